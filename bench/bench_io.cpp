@@ -18,6 +18,7 @@
 
 #include "cloud_or_flat.hpp"
 #include "compare.hpp"
+#include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/detail/scene/describe_cloud.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/detail/scene/views_around.hpp"

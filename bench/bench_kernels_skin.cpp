@@ -14,7 +14,7 @@
 #endif
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/detail/avatar/skinning_weights.hpp"
-#include "gsnav/scene/renderer.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/skin/skin.hpp"
 #include "kernel_bench.hpp"
 

@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "bench_nav_scenes.hpp"
+#include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/detail/io/mesh_file.hpp"
 #include "gsnav/detail/nav/geodesic_field.hpp"
-#include "gsnav/sim/default_scene.hpp"
 #include "navmesh_impl.hpp"
 
 using namespace gsnav;

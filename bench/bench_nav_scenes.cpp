@@ -7,8 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/detail/io/mesh_file.hpp"
-#include "gsnav/sim/default_scene.hpp"
 #include "navmesh_impl.hpp"
 
 namespace gsnav_bench {

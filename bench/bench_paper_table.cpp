@@ -14,10 +14,11 @@
 #include <vector>
 
 #include "gsnav/backends/openmp.hpp"
+#include "gsnav/detail/demo/people.hpp"
 #include "gsnav/detail/sim/scene_library.hpp"
+#include "gsnav/detail/sim/start_times.hpp"
 #include "gsnav/sim/basic_batch.hpp"
 #include "gsnav/sim/follower.hpp"
-#include "gsnav/sim/people.hpp"
 #include "report/runner_system.hpp"
 #if defined(GSNAV_HAS_CUDA)
 #include <cuda_runtime_api.h>

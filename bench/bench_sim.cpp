@@ -12,12 +12,12 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/core/rng.hpp"
-#include "gsnav/detail/avatar/humanoid.hpp"
-#include "gsnav/detail/avatar/proxy_fit.hpp"
 #include "gsnav/detail/avatar/skinned_crowd.hpp"
 #include "gsnav/detail/avatar/weight_gradients.hpp"
+#include "gsnav/detail/demo/default_scene.hpp"
+#include "gsnav/detail/demo/humanoid.hpp"
+#include "gsnav/detail/rigging/proxy_fit.hpp"
 #include "gsnav/sim/basic_batch.hpp"
-#include "gsnav/sim/default_scene.hpp"
 
 namespace {
 

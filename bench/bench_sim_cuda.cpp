@@ -9,9 +9,9 @@
 #include "device_time.hpp"
 #include "gsnav/backends/cuda.hpp"
 #include "gsnav/backends/cuda/pinned.hpp"
+#include "gsnav/detail/demo/people.hpp"
 #include "gsnav/sim/basic_simulator.hpp"
 #include "gsnav/sim/follower.hpp"
-#include "gsnav/sim/people.hpp"
 #include "samples.hpp"
 
 namespace {

@@ -13,6 +13,7 @@
 #include "cloud_or_flat.hpp"
 #include "compare.hpp"
 #include "gsnav/backends/openmp.hpp"
+#include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/detail/io/cameras_file.hpp"
 #include "gsnav/detail/scene/describe_cloud.hpp"
 #include "gsnav/detail/scene/views_around.hpp"

@@ -4,9 +4,9 @@
 #include <string>
 #include <utility>
 
+#include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/sim/default_scene.hpp"
 
 namespace gsnav_bench {
 

@@ -3,9 +3,9 @@
 
 #include <cstdlib>
 
+#include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/detail/io/cameras_file.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/sim/default_scene.hpp"
 
 using namespace gsnav;
 

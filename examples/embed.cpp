@@ -2,8 +2,8 @@
 // An image of a scene. usage: embed [device]
 #include <cstdio>
 
+#include "gsnav/demo.hpp"
 #include "gsnav/device/renderer.hpp"
-#include "gsnav/sim/default_scene.hpp"
 
 int main(int argc, char** argv) {
   auto device = gsnav::Device::parse(argc > 1 ? argv[1] : "best").value();

@@ -2,9 +2,9 @@
 // The same in many environments at once. usage: pointnav_batch [device]
 #include <cstdio>
 
+#include "gsnav/demo.hpp"
 #include "gsnav/device/simulator.hpp"
 #include "gsnav/sim/follower.hpp"
-#include "gsnav/sim/people.hpp"
 
 int main(int argc, char** argv) {
   auto device = gsnav::Device::parse(argc > 1 ? argv[1] : "best").value();

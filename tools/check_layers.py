@@ -12,12 +12,14 @@ import sys
 import tempfile
 
 RANK = {"base": 0, "math": 1, "core": 2, "image": 3, "frame": 4, "skin": 4, "sweep": 4, "mesh": 5, "lanes": 6,
-        "render": 6, "scene": 7, "avatar": 7, "nav": 7, "io": 8, "interop": 8, "sim": 8, "eval": 8, "device": 9}
+        "render": 6, "scene": 7, "avatar": 7, "nav": 7, "rigging": 8, "io": 8, "interop": 8, "sim": 8,
+        "eval": 8, "demo": 9, "device": 9}
 # avatar may include these
 DATA_ONLY = {"scene/gaussian_cloud.hpp", "scene/load_report.hpp", "scene/surface_material.hpp"}
 # Not standard, but there wherever the code that includes them is compiled.
 PLATFORM_HEADERS = {"immintrin.h", "arm_neon.h", "fcntl.h", "sys/mman.h", "sys/stat.h", "unistd.h"}
-MODULES = {"render", "avatar", "nav", "sim", "io", "eval", "gsnav"}  # headers that include what users need
+# headers that include what users need
+MODULES = {"render", "avatar", "rigging", "nav", "sim", "io", "eval", "demo", "gsnav"}
 MOST_PUBLIC = 70
 SOURCES = {".hpp", ".cpp", ".h", ".inl", ".cu", ".cuh"}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
@@ -94,6 +96,7 @@ def self_test():
            "include/gsnav/avatar/not_data.hpp": '"gsnav/scene/basic_renderer.hpp"',
            "include/gsnav/render/backend.hpp": "<gsnav/backends/serial.hpp>",
            "include/gsnav/scene/library.hpp": "<Eigen/Core>", "tools/t/main.cpp": '"gsnav/detail/io/ply.hpp"',
+           "src/sim/makes.cpp": '"gsnav/detail/rigging/retarget.hpp"',
            "src/sim/reads.cpp": '#  include "../io/private.hpp"', "src/io/private.hpp": "",
            "backends/y/gsnav/backends/y.hpp": '"gsnav/backends/x.hpp"',
            "backends/z/src/z.cpp": '"gsnav/scene/basic_renderer.hpp"', "src/other/o.cpp": ""}

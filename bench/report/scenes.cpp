@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "cache.hpp"
+#include "gsnav/demo.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/sim/default_scene.hpp"
 
 namespace gsnav_report {
 

@@ -9,8 +9,8 @@
 #include "../nav_loop/canvas.hpp"
 #include "crowd.hpp"
 #include "gsnav/core/replace_file.hpp"
+#include "gsnav/demo.hpp"
 #include "gsnav/io/image_file.hpp"
-#include "gsnav/sim/default_scene.hpp"
 
 namespace {
 

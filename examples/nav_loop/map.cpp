@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "gsnav/demo.hpp"
 #include "gsnav/frame/sh.hpp"
-#include "gsnav/sim/people.hpp"
 
 namespace nav_loop {
 namespace {

@@ -6,14 +6,14 @@
 #include <optional>
 
 #include "gsnav/core/printable.hpp"
+#include "gsnav/demo.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/nav.hpp"
 #include "gsnav/render.hpp"
 #include "gsnav/scene/prepare.hpp"
-#include "gsnav/sim/default_scene.hpp"
-#include "gsnav/sim/people.hpp"
+#include "gsnav/sim.hpp"
 
 namespace nav_loop {
 namespace {
@@ -62,7 +62,7 @@ Result<gsnav::VisibleSets> visible_sets_of(const Options& options, const gsnav::
 
 /// Lets go of SH bands that cannot be seen.
 void fit_storage(gsnav::GaussianCloud& cloud, double unseen) {
-  gsnav::SceneProfile profile = gsnav::profile_scene(cloud, unseen);
+  gsnav::SceneBands profile = gsnav::scene_bands(cloud, unseen);
   gsnav::drop_bands(cloud, profile);
 }
 

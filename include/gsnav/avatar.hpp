@@ -1,29 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// People: skeletons, motions, skinning and the making of Gaussian avatars. Link gsnav::avatar.
+// People: skeletons, motions and skinning. Link gsnav::avatar. What makes them: rigging.hpp.
 
 #include "gsnav/avatar/actor.hpp"
 #include "gsnav/avatar/asset.hpp"
 #include "gsnav/avatar/motion.hpp"
 #include "gsnav/avatar/skeleton.hpp"
 #include "gsnav/avatar/skinned_gaussians.hpp"
-#include "gsnav/detail/avatar/avatar.hpp"
 #include "gsnav/detail/avatar/body_bounds.hpp"
-#include "gsnav/detail/avatar/capsule_fit.hpp"
 #include "gsnav/detail/avatar/capsule_track.hpp"
-#include "gsnav/detail/avatar/capsule_volume.hpp"
-#include "gsnav/detail/avatar/clip_walk.hpp"
-#include "gsnav/detail/avatar/cloud_binding.hpp"
-#include "gsnav/detail/avatar/foot_contact.hpp"
-#include "gsnav/detail/avatar/foot_lock.hpp"
-#include "gsnav/detail/avatar/gait.hpp"
-#include "gsnav/detail/avatar/humanoid.hpp"
-#include "gsnav/detail/avatar/joint_match.hpp"
-#include "gsnav/detail/avatar/mesh_avatar.hpp"
-#include "gsnav/detail/avatar/mesh_surface.hpp"
-#include "gsnav/detail/avatar/proxy_fit.hpp"
-#include "gsnav/detail/avatar/retarget.hpp"
 #include "gsnav/detail/avatar/skinned_crowd.hpp"
 #include "gsnav/detail/avatar/skinned_mesh.hpp"
 #include "gsnav/detail/avatar/skinning_weights.hpp"

@@ -5,12 +5,12 @@
 // gsnav::avatar for what avatar/ declares. nav, io, sim and interop have headers of their own, because
 // they need other libraries.
 
+#include "gsnav/avatar.hpp"
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/rng.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/core/view.hpp"
-#include "gsnav/detail/avatar/avatar.hpp"
 #include "gsnav/detail/core/parallel.hpp"
 #include "gsnav/detail/render/at_time.hpp"
 #include "gsnav/detail/scene/describe_cloud.hpp"

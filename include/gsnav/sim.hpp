@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The simulator on a device chosen at run time: scenes, sensors, actions, episodes, metrics, people and
+// The simulator on a device chosen at run time: scenes, sensors, actions, episodes, metrics and
 // batches. Link gsnav::device. BasicSimulator and BasicBatchSimulator, over a backend of your choice:
 // sim/basic_simulator.hpp and sim/basic_batch.hpp.
 
@@ -16,14 +16,13 @@
 #include "gsnav/detail/sim/reward.hpp"
 #include "gsnav/detail/sim/scene_library.hpp"
 #include "gsnav/detail/sim/sensor.hpp"
+#include "gsnav/detail/sim/start_times.hpp"
 #include "gsnav/detail/sim/task.hpp"
 #include "gsnav/device/device.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/device/simulator.hpp"
 #include "gsnav/sim/config.hpp"
-#include "gsnav/sim/default_scene.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "gsnav/sim/metrics.hpp"
-#include "gsnav/sim/people.hpp"
 #include "gsnav/sim/scene.hpp"
 #include "gsnav/sim/world.hpp"

@@ -17,9 +17,7 @@ Result<AvatarActor> AvatarActor::create(std::shared_ptr<const AvatarAsset> asset
                                         std::shared_ptr<const MotionSource> motion,
                                         std::shared_ptr<const Trajectory> trajectory,
                                         const ActorOptions& options) {
-  const auto bad = [](const std::string& what) {
-    return Status(Errc::invalid_argument, "AvatarActor: " + what);
-  };
+  const BadArgument bad{"AvatarActor: "};
   if (asset == nullptr) return bad("no asset");
   if (Status s = asset->validate(); !s) return s;
   if (motion == nullptr) {

@@ -10,9 +10,7 @@ namespace gsnav {
 
 Result<TrackedCapsules> capsules_from_track(const Skeleton& skeleton, const MotionClip& clip,
                                             const std::vector<std::vector<Capsule<double>>>& track) {
-  const auto bad = [](const std::string& what) {
-    return Status(Errc::invalid_argument, "capsules_from_track: " + what);
-  };
+  const BadArgument bad{"capsules_from_track: "};
   if (Status s = clip.validate(); !s) return s;
   if (clip.joints != skeleton.size()) return bad("the clip is of another skeleton");
   if (track.size() != clip.frames()) {

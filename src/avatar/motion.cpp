@@ -23,9 +23,7 @@ double MotionClip::duration() const noexcept {
 }
 
 Status MotionClip::validate() const {
-  const auto bad = [](const std::string& what) {
-    return Status(Errc::invalid_argument, "MotionClip." + what);
-  };
+  const BadArgument bad{"MotionClip."};
   const std::size_t t = frames();
   if (!(frame_rate > 0) || !is_finite(frame_rate)) return bad("frame_rate must be positive");
   if (t == 0 || rotations.size() != t * joints) {

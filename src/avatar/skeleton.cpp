@@ -72,9 +72,7 @@ LocalPose Skeleton::rest_pose() const {
 }
 
 Status Skeleton::validate() const {
-  const auto bad = [](const std::string& what) {
-    return Status(Errc::invalid_argument, "Skeleton: " + what);
-  };
+  const BadArgument bad{"Skeleton: "};
   const std::size_t n = parents.size();
   if (n == 0) return bad("no joints");
   const auto sized = [&](std::size_t have, const char* name) {

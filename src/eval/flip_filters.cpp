@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "flip_filters.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <numeric>

@@ -15,6 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 using detail::Json;
 using detail::member;
+using detail::must_be;
 using detail::shown;
 
 class SceneReader {
@@ -23,22 +24,18 @@ class SceneReader {
       : folder_(path.parent_path()), source_(path.string()), json_(json) {}
 
   Result<AvatarScene> run() {
-    if (!json_.is_object())
-      return {Errc::invalid_file, source_ + ": is " + shown(json_) + ", must be an object"};
+    if (!json_.is_object()) return must_be(source_ + ":", json_, "an object");
     if (Status s = number(json_, "time_max", source_, out_.time_max); !s) return s;
     if (!(out_.time_max >= 0)) return {Errc::invalid_file, source_ + ": 'time_max' is negative"};
     if (const Json* loop = member(json_, "time_loop"); loop != nullptr) {
-      if (!loop->is_boolean())
-        return {Errc::invalid_file,
-                source_ + ": 'time_loop' is " + shown(*loop) + ", must be true or false"};
+      if (!loop->is_boolean()) return must_be(source_ + ": 'time_loop'", *loop, "true or false");
       out_.time_loop = loop->get<bool>();
     }
     const Json* list = member(json_, "gaussian_avatars");
     const char* key = list != nullptr ? "gaussian_avatars" : "avatars";
     if (list == nullptr) list = member(json_, "avatars");
     if (list == nullptr) return std::move(out_);
-    if (!list->is_array())
-      return {Errc::invalid_file, source_ + ": '" + key + "' is " + shown(*list) + ", must be an array"};
+    if (!list->is_array()) return must_be(source_ + ": '" + key + "'", *list, "an array");
     for (std::size_t i = 0; i < list->size(); ++i) {
       const std::string at = source_ + ": " + key + "[" + std::to_string(i) + "]";
       if (Status s = avatar((*list)[i], at); !s) return s;
@@ -59,14 +56,14 @@ class SceneReader {
     const Json* v = member(object, key);
     if (v == nullptr) return {Errc::invalid_file, at + ": '" + key + "' is missing"};
     if (!v->is_string() || v->get<std::string>().empty()) {
-      return {Errc::invalid_file, at + ": '" + key + "' is " + shown(*v) + ", must be a path"};
+      return must_be(at + ": '" + key + "'", *v, "a path");
     }
     const fs::path p(v->get<std::string>());
     return p.is_absolute() ? p : folder_ / p;
   }
 
   Status avatar(const Json& a, const std::string& at) {
-    if (!a.is_object()) return {Errc::invalid_file, at + " is " + shown(a) + ", must be an object"};
+    if (!a.is_object()) return must_be(at, a, "an object");
     SceneAvatar out;
     if (const Json* name = member(a, "name"); name != nullptr && name->is_string())
       out.name = name->get<std::string>();

@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using detail::Json;
 using detail::member;
-using detail::shown;
+using detail::must_be;
 
 constexpr std::size_t kLeastText = std::size_t{1} << 16;
 constexpr std::size_t kMostText = std::size_t{1} << 30;  // a million episodes are half of it
@@ -67,12 +67,10 @@ class EpisodeReader {
     const auto json = detail::parse_json(*text, path.string(), limits_);
     if (!json) return json.status();
     source_ = path.string();
-    if (!json->is_object())
-      return {Errc::invalid_file, source_ + ": is " + shown(*json) + ", must be an object"};
+    if (!json->is_object()) return must_be(source_ + ":", *json, "an object");
     const Json* list = member(*json, "episodes");
     if (list == nullptr) return {Errc::invalid_file, source_ + ": 'episodes' is missing"};
-    if (!list->is_array())
-      return {Errc::invalid_file, source_ + ": 'episodes' is " + shown(*list) + ", must be an array"};
+    if (!list->is_array()) return must_be(source_ + ": 'episodes'", *list, "an array");
     if (list->empty() && follow) return read_content(path.parent_path() / "content");
     for (std::size_t i = 0; i < list->size(); ++i) {
       if (Status s = episode((*list)[i], source_ + ": episodes[" + std::to_string(i) + "]"); !s)
@@ -118,7 +116,7 @@ class EpisodeReader {
     } else if (v->is_string()) {
       out = v->get<std::string>();
     } else {
-      return {Errc::invalid_file, at + ": '" + key + "' is " + shown(*v) + ", must be a text"};
+      return must_be(at + ": '" + key + "'", *v, "a text");
     }
     return {};
   }
@@ -153,7 +151,7 @@ class EpisodeReader {
   }
 
   Status episode(const Json& e, const std::string& at) {
-    if (!e.is_object()) return {Errc::invalid_file, at + " is " + shown(e) + ", must be an object"};
+    if (!e.is_object()) return must_be(at, e, "an object");
     PointNavEpisode out;
     out.id = std::to_string(out_.episodes.size());
     if (Status s = text(e, "episode_id", at, out.id); !s) return s;

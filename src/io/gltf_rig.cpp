@@ -5,7 +5,6 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <utility>
 
 #include "gltf_file_skins.hpp"
 #include "gsnav/skin/lbs.hpp"

@@ -16,6 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using detail::Json;
 using detail::member;
+using detail::must_be;
 using detail::shown;
 using namespace habitat;
 
@@ -135,18 +136,15 @@ class DatasetReader {
     const Json* section = member(json, part);
     if (section == nullptr) return {};
     const std::string at = at_ + ": " + part;
-    if (!section->is_object())
-      return {Errc::invalid_file, at + " is " + shown(*section) + ", must be an object"};
+    if (!section->is_object()) return must_be(at, *section, "an object");
     left_out_.add(*section, {"paths", "default_attributes"}, at);
     const Json* paths = member(*section, "paths");
     if (paths == nullptr) return {};
-    if (!paths->is_object())
-      return {Errc::invalid_file, at + ": 'paths' is " + shown(*paths) + ", must be an object"};
+    if (!paths->is_object()) return must_be(at + ": 'paths'", *paths, "an object");
     const Json* list = member(*paths, ".json");
     left_out_.add(*paths, {".json"}, at + ": paths");
     if (list == nullptr) return {};
-    if (!list->is_array())
-      return {Errc::invalid_file, at + ": paths['.json'] is " + shown(*list) + ", must be an array"};
+    if (!list->is_array()) return must_be(at + ": paths['.json']", *list, "an array");
     for (const Json& p : *list) {
       if (!p.is_string())
         return {Errc::invalid_file, at + ": paths['.json'] has " + shown(p) + ", must have paths"};
@@ -192,15 +190,9 @@ class DatasetReader {
   Status read_navmeshes(const Json& json) {
     const Json* section = member(json, "navmesh_instances");
     if (section == nullptr) return {};
-    if (!section->is_object()) {
-      return {Errc::invalid_file,
-              at_ + ": 'navmesh_instances' is " + shown(*section) + ", must be an object"};
-    }
+    if (!section->is_object()) return must_be(at_ + ": 'navmesh_instances'", *section, "an object");
     for (const auto& [name, path] : section->items()) {
-      if (!path.is_string()) {
-        return {Errc::invalid_file,
-                at_ + ": navmesh_instances['" + name + "'] is " + shown(path) + ", must be a path"};
-      }
+      if (!path.is_string()) return must_be(at_ + ": navmesh_instances['" + name + "']", path, "a path");
       navmeshes_[name] = (folder_ / path.get<std::string>()).lexically_normal();
     }
     return {};

@@ -11,6 +11,7 @@ namespace habitat {
 namespace fs = std::filesystem;
 using detail::Json;
 using detail::member;
+using detail::must_be;
 using detail::shown;
 
 Result<Json> load_object(const fs::path& path) {
@@ -26,8 +27,7 @@ Result<Json> load_object(const fs::path& path) {
 Result<std::string> text(const Json& object, const char* key, const std::string& at) {
   const Json* v = member(object, key);
   if (v == nullptr) return std::string();
-  if (!v->is_string())
-    return {Errc::invalid_file, at + ": '" + key + "' is " + shown(*v) + ", must be a text"};
+  if (!v->is_string()) return must_be(at + ": '" + key + "'", *v, "a text");
   return v->get<std::string>();
 }
 
@@ -48,8 +48,7 @@ Status read_scale(const Json& object, const std::string& at, double& out) {
   for (const Json& x : v->is_array() ? *v : Json::array({*v}))
     s.push_back(x.is_number() ? x.get<double>() : NAN);
   for (const double x : s) {
-    if (!(x > 0) || !std::isfinite(x))
-      return {Errc::invalid_file, at + ": 'scale' is " + shown(*v) + ", must be positive"};
+    if (!(x > 0) || !std::isfinite(x)) return must_be(at + ": 'scale'", *v, "positive");
     if (x != s[0]) return {Errc::unsupported, at + ": 'scale' differs by axis; one for all is read"};
   }
   if (s.size() != 1 && s.size() != 3)
@@ -87,9 +86,7 @@ Status read_stage(const Json& object, const fs::path& folder, const std::string&
   }
   if (Status s = read_scale(object, at, out.scale); !s) return s;
   if (const Json* v = member(object, "norm_quaternion"); v != nullptr) {
-    if (!v->is_boolean())
-      return {Errc::invalid_file,
-              at + ": 'norm_quaternion' is " + shown(*v) + ", must be true or false"};
+    if (!v->is_boolean()) return must_be(at + ": 'norm_quaternion'", *v, "true or false");
     out.norm_quaternion = v->get<bool>();
   }
   left_out.add(object,

@@ -76,6 +76,10 @@ std::string shown(const Json& value) {
                                          : value.dump(-1, ' ', true, Json::error_handler_t::replace));
 }
 
+Status must_be(const std::string& what, const Json& value, const char* rule) {
+  return {Errc::invalid_file, what + " is " + shown(value) + ", must be " + rule};
+}
+
 const Json* member(const Json& object, const char* key) {
   if (!object.is_object()) return nullptr;
   const auto found = object.find(key);
@@ -94,8 +98,7 @@ Result<double> get_number(const Json& object, const char* key, const std::string
   const Json* value = member(object, key);
   if (value == nullptr) return missing(key, where);
   if (!value->is_number() || !std::isfinite(value->get<double>())) {
-    return {Errc::invalid_file,
-            where + ": '" + key + "' is " + shown(*value) + ", must be a finite number"};
+    return must_be(where + ": '" + key + "'", *value, "a finite number");
   }
   return value->get<double>();
 }
@@ -130,8 +133,7 @@ Result<std::vector<double>> get_numbers(const Json& object, const char* key, std
   for (std::size_t i = 0; i < size; ++i) {
     const Json& item = (*value)[i];
     if (!item.is_number() || !std::isfinite(item.get<double>())) {
-      return {Errc::invalid_file, where + ": '" + key + "[" + std::to_string(i) + "]' is " +
-                                      shown(item) + ", must be a finite number"};
+      return must_be(where + ": '" + key + "[" + std::to_string(i) + "]'", item, "a finite number");
     }
     out.push_back(item.get<double>());
   }

@@ -29,6 +29,9 @@ Status check_limits(const ReadLimits& limits, const std::string& source);
 /// A value of a file as it is shown in an error message.
 std::string shown(const Json& value);
 
+/// invalid_file: "`what` is `value`, must be `rule`".
+Status must_be(const std::string& what, const Json& value, const char* rule);
+
 /// Member `key` of `object`, or null where it is none or lacks it.
 const Json* member(const Json& object, const char* key);
 

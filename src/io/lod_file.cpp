@@ -4,15 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
-#include <span>
 #include <string>
 #include <vector>
 
-#include "file.hpp"
+#include "cache_file.hpp"
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/detail/core/pool_backend.hpp"
-#include "gsnav/detail/scene/content_hash.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 
@@ -22,16 +19,13 @@ namespace {
 namespace fs = std::filesystem;
 using detail::invalid_file;
 
-constexpr char kMagic[8] = {'G', 'S', 'N', 'A', 'V', 'L', 'O', 'D'};
 /// Grows with every change of what build_lod makes of a cloud.
 constexpr std::uint32_t kVersion = 2;
 
 /// What stands at the front; the arrays of for_each_array follow.
 struct Header {
-  char magic[8];
-  std::uint32_t version, size;
-  std::uint64_t built_of[2];  ///< hash of cloud, settings and version
-  std::uint64_t checksum;     ///< of the arrays
+  detail::CacheFront front;
+  std::uint64_t checksum;  ///< of the arrays
 };
 static_assert(sizeof(Header) == 40);
 
@@ -42,13 +36,17 @@ struct Node {
 };
 static_assert(sizeof(Node) == 64);
 
-Hasher built_of(const GaussianCloud& cloud, const LodSettings& settings) {
+Hasher hash_of(const GaussianCloud& cloud, const LodSettings& settings) {
   Hasher h;
   h.value(kVersion);
   h.value(settings.sh_degree);
   h.value(settings.neighbours);
   hash_cloud(h, cloud);
   return h;
+}
+
+detail::CacheFront front_of(const GaussianCloud& cloud, const LodSettings& settings) {
+  return {"GSNAVLOD", kVersion, sizeof(Header), hash_of(cloud, settings)};
 }
 
 /// The arrays of a tree that a file has, in its order.
@@ -110,10 +108,7 @@ Status check(const fs::path& path, const GaussianCloud& m, const std::vector<Nod
 
 std::uint64_t checksum(const LodTree& tree, const std::vector<Node>& nodes) {
   Hasher h;
-  for_each_array(tree, const_cast<std::vector<Node>&>(nodes), [&h](const auto& v) {
-    h.value(v.size());
-    h.bytes(v.data(), v.size() * sizeof(v[0]));
-  });
+  for_each_array(tree, const_cast<std::vector<Node>&>(nodes), [&h](const auto& v) { h.array(v); });
   return h.low();
 }
 
@@ -134,13 +129,7 @@ Status save_lod(const fs::path& path, const LodTree& tree, const GaussianCloud& 
       nodes[i].opacity_max = n.reach.opacity_max;
       nodes[i].grain = n.grain;
     }
-    Header header{};
-    std::memcpy(header.magic, kMagic, sizeof kMagic);
-    header.version = kVersion;
-    header.size = sizeof header;
-    const Hasher of = built_of(cloud, settings);
-    for (std::size_t k = 0; k < 2; ++k) header.built_of[k] = of.state()[k];
-    header.checksum = checksum(tree, nodes);
+    const Header header{front_of(cloud, settings), checksum(tree, nodes)};
     return replace_file(path, [&](OutputFile& file) {
       file.write(&header, sizeof header);
       for_each_array(tree, nodes,
@@ -152,21 +141,9 @@ Status save_lod(const fs::path& path, const LodTree& tree, const GaussianCloud& 
 Result<LodTree> load_lod(const fs::path& path, const GaussianCloud& cloud, const LodSettings& settings) {
   return detail::guarded(path.string(), [&]() -> Result<LodTree> {
     detail::RandomFile file;
-    if (Status s = file.open(path); !s) return s;
     Header header{};
-    if (file.size() < sizeof header || !file.read(0, std::as_writable_bytes(std::span(&header, 1)))) {
-      return invalid_file(path, "shorter than the header of a level-of-detail file");
-    }
-    if (std::memcmp(header.magic, kMagic, sizeof kMagic) != 0 || header.size != sizeof header) {
-      return invalid_file(path, "not a level-of-detail file");
-    }
-    const Hasher of = built_of(cloud, settings);
-    if (header.version != kVersion || header.built_of[0] != of.state()[0] ||
-        header.built_of[1] != of.state()[1]) {
-      return Status(
-          Errc::invalid_argument,
-          path.string() + ": was built of another scene, by other settings or by another version");
-    }
+    const detail::CacheFront front = front_of(cloud, settings);
+    if (Status s = open_cache(path, front, "level-of-detail file", file, header); !s) return s;
     LodTree tree;
     if (cloud.size() != 0 && cloud.chunk_bounds.size() != cloud.view().chunk_count()) {
       return Status(Errc::invalid_argument, path.string() + ": the cloud is not in spatial order");
@@ -179,13 +156,9 @@ Result<LodTree> load_lod(const fs::path& path, const GaussianCloud& cloud, const
       return invalid_file(path, "has " + std::to_string(file.size()) + " bytes where " +
                                     std::to_string(wanted) + " are needed");
     }
-    std::uint64_t at = sizeof header;
-    bool whole = true;
-    for_each_array(tree, nodes, [&](auto& v) {
-      whole = whole && file.read(at, std::as_writable_bytes(std::span(v.data(), v.size())));
-      at += v.size() * sizeof(v[0]);
-    });
-    if (!whole) return detail::reading_failed(path.string());
+    detail::ArrayReader read(file, sizeof header);
+    for_each_array(tree, nodes, [&read](auto& v) { read(v); });
+    if (!read.whole()) return detail::reading_failed(path.string());
     if (header.checksum != checksum(tree, nodes))
       return invalid_file(path, "its checksum is another: damaged");
     if (Status s = check(path, tree.merged, nodes, std::max<std::size_t>(cloud.origins.size(), 1)); !s)
@@ -208,7 +181,7 @@ Result<LodTree> load_lod(const fs::path& path, const GaussianCloud& cloud, const
 }
 
 fs::path lod_path(const std::string& spec, const GaussianCloud& cloud, const LodSettings& settings) {
-  return detail::path_beside(spec) + "." + built_of(cloud, settings).hex().substr(0, 16) + ".lod";
+  return detail::path_beside(spec) + "." + hash_of(cloud, settings).hex().substr(0, 16) + ".lod";
 }
 
 }  // namespace gsnav::io

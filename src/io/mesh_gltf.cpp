@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <utility>
-#include <vector>
 
 #include "gltf_nodes.hpp"
 #include "gltf_primitive.hpp"

@@ -13,6 +13,7 @@ namespace gsnav::io {
 namespace {
 
 using detail::Json;
+using detail::must_be;
 using detail::shown;
 
 struct NumberKey {
@@ -49,7 +50,7 @@ constexpr const char *kVertsPerPoly = "vertsPerPoly", *kTileSize = "tileSize", *
 Result<std::int64_t> whole(const Json& value, const std::string& what, double most) {
   const double v = value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN();
   if (v >= 0 && v <= most && v == std::floor(v)) return static_cast<std::int64_t>(v);
-  return {Errc::invalid_file, what + " is " + shown(value) + ", must be a whole number, 0 or more"};
+  return must_be(what, value, "a whole number, 0 or more");
 }
 
 Status read_setting(const std::string& key, const Json& value, const std::string& at,
@@ -57,15 +58,13 @@ Status read_setting(const std::string& key, const Json& value, const std::string
   const std::string what = at + ": '" + key + "'";
   for (const NumberKey& n : kNumbers) {
     if (key != n.key) continue;
-    if (!value.is_number())
-      return {Errc::invalid_file, what + " is " + shown(value) + ", must be a number"};
+    if (!value.is_number()) return must_be(what, value, "a number");
     s.*n.value = value.get<double>();
     return {};
   }
   for (const FlagKey& f : kFlags) {
     if (key != f.key) continue;
-    if (!value.is_boolean())
-      return {Errc::invalid_file, what + " is " + shown(value) + ", must be true or false"};
+    if (!value.is_boolean()) return must_be(what, value, "true or false");
     s.*f.value = value.get<bool>();
     return {};
   }

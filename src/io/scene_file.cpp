@@ -20,7 +20,7 @@
 #include "gsnav/detail/io/temporal_file.hpp"
 #include "gsnav/detail/scene/describe_cloud.hpp"
 #include "gsnav/detail/scene/drop_bands.hpp"
-#include "gsnav/detail/scene/scene_profile.hpp"
+#include "gsnav/detail/scene/scene_bands.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "packed_file.hpp"
 #include "ply_temporal.hpp"
@@ -204,7 +204,7 @@ Result<std::optional<LoadedPackedCloud>> pack_apart(const std::string& spec, Loa
     packer.add(bands.data(), std::min(each, chunks - chunk));
   }
   int used = 0;
-  for (const std::uint8_t degree : profile_scene(out.cloud).chunk_sh_degrees)
+  for (const std::uint8_t degree : scene_bands(out.cloud).chunk_sh_degrees)
     used = std::max(used, int{degree});
   const int kept = options.keep_zero_bands ? apart.degree : used;
   packer.give(out.report.packing, kept);

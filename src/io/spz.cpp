@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/detail/io/spz.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <span>
 #include <utility>

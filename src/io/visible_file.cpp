@@ -3,12 +3,10 @@
 
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <string>
 
-#include "file.hpp"
+#include "cache_file.hpp"
 #include "gsnav/core/replace_file.hpp"
-#include "gsnav/detail/scene/content_hash.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -16,15 +14,12 @@ namespace {
 namespace fs = std::filesystem;
 using detail::invalid_file;
 
-constexpr char kMagic[8] = {'G', 'S', 'N', 'A', 'V', 'V', 'I', 'S'};
 /// Grows with every change of what build_visible_sets makes of a cloud.
 constexpr std::uint32_t kVersion = 2;
 
 /// What stands at the front; keys, ends and bits follow.
 struct Header {
-  char magic[8];
-  std::uint32_t version, size;
-  std::uint64_t built_of[2];  ///< hash of the cloud but for its colours, and of the version
+  detail::CacheFront front;
   double cell, focal, near_plane, near_sigma, min_weight;
   std::uint64_t viewpoints, cells, chunks;  ///< chunks of the cloud
   std::uint64_t words;                      ///< of all cells' bits
@@ -32,11 +27,16 @@ struct Header {
 };
 static_assert(sizeof(Header) == 112);
 
+/// Of the cloud but for its colours, and of the version.
 Hasher hash_of(const GaussianCloud& cloud) {
   Hasher h;
   h.value(kVersion);
   hash_shapes(h, cloud);
   return h;
+}
+
+detail::CacheFront front_of(const GaussianCloud& cloud) {
+  return {"GSNAVVIS", kVersion, sizeof(Header), hash_of(cloud)};
 }
 
 std::uint64_t checksum(const VisibleSets& v) {
@@ -106,11 +106,7 @@ Status check(const fs::path& path, const VisibleSets& v, std::size_t cloud_rows)
 Status save_visible_sets(const fs::path& path, const VisibleSets& sets, const GaussianCloud& cloud) {
   return detail::guarded(path.string(), [&]() -> Status {
     Header header{};
-    std::memcpy(header.magic, kMagic, sizeof kMagic);
-    header.version = kVersion;
-    header.size = sizeof header;
-    const Hasher of = hash_of(cloud);
-    for (std::size_t k = 0; k < 2; ++k) header.built_of[k] = of.state()[k];
+    header.front = front_of(cloud);
     header.cell = sets.cell;
     header.focal = sets.focal;
     header.near_plane = sets.near_plane;
@@ -133,20 +129,8 @@ Status save_visible_sets(const fs::path& path, const VisibleSets& sets, const Ga
 Result<VisibleSets> load_visible_sets(const fs::path& path, const GaussianCloud& cloud) {
   return detail::guarded(path.string(), [&]() -> Result<VisibleSets> {
     detail::RandomFile file;
-    if (Status s = file.open(path); !s) return s;
     Header header{};
-    if (file.size() < sizeof header || !file.read(0, std::as_writable_bytes(std::span(&header, 1)))) {
-      return invalid_file(path, "shorter than the header of a file of visible sets");
-    }
-    if (std::memcmp(header.magic, kMagic, sizeof kMagic) != 0 || header.size != sizeof header) {
-      return invalid_file(path, "not a file of visible sets");
-    }
-    const Hasher of = hash_of(cloud);
-    if (header.version != kVersion || header.built_of[0] != of.state()[0] ||
-        header.built_of[1] != of.state()[1]) {
-      return Status(Errc::invalid_argument,
-                    path.string() + ": was built of another scene, or by another version");
-    }
+    if (Status s = open_cache(path, front_of(cloud), "file of visible sets", file, header); !s) return s;
     // Nothing is allocated that the file does not have.
     VisibleSets v;
     v.cloud_chunks = cloud.view().chunk_count();
@@ -169,17 +153,11 @@ Result<VisibleSets> load_visible_sets(const fs::path& path, const GaussianCloud&
     v.keys.resize(header.cells);
     v.ends.resize(header.cells);
     v.bits.resize(header.words);
-    std::uint64_t at = sizeof header;
-    bool whole = true;
-    const auto read = [&](auto& array) {
-      const auto bytes = std::as_writable_bytes(std::span(array));
-      whole = whole && (bytes.empty() || file.read(at, bytes));
-      at += bytes.size();
-    };
+    detail::ArrayReader read(file, sizeof header);
     read(v.keys);
     read(v.ends);
     read(v.bits);
-    if (!whole) return detail::reading_failed(path.string());
+    if (!read.whole()) return detail::reading_failed(path.string());
     if (header.checksum != checksum(v)) return invalid_file(path, "its checksum is another: damaged");
     if (Status s = check(path, v, cloud.size()); !s) return s;
     return v;

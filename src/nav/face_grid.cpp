@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "face_grid.hpp"
 
-#include <array>
 #include <cmath>
 
 #include "gsnav/math/aabb.hpp"

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
 #include <cstdio>
 #include <limits>
-#include <numeric>
 
 #include "navmesh_impl.hpp"
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/nav/navmesh_settings.hpp"
 
-#include <cmath>
-#include <limits>
 #include <string>
 
 #include "navmesh_format.hpp"

@@ -49,9 +49,7 @@ std::vector<Vec3d> straight(const NavMesh& mesh, const NavPoint& a, const NavPoi
 
 Result<ClearPath> keep_clear(const NavMesh& mesh, std::span<const Vec3d> points,
                              const ClearanceOptions& options) {
-  const auto bad = [](const std::string& what) {
-    return Status(Errc::invalid_argument, "keep_clear: " + what);
-  };
+  const BadArgument bad{"keep_clear: "};
   if (!(options.clearance >= 0) || !(options.clearance <= 10))
     return bad("ClearanceOptions.clearance must be from 0 to 10 m");
   if (!(options.spacing > 0.01) || !(options.spacing <= 1))

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The voxels that opaque Gaussians fill, tile by tile.
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <mutex>
 #include <new>
-#include <string>
 
 #include "solid_gaussians.hpp"
 

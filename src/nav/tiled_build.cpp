@@ -2,7 +2,6 @@
 // The build in tiles. Each looks at a border of the agent's radius and three cells around it, so that
 // erosion and filters see what they would see in one tile: the same cells can be walked on.
 #include <algorithm>
-#include <cmath>
 #include <functional>
 #include <mutex>
 #include <optional>

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/detail/sim/batch_world.hpp"
 
-#include <algorithm>
-#include <exception>
 #include <utility>
 
 namespace gsnav {

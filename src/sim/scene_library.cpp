@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/detail/sim/scene_library.hpp"
 
-#include <algorithm>
 #include <utility>
 
 #include "gsnav/detail/core/guarded.hpp"

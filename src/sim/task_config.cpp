@@ -6,10 +6,7 @@
 namespace gsnav {
 
 Status validate(const TaskConfig& c) {
-  const auto bad = [](const char* field, double value, const char* rule) {
-    return Status(Errc::invalid_argument,
-                  std::string("TaskConfig.") + field + " = " + std::to_string(value) + ": " + rule);
-  };
+  const BadArgument bad{"TaskConfig."};
   const auto positive = [](double v) { return v > 0 && is_finite(v); };
   const auto not_negative = [](double v) { return v >= 0 && is_finite(v); };
   if (!not_negative(c.agent_radius)) return bad("agent_radius", c.agent_radius, "must be >= 0");

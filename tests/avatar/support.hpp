@@ -5,9 +5,10 @@
 #include <memory>
 #include <vector>
 
+#include "gsnav/avatar.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/rng.hpp"
-#include "gsnav/detail/avatar/avatar.hpp"
+#include "gsnav/detail/demo/humanoid.hpp"
 #include "hard_cases/cases.hpp"
 #include "support/rotations.hpp"
 

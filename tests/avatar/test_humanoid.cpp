@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "avatar/support.hpp"
+#include "gsnav/detail/rigging/proxy_fit.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -230,6 +231,44 @@ TEST_CASE("a walk needs SMPL's names") {
   s.names[9] = "chest";
   CHECK(WalkMotion::create(s).message().find("spine3") != std::string::npos);
 }
+
+namespace {
+
+/// Share of points within at least one capsule grown by `slack` metres.
+double capsule_coverage(const std::vector<Capsule<double>>& capsules, const std::vector<Vec3d>& points,
+                        double slack = 0.0) {
+  std::size_t inside = 0;
+  for (const Vec3d& p : points) {
+    for (const Capsule<double>& c : capsules) {
+      const double r = c.radius + slack;
+      if (segment_distance2(c.p0, c.p1, p) <= r * r) {
+        ++inside;
+        break;
+      }
+    }
+  }
+  return points.empty() ? 1.0 : static_cast<double>(inside) / static_cast<double>(points.size());
+}
+
+/// One capsule per bone, from each joint to each of its children; leaf joints get a point. Radii are
+/// zero.
+std::vector<ProxyCapsule> bone_capsules(const Skeleton& skeleton) {
+  std::vector<ProxyCapsule> out;
+  std::vector<bool> has_child(skeleton.size(), false);
+  for (std::size_t j = 0; j < skeleton.size(); ++j) {
+    const std::int32_t p = skeleton.parents[j];
+    if (p < 0) continue;
+    has_child[static_cast<std::size_t>(p)] = true;
+    const Vec3d tip = skeleton.rest_local[j].translation;
+    if (norm(tip) >= 0.02) out.push_back({static_cast<std::uint16_t>(p), {}, tip, 0.0});
+  }
+  for (std::size_t j = 0; j < skeleton.size(); ++j) {
+    if (!has_child[j]) out.push_back({static_cast<std::uint16_t>(j), {}, {}, 0.0});
+  }
+  return out;
+}
+
+}  // namespace
 
 TEST_CASE("capsules hold the body in every frame") {
   const AvatarAsset& a = *person();

@@ -7,7 +7,7 @@
 
 #include "avatar/support.hpp"
 #include "gsnav/detail/avatar/body_bounds.hpp"
-#include "gsnav/detail/avatar/proxy_fit.hpp"
+#include "gsnav/detail/rigging/proxy_fit.hpp"
 #include "ops/backends.hpp"
 #include "support/scenes.hpp"
 

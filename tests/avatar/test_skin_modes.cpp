@@ -8,6 +8,7 @@
 
 #include "avatar/support.hpp"
 #include "gsnav/detail/avatar/weight_gradients.hpp"
+#include "gsnav/detail/rigging/proxy_fit.hpp"
 #if defined(_OPENMP)
 #include "gsnav/backends/openmp.hpp"
 #endif

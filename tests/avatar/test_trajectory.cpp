@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "avatar/support.hpp"
+#include "gsnav/detail/rigging/proxy_fit.hpp"
 
 using namespace gsnav;
 

@@ -8,10 +8,10 @@
 
 #include "avatar_files/bodies.hpp"
 #include "gsnav/core/rng.hpp"
-#include "gsnav/detail/avatar/capsule_fit.hpp"
-#include "gsnav/detail/avatar/capsule_volume.hpp"
-#include "gsnav/detail/avatar/humanoid.hpp"
-#include "gsnav/detail/avatar/mesh_avatar.hpp"
+#include "gsnav/detail/demo/humanoid.hpp"
+#include "gsnav/detail/rigging/capsule_fit.hpp"
+#include "gsnav/detail/rigging/capsule_volume.hpp"
+#include "gsnav/detail/rigging/mesh_avatar.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

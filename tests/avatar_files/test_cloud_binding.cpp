@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "gsnav/core/rng.hpp"
-#include "gsnav/detail/avatar/cloud_binding.hpp"
+#include "gsnav/detail/rigging/cloud_binding.hpp"
 
 using namespace gsnav;
 

@@ -5,11 +5,11 @@
 #include <string>
 
 #include "avatar_files/bodies.hpp"
-#include "gsnav/detail/avatar/capsule_fit.hpp"
 #include "gsnav/detail/avatar/capsule_track.hpp"
-#include "gsnav/detail/avatar/humanoid.hpp"
+#include "gsnav/detail/demo/humanoid.hpp"
 #include "gsnav/detail/io/avatar_file.hpp"
 #include "gsnav/detail/io/motion_file.hpp"
+#include "gsnav/detail/rigging/capsule_fit.hpp"
 #include "support/files.hpp"
 
 using namespace gsnav;

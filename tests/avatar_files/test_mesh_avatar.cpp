@@ -13,8 +13,8 @@
 #include "gsnav/avatar/actor.hpp"
 #include "gsnav/avatar/skinned_gaussians.hpp"
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/detail/avatar/mesh_avatar.hpp"
-#include "gsnav/detail/avatar/mesh_surface.hpp"
+#include "gsnav/detail/rigging/mesh_avatar.hpp"
+#include "gsnav/detail/rigging/mesh_surface.hpp"
 #include "gsnav/scene/basic_renderer.hpp"
 
 using namespace gsnav;
@@ -50,6 +50,20 @@ SkinnedMesh tube() {
   }
   m.materials.emplace_back();
   return m;
+}
+
+/// The mesh's vertices posed by joint matrices (joint to root frame times inverse bind, [J]).
+std::vector<Vec3d> skinned_vertices(const SkinnedMesh& mesh,
+                                    const std::vector<Affine3<double>>& joints) {
+  std::vector<Vec3d> out(mesh.positions.size());
+  for (std::size_t v = 0; v < out.size(); ++v) {
+    for (std::size_t k = v * mesh.influences; k < (v + 1) * mesh.influences; ++k) {
+      if (mesh.weights[k] > 0)
+        out[v] +=
+            (joints[mesh.joint_indices[k]] * mesh.positions[v]) * static_cast<double>(mesh.weights[k]);
+    }
+  }
+  return out;
 }
 
 /// What a picture of the avatar is beside one of the mesh.

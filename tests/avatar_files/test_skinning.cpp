@@ -10,7 +10,7 @@
 
 #include "avatar/support.hpp"
 #include "avatar_files/bodies.hpp"
-#include "gsnav/detail/avatar/mesh_avatar.hpp"
+#include "gsnav/detail/rigging/mesh_avatar.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

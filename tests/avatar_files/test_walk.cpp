@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "avatar_files/bodies.hpp"
-#include "gsnav/detail/avatar/clip_walk.hpp"
-#include "gsnav/detail/avatar/foot_contact.hpp"
-#include "gsnav/detail/avatar/foot_lock.hpp"
-#include "gsnav/detail/avatar/humanoid.hpp"
-#include "gsnav/detail/avatar/joint_match.hpp"
+#include "gsnav/detail/demo/humanoid.hpp"
 #include "gsnav/detail/io/motion_file.hpp"
+#include "gsnav/detail/rigging/clip_walk.hpp"
+#include "gsnav/detail/rigging/foot_contact.hpp"
+#include "gsnav/detail/rigging/foot_lock.hpp"
+#include "gsnav/detail/rigging/joint_match.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

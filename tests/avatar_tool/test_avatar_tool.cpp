@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/detail/avatar/clip_walk.hpp"
-#include "gsnav/detail/avatar/humanoid.hpp"
+#include "gsnav/detail/demo/humanoid.hpp"
 #include "gsnav/detail/io/avatar_file.hpp"
 #include "gsnav/detail/io/motion_file.hpp"
 #include "gsnav/detail/nav/navmesh_file.hpp"
+#include "gsnav/detail/rigging/clip_walk.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "io/gltf_builder.hpp"
 #include "support/command.hpp"

@@ -9,15 +9,15 @@
 
 #include "doctest/doctest.h"
 #include "gsnav/backends/serial.hpp"
+#include "gsnav/detail/demo/default_scene.hpp"
+#include "gsnav/detail/demo/people.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/device/device.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/device/simulator.hpp"
 #include "gsnav/sim/basic_batch.hpp"
 #include "gsnav/sim/basic_simulator.hpp"
-#include "gsnav/sim/default_scene.hpp"
 #include "gsnav/sim/follower.hpp"
-#include "gsnav/sim/people.hpp"
 #include "sim/mesh_box.hpp"
 #include "support/scenes.hpp"
 
@@ -165,12 +165,12 @@ TEST_CASE("renderer: a cloud alone, rules that change, errors that name what is 
 TEST_CASE("renderer: packed clouds, bands of a profile and a light on meshes, on every device") {
   GaussianCloud cloud = random_cloud(12, {.count = 2500});
   sort_spatially(cloud);
-  SceneProfile bands;  // chunk c has the SH bands up to c % 4
+  SceneBands bands;  // chunk c has the SH bands up to c % 4
   for (std::size_t c = 0; c < cloud.view().chunk_count(); ++c)
     bands.chunk_sh_degrees.push_back(static_cast<std::uint8_t>(c % 4));
   SimulatorScene as_floats, as_packed;
   as_floats.assets.push_back({std::make_shared<const GaussianCloud>(cloud)});
-  as_floats.assets[0].profile = std::make_shared<const SceneProfile>(bands);
+  as_floats.assets[0].profile = std::make_shared<const SceneBands>(bands);
   as_packed.assets.push_back({});
   as_packed.assets[0].packed = std::make_shared<const PackedCloud>(pack_cloud(cloud));
   SceneMesh mesh = turned_box(0.6);
@@ -218,7 +218,7 @@ TEST_CASE("renderer: assets that cannot be drawn so are named") {
   };
   CHECK(has(message({}), "assets[0].cloud is null"));
   SceneAsset asset{cloud};
-  asset.profile = std::make_shared<const SceneProfile>();
+  asset.profile = std::make_shared<const SceneBands>();
   CHECK(has(message(asset), "assets[0].profile is of another cloud"));
   asset = {cloud};
   asset.packed = std::make_shared<const PackedCloud>(pack_cloud(*cloud));

@@ -155,8 +155,8 @@ void read_lod_set(const std::string& input) {
   const auto levels = io::load_lod_levels(folder.path());
   if (!levels) return;
   bool ok = validate(levels->cloud.set()).ok() && validate(levels->tree.merged.set()).ok();
-  for (const LodPlace& p : levels->tree.places) {
-    const GaussianCloud& of = p.finer == LodPlace::kNone ? levels->cloud : levels->tree.merged;
+  for (const LodBox& p : levels->tree.boxes) {
+    const GaussianCloud& of = p.finer == LodBox::kNone ? levels->cloud : levels->tree.merged;
     ok = ok && p.first_chunk + p.chunks <= of.view().chunk_count() && p.rows <= p.chunks * kProjectChunk;
   }
   for (const LodNode& n : levels->tree.nodes) ok = ok && is_finite(n.error) && n.error >= 0;

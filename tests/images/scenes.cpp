@@ -9,11 +9,11 @@
 
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/rng.hpp"
-#include "gsnav/detail/avatar/humanoid.hpp"
+#include "gsnav/detail/demo/default_scene.hpp"
+#include "gsnav/detail/demo/humanoid.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/scene/visible_sets.hpp"
-#include "gsnav/sim/default_scene.hpp"
 #include "hard_cases/cases.hpp"
 #include "lod/level_support.hpp"
 #include "support/scenes.hpp"

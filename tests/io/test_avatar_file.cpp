@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "avatar_npz.hpp"
-#include "gsnav/detail/avatar/avatar.hpp"
+#include "gsnav/avatar.hpp"
 #include "gsnav/detail/io/avatar_file.hpp"
 #include "support/files.hpp"
 

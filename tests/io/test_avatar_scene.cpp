@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/detail/avatar/humanoid.hpp"
+#include "gsnav/detail/demo/humanoid.hpp"
 #include "gsnav/detail/io/avatar_file.hpp"
 #include "gsnav/detail/io/avatar_scene_file.hpp"
 #include "gsnav/detail/io/motion_file.hpp"

@@ -169,8 +169,8 @@ TEST_CASE("lod set: levels to be drawn by view, each box's own") {
   }();
   CHECK(levels.report.kept == 10);
   REQUIRE(levels.tree.roots.size() == 2);
-  REQUIRE(levels.tree.places.size() == 4);
-  const auto rows = [](const GaussianCloud& cloud, const LodPlace& place) {
+  REQUIRE(levels.tree.boxes.size() == 4);
+  const auto rows = [](const GaussianCloud& cloud, const LodBox& place) {
     std::vector<int> out;
     for (std::size_t i = 0; i < place.rows; ++i) {
       out.push_back(static_cast<int>(std::lround(cloud.mean(place.first_chunk * kProjectChunk + i).x)));
@@ -178,7 +178,7 @@ TEST_CASE("lod set: levels to be drawn by view, each box's own") {
     std::sort(out.begin(), out.end());
     return out;
   };
-  const std::vector<LodPlace>& places = levels.tree.places;
+  const std::vector<LodBox>& places = levels.tree.boxes;
   CHECK(rows(levels.cloud, places[0]) == std::vector<int>{0, 1, 2, 3, 4, 5});
   CHECK(rows(levels.cloud, places[1]) == std::vector<int>{6, 7, 8, 9});
   CHECK(rows(levels.tree.merged, places[2]) == std::vector<int>{100, 101});
@@ -194,8 +194,8 @@ TEST_CASE("lod set: levels to be drawn by view, each box's own") {
   const auto scene = io::load_shipped_levels(set.folder.path().string()).value();
   REQUIRE(scene.has_value());
   REQUIRE(scene->tree.roots.size() == 3);
-  CHECK(rows(scene->cloud, scene->tree.places[2]) == std::vector<int>{200, 201});
-  CHECK(scene->tree.places[scene->tree.roots[2]].finer == LodPlace::kNone);
+  CHECK(rows(scene->cloud, scene->tree.boxes[2]) == std::vector<int>{200, 201});
+  CHECK(scene->tree.boxes[scene->tree.roots[2]].finer == LodBox::kNone);
   // From the coarser level on nothing is above, and what is no set ships nothing.
   CHECK(!io::load_shipped_levels(set.folder.path().string(), {.level = 1}).value().has_value());
   CHECK(!io::load_shipped_levels((set.folder / "1_0.sog").string()).value().has_value());
@@ -218,7 +218,7 @@ TEST_CASE("lod set: levels that make no sense, or are not there") {
   refused(Errc::invalid_file, "two nodes share rows of 0_0/meta.json from 5");
   set.first = R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":0,"offset":0,"count":6}})";
   write_file(set.folder / "lod-meta.json", set.text());
-  CHECK(io::load_lod_levels(set.folder.path()).value().tree.places.size() == 3);
+  CHECK(io::load_lod_levels(set.folder.path()).value().tree.boxes.size() == 3);
   for (const char* bad :
        {R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":9,"offset":0,"count":2}})",
         R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":1,"offset":-1,"count":2}})",
@@ -232,7 +232,7 @@ TEST_CASE("lod set: levels that make no sense, or are not there") {
   // A coarser level that is not there is left out.
   set.first = R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":2,"offset":0,"count":2}})";
   write_file(set.folder / "lod-meta.json", set.text());
-  CHECK(io::load_lod_levels(set.folder.path()).value().tree.places.size() == 3);
+  CHECK(io::load_lod_levels(set.folder.path()).value().tree.boxes.size() == 3);
   set.first = first;
   refused(Errc::invalid_argument, "level 3", {.level = 3});
   write_file(set.folder / "lod-meta.json", "{");
@@ -264,8 +264,8 @@ TEST_CASE("lod set: the levels of a damaged set fit their cloud, or it is refuse
       continue;
     }
     ++taken;
-    for (const LodPlace& p : got->tree.places) {
-      const GaussianCloud& of = p.finer == LodPlace::kNone ? got->cloud : got->tree.merged;
+    for (const LodBox& p : got->tree.boxes) {
+      const GaussianCloud& of = p.finer == LodBox::kNone ? got->cloud : got->tree.merged;
       CHECK(p.first_chunk + p.chunks <= of.view().chunk_count());
       CHECK(p.rows <= p.chunks * kProjectChunk);
     }
@@ -292,6 +292,6 @@ TEST_CASE("lod set: real sets, level by level") {
     const LoadedLodSet levels = io::load_lod_levels(showroom).value();
     CHECK(levels.report.read == 1495636);
     CHECK(levels.tree.roots.size() == 362);
-    CHECK(levels.tree.places.size() == 362 + 356);
+    CHECK(levels.tree.boxes.size() == 362 + 356);
   }
 }

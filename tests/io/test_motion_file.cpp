@@ -10,9 +10,9 @@
 #include <utility>
 
 #include "allocations.hpp"
-#include "gsnav/detail/avatar/humanoid.hpp"
-#include "gsnav/detail/avatar/retarget.hpp"
+#include "gsnav/detail/demo/humanoid.hpp"
 #include "gsnav/detail/io/motion_file.hpp"
+#include "gsnav/detail/rigging/retarget.hpp"
 #include "pose_at.hpp"
 #include "support/data.hpp"
 #include "support/files.hpp"

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "avatar_npz.hpp"
-#include "gsnav/detail/avatar/humanoid.hpp"
 #include "gsnav/detail/avatar/smpl_joints.hpp"
+#include "gsnav/detail/demo/humanoid.hpp"
 #include "gsnav/detail/io/avatar_file.hpp"
 #include "gsnav/detail/io/motion_file.hpp"
 #include "support/files.hpp"

@@ -32,9 +32,9 @@ LeveledCloud joined() {
 }
 
 /// Rows of a node, less those that fill its last chunk.
-std::vector<std::size_t> rows_of(const LodPlace& place) {
-  std::vector<std::size_t> rows(place.rows);
-  for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = place.first_chunk * kProjectChunk + i;
+std::vector<std::size_t> rows_of(const LodBox& box) {
+  std::vector<std::size_t> rows(box.rows);
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = box.first_chunk * kProjectChunk + i;
   return rows;
 }
 
@@ -50,11 +50,11 @@ TEST_CASE(
   std::vector<int> seen(set.cloud.size());
   std::size_t real = 0;
   for (std::size_t node = 0; node < set.tree.leaves(); ++node) {
-    const LodPlace& place = set.tree.places[node];
-    CHECK(place.finer == LodPlace::kNone);
-    CHECK(place.shown == place.rows);
+    const LodBox& box = set.tree.boxes[node];
+    CHECK(box.finer == LodBox::kNone);
+    CHECK(box.shown == box.rows);
     std::uint32_t box = 99;
-    for (const std::size_t row : rows_of(place)) {
+    for (const std::size_t row : rows_of(box)) {
       const std::uint32_t id = set.cloud.row_ids[row];
       REQUIRE(id < levels[0].cloud.size());
       if (box == 99) box = levels[0].boxes[id];
@@ -68,8 +68,8 @@ TEST_CASE(
       ++seen[id];
       ++real;
     }
-    for (std::size_t i = place.rows; i < place.chunks * kProjectChunk; ++i) {
-      const std::size_t row = place.first_chunk * kProjectChunk + i;
+    for (std::size_t i = box.rows; i < box.chunks * kProjectChunk; ++i) {
+      const std::size_t row = box.first_chunk * kProjectChunk + i;
       CHECK(set.cloud.opacities[row] == 0);
       ++seen[set.cloud.row_ids[row]];
     }
@@ -79,15 +79,15 @@ TEST_CASE(
   // Coarser nodes: as many rows as the level has of the box, and bounds around all that they stand for.
   std::size_t merged = 0;
   for (std::size_t node = set.tree.leaves(); node < set.tree.nodes.size(); ++node) {
-    const LodPlace& place = set.tree.places[node];
-    const LodNode& finer = set.tree.nodes[place.finer];
-    merged += place.rows;
+    const LodBox& box = set.tree.boxes[node];
+    const LodNode& finer = set.tree.nodes[box.finer];
+    merged += box.rows;
     CHECK(set.tree.nodes[node].error >= finer.error);
     for (int k = 0; k < 3; ++k) {
       CHECK(set.tree.nodes[node].reach.low[k] <= finer.reach.low[k]);
       CHECK(set.tree.nodes[node].reach.high[k] >= finer.reach.high[k]);
     }
-    for (const std::size_t row : rows_of(place)) CHECK(set.tree.merged.opacities[row] > 0);
+    for (const std::size_t row : rows_of(box)) CHECK(set.tree.merged.opacities[row] > 0);
   }
   CHECK(merged == levels[1].cloud.size() + levels[2].cloud.size() + levels[3].cloud.size());
 }
@@ -171,14 +171,14 @@ TEST_CASE("lod levels: any cut shows each box in view once, and the same for any
       int times = 0;
       const bool visible = may_be_visible(p, set.tree.nodes[node].reach);
       std::uint32_t finest = node;
-      for (std::uint32_t n = node; n != LodPlace::kNone; n = set.tree.places[n].finer) {
-        const LodPlace& place = set.tree.places[n];
-        const std::vector<int>& of = place.finer == LodPlace::kNone ? leaf : merged;
+      for (std::uint32_t n = node; n != LodBox::kNone; n = set.tree.boxes[n].finer) {
+        const LodBox& box = set.tree.boxes[n];
+        const std::vector<int>& of = box.finer == LodBox::kNone ? leaf : merged;
         int drawn = 0;
-        for (std::uint32_t c = 0; c < place.chunks; ++c) drawn += of[place.first_chunk + c];
-        CHECK((drawn == 0 || drawn == static_cast<int>(place.chunks)));
+        for (std::uint32_t c = 0; c < box.chunks; ++c) drawn += of[box.first_chunk + c];
+        CHECK((drawn == 0 || drawn == static_cast<int>(box.chunks)));
         times += drawn != 0 ? 1 : 0;
-        shown += drawn != 0 ? place.shown : 0;
+        shown += drawn != 0 ? box.shown : 0;
         finest = n;
       }
       CHECK(times <= 1);
@@ -227,9 +227,9 @@ TEST_CASE(
         // One level: the coarsest that the cut has, of every box.
         std::size_t coarsest = 0;
         for (std::size_t node = 0; node < set.tree.nodes.size(); ++node) {
-          const LodPlace& place = set.tree.places[node];
-          const auto& chunks = place.finer == LodPlace::kNone ? cut.leaf_chunks() : cut.merged_chunks();
-          if (std::find(chunks.begin(), chunks.end(), place.first_chunk) == chunks.end()) continue;
+          const LodBox& box = set.tree.boxes[node];
+          const auto& chunks = box.finer == LodBox::kNone ? cut.leaf_chunks() : cut.merged_chunks();
+          if (std::find(chunks.begin(), chunks.end(), box.first_chunk) == chunks.end()) continue;
           for (std::size_t l = 0; l < set.tree.levels(); ++l) {
             if (node >= set.tree.level_begin[l]) coarsest = std::max(coarsest, l);
           }
@@ -237,8 +237,8 @@ TEST_CASE(
         std::vector<std::uint32_t> level;
         for (std::size_t n = set.tree.level_begin[coarsest]; n < set.tree.level_begin[coarsest + 1];
              ++n) {
-          for (std::uint32_t c = 0; c < set.tree.places[n].chunks; ++c)
-            level.push_back(set.tree.places[n].first_chunk + c);
+          for (std::uint32_t c = 0; c < set.tree.boxes[n].chunks; ++c)
+            level.push_back(set.tree.boxes[n].first_chunk + c);
         }
         GaussianSet one = LodCut::photo_set(coarsest == 0 ? set.cloud : set.tree.merged, choice);
         one.selection.drawn_chunks = {level.data(), level.size()};

@@ -13,7 +13,7 @@
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/scene/drop_bands.hpp"
 #include "gsnav/detail/scene/ledger.hpp"
-#include "gsnav/detail/scene/scene_profile.hpp"
+#include "gsnav/detail/scene/scene_bands.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
@@ -43,7 +43,7 @@ GaussianCloud banded(double small) {
 
 TEST_CASE("scene profile: bands of zeros are not read, and no bit changes") {
   const GaussianCloud cloud = banded(0);
-  const SceneProfile profile = profile_scene(cloud);
+  const SceneBands profile = scene_bands(cloud);
   REQUIRE(profile.chunk_sh_degrees.size() == 10);
   for (std::size_t c = 0; c < 10; ++c)
     CHECK(int{profile.chunk_sh_degrees[c]} == static_cast<int>(c % 4));
@@ -101,7 +101,7 @@ template <class Cloud>
 void check_dropped(Cloud cloud, int most, std::size_t bytes_a_number, double unseen) {
   const Cloud whole = cloud;
   const std::size_t n = cloud.size();
-  SceneProfile profile = profile_scene(cloud, unseen);
+  SceneBands profile = scene_bands(cloud, unseen);
   drop_bands(cloud, profile);
   const std::size_t kept = static_cast<std::size_t>(3 * ((most + 1) * (most + 1) - 1));
   const ColorRows v = cloud.view().color;
@@ -167,7 +167,7 @@ TEST_CASE("scene profile: storage follows, in floats, halves and packed") {
 TEST_CASE("scene profile: a cloud that needs its bands, or has no row, stays as it is") {
   GaussianCloud cloud = banded(0);
   const std::vector<float> before = cloud.shN;
-  SceneProfile profile = profile_scene(cloud);
+  SceneBands profile = scene_bands(cloud);
   drop_bands(cloud, profile);
   CHECK(cloud.sh_degree == 3);
   CHECK(cloud.shN == before);
@@ -175,7 +175,7 @@ TEST_CASE("scene profile: a cloud that needs its bands, or has no row, stays as 
   CHECK(profile.bytes_unneeded == 4 * (profile.sh_numbers - profile.sh_numbers_read));
   GaussianCloud none;
   none.sh_degree = 3;
-  profile = profile_scene(none);
+  profile = scene_bands(none);
   drop_bands(none, profile);
   CHECK(profile.bytes_let_go == 0);
   CHECK(profile.bytes_unneeded == 0);
@@ -185,7 +185,7 @@ TEST_CASE("scene profile: what is let go is not held any more") {
   GaussianCloud cloud = banded_to(1, 0), halves = cloud;
   compact_sh(halves);
   CHECK(halves.shN.capacity() == 0);
-  SceneProfile profile = profile_scene(cloud);
+  SceneBands profile = scene_bands(cloud);
   drop_bands(cloud, profile);
   CHECK(cloud.shN.capacity() == 9 * cloud.size());
   expand_sh(halves);
@@ -194,12 +194,12 @@ TEST_CASE("scene profile: what is let go is not held any more") {
 
 TEST_CASE("scene profile: no colour changes by more than the bound (N69)") {
   const GaussianCloud cloud = banded(2e-4);
-  const SceneProfile profile = profile_scene(cloud, kUnseenColor);
+  const SceneBands profile = scene_bands(cloud, kUnseenColor);
   CHECK(profile.color_error > 0);
   CHECK(profile.color_error <= 1.0 / 1020);
   for (std::size_t c = 0; c < 10; ++c)
     CHECK(int{profile.chunk_sh_degrees[c]} <= static_cast<int>(c % 4));
-  CHECK(profile_scene(cloud).sh_numbers_read == profile_scene(cloud).sh_numbers);
+  CHECK(scene_bands(cloud).sh_numbers_read == scene_bands(cloud).sh_numbers);
   const GaussianSet set = profile.applied_to(cloud.set());
   Rng rng(14);
   double worst = 0;
@@ -218,7 +218,7 @@ TEST_CASE("scene profile: no colour changes by more than the bound (N69)") {
 
 TEST_CASE("scene profile: one that does not fit its set is refused") {
   const GaussianCloud cloud = banded(0);
-  SceneProfile profile = profile_scene(cloud);
+  SceneBands profile = scene_bands(cloud);
   profile.chunk_sh_degrees.pop_back();
   CHECK(validate(profile.applied_to(cloud.set())).message().find("color.chunk_degrees") !=
         std::string::npos);
@@ -227,7 +227,7 @@ TEST_CASE("scene profile: one that does not fit its set is refused") {
 TEST_CASE("ledger: its counts are those of the frame") {
   const GaussianCloud cloud = banded(2e-4);
   const Camera camera = Camera::look_at({0, 0, 0}, {2, 0, 4}, {0, -1, 0}, 96, 64, 30);
-  const SceneProfile profile = profile_scene(cloud, kUnseenColor);
+  const SceneBands profile = scene_bands(cloud, kUnseenColor);
   SerialBackend backend;
   RenderConfig config;
   config.quality.exponential = Exponential::fast;

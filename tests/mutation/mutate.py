@@ -59,7 +59,9 @@ def copy_tree(to):
 
 
 def sources_beside(tree, source):
-    """What defines what the headers that a test includes declare: the sources of their names, in tests/ and avatar."""
+    """What defines what the headers that a test includes declare: the sources of their names, in tests/ and in the
+    components that need no library."""
+    components = ("avatar", "rigging", "demo")
     seen, found, queue = set(), [], [tree / source]
     while queue:
         file = queue.pop()
@@ -71,9 +73,9 @@ def sources_beside(tree, source):
             seen.add(header)
             queue.append(header)
             beside = header.with_suffix(".cpp")
-            if header.parent.name == "avatar" and header.is_relative_to(tree / "include"):
-                beside = tree / "src/avatar" / beside.name
-            elif not any(header.is_relative_to(tree / d) for d in ("tests", "src/avatar")):
+            if header.parent.name in components and header.is_relative_to(tree / "include"):
+                beside = tree / "src" / header.parent.name / beside.name
+            elif not any(header.is_relative_to(tree / d) for d in ("tests", *(f"src/{c}" for c in components))):
                 continue
             if beside.is_file() and beside.name != "compiled_frames.cpp":
                 queue.append(beside)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
-#include "gsnav/sim/default_scene.hpp"
+#include "gsnav/detail/demo/default_scene.hpp"
 #include "metric_check.hpp"
 
 using namespace gsnav;

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "gsnav/detail/scene/drop_bands.hpp"
-#include "gsnav/detail/scene/scene_profile.hpp"
+#include "gsnav/detail/scene/scene_bands.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 #include "ops/backends.hpp"
@@ -45,10 +45,10 @@ struct Banded {
         if (std::isnan(nan[k])) marked.shN_half[k] = 0x7e00;
       }
     }
-    profile = profile_scene(cloud);
+    profile = scene_bands(cloud);
   }
   GaussianCloud cloud, marked;
-  SceneProfile profile;
+  SceneBands profile;
 };
 
 /// What a set of degree `degree` holds of N Gaussians.
@@ -87,7 +87,7 @@ TEST_CASE("SH bands: of packed rows, too, another memory holds those that some c
     CAPTURE(most);
     PackedCloud packed = pack_cloud(Banded(most).cloud, {.sh = 1});
     REQUIRE(packed.shN.size() == 45 * packed.size());
-    SceneProfile profile = profile_scene(packed);
+    SceneBands profile = scene_bands(packed);
     const GaussianArrays<ToyBackend> all(toy, packed), some(toy, packed, profile);
     check_held(some.set().gaussians, most);
     const Frames<float> expected = render<float>(toy, {all.set()}, camera);

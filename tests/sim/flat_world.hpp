@@ -4,7 +4,7 @@
 #include <cmath>
 #include <memory>
 
-#include "gsnav/sim/default_scene.hpp"
+#include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/sim/world.hpp"
 
 namespace gsnav_test {

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "flat_world.hpp"
-#include "gsnav/detail/avatar/humanoid.hpp"
+#include "gsnav/detail/demo/humanoid.hpp"
 #include "gsnav/detail/sim/scene_on_backend.hpp"
 
 namespace gsnav_test {

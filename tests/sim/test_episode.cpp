@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/detail/sim/episode.hpp"
-#include "gsnav/sim/default_scene.hpp"
 
 using namespace gsnav;
 

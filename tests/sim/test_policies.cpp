@@ -6,8 +6,9 @@
 #include <vector>
 
 #include "flat_world.hpp"
+#include "gsnav/detail/demo/people.hpp"
 #include "gsnav/detail/sim/random_policy.hpp"
-#include "gsnav/sim/people.hpp"
+#include "gsnav/detail/sim/start_times.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

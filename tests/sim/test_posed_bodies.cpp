@@ -4,7 +4,7 @@
 
 #include <cstring>
 
-#include "gsnav/sim/people.hpp"
+#include "gsnav/detail/demo/people.hpp"
 #include "sim_scene.hpp"
 
 using namespace gsnav;

@@ -9,7 +9,7 @@
 #include "flat_world.hpp"
 #include "gsnav/avatar/actor.hpp"
 #include "gsnav/core/rng.hpp"
-#include "gsnav/detail/avatar/humanoid.hpp"
+#include "gsnav/detail/demo/humanoid.hpp"
 #include "gsnav/sim/follower.hpp"
 
 using namespace gsnav;

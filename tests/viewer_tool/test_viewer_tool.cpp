@@ -17,9 +17,9 @@
 #include <vector>
 
 #include "../../tools/eval/run.hpp"
+#include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/detail/io/ply.hpp"
 #include "gsnav/device/simulator.hpp"
-#include "gsnav/sim/default_scene.hpp"
 #include "http_client.hpp"
 #include "picture.hpp"
 #include "support/command.hpp"

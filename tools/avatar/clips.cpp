@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/avatar.hpp"
 #include "gsnav/io.hpp"
+#include "gsnav/rigging.hpp"
 
 namespace gsnav_avatar {
 

@@ -8,9 +8,9 @@
 
 #include "clips.hpp"
 #include "commands.hpp"
-#include "gsnav/avatar.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/math/aabb.hpp"
+#include "gsnav/rigging.hpp"
 
 namespace gsnav_avatar {
 

@@ -9,11 +9,11 @@
 
 #include "commands.hpp"
 #include "gsnav/avatar/actor.hpp"
+#include "gsnav/demo.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/scene_file.hpp"
-#include "gsnav/sim/default_scene.hpp"
 
 namespace gsnav_avatar {
 

@@ -10,11 +10,11 @@
 
 #include "clips.hpp"
 #include "commands.hpp"
-#include "gsnav/avatar.hpp"
 #include "gsnav/avatar/actor.hpp"
+#include "gsnav/demo.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/nav.hpp"
-#include "gsnav/sim/default_scene.hpp"
+#include "gsnav/rigging.hpp"
 
 namespace gsnav_avatar {
 

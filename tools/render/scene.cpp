@@ -27,7 +27,7 @@ struct Parts {
   std::optional<LodTree> tree;         ///< where the profile is lod
   std::optional<VisibleSets> visible;  ///< where some are given
   LoadReport report;
-  SceneProfile profile;
+  SceneBands profile;
   std::vector<PlacedMeshes> meshes;
   std::vector<Camera> cameras;
 };
@@ -140,14 +140,14 @@ Status read_visible_sets(const Options& o, Parts& parts) {
 void profile_clouds(const Options& o, Parts& parts) {
   // What cannot be seen is not held and not read; in exact, what is zero.
   const auto fit = [unseen = o.profile == "exact" ? 0 : kUnseenColor](auto& cloud) {
-    SceneProfile made = profile_scene(cloud, unseen);
+    SceneBands made = scene_bands(cloud, unseen);
     drop_bands(cloud, made);
     return made;
   };
-  SceneProfile& profile = parts.profile;
+  SceneBands& profile = parts.profile;
   profile = parts.packed ? fit(*parts.packed) : fit(parts.full);
   if (parts.tree) {
-    const SceneProfile merged = fit(parts.tree->merged);
+    const SceneBands merged = fit(parts.tree->merged);
     profile.bytes_let_go += merged.bytes_let_go;
     profile.color_error = std::max(profile.color_error, merged.color_error);
   }

@@ -41,7 +41,7 @@ struct NoopFunctor {
 ///     one_thread() -> B                       a backend of the same kind for the calling thread alone:
 ///     batches
 ///                                             of cameras are then cut by frames
-///                                             (detail/render/frame_lanes.hpp)
+///                                             (detail/render/thread_frames.hpp)
 ///     static constexpr bool bins_in_lanes     its binning reads BinArgs::spans, which projection then
 ///     fills batch_renderer                          a type that draws many cameras by one call
 ///     (detail/sim/frame_batch.hpp) static allocate_host(bytes) -> void*, deallocate_host(p)   host

@@ -3,9 +3,9 @@
 
 #include <cstdio>
 #include <cstdlib>
-#include <new>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <variant>
 
@@ -67,6 +67,27 @@ class [[nodiscard]] Status {
  private:
   Errc code_ = Errc::ok;
   std::string message_;
+};
+
+/// Makes invalid_argument errors whose messages begin with the same words:
+///
+///     const BadArgument bad{"Camera."};
+///     if (width < 1) return bad("width", width, "must be positive");
+struct BadArgument {
+  const char* subject;
+
+  Status operator()(const std::string& what) const { return {Errc::invalid_argument, subject + what}; }
+  /// "`field` = `value`: `rule`".
+  template <class T>
+  Status operator()(const char* field, const T& value, const char* rule) const {
+    std::string text;
+    if constexpr (std::is_arithmetic_v<T>) {
+      text = std::to_string(value);
+    } else {
+      text = value;
+    }
+    return (*this)(std::string(field) + " = " + text + ": " + rule);
+  }
 };
 
 /// A value or the Status that says why there is none.

@@ -110,7 +110,7 @@ struct ColorRows {
   /// Rotation of each Gaussian since training (w, x, y, z), or empty: the view direction is turned back
   /// by it before SH is evaluated. Of skinned sets of degree >= 1.
   Planes<const float, 4> rotations;
-  /// Highest SH degree that the Gaussians of a chunk use, one a chunk (detail/scene/scene_profile.hpp):
+  /// Highest SH degree that the Gaussians of a chunk use, one a chunk (detail/scene/scene_bands.hpp):
   /// bands above it are not read. In the backend's memory. Empty: degree.
   View<const std::uint8_t> chunk_degrees;
 

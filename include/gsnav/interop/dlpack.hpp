@@ -84,9 +84,7 @@ DLManagedTensor* to_dlpack(T* data, const std::int64_t (&shape)[N], DLDevice dev
 /// `device`, or elements are not compact and row-major.
 template <class T>
 Result<View<T>> from_dlpack(const DLTensor& tensor, DLDevice device) {
-  const auto bad = [](const std::string& what) {
-    return Status(Errc::invalid_argument, "DLTensor." + what);
-  };
+  const BadArgument bad{"DLTensor."};
   const DLDataType want = dlpack_type<std::remove_const_t<T>>();
   if (tensor.dtype.code != want.code || tensor.dtype.bits != want.bits ||
       tensor.dtype.lanes != want.lanes) {

@@ -39,15 +39,12 @@ struct RenderConfig {
 
 /// invalid_argument, naming the field, or ok.
 inline Status validate(const RenderConfig& c) {
-  const auto bad = [](const char* field, const std::string& value, const char* rule) {
-    return Status(Errc::invalid_argument,
-                  std::string("RenderConfig.") + field + " = " + value + ": " + rule);
-  };
+  const BadArgument bad{"RenderConfig."};
   if (c.outputs == 0 || (c.outputs & ~(kRgb | kAlpha | kAnyDepth)) != 0) {
-    return bad("outputs", std::to_string(c.outputs), "name at least one known output");
+    return bad("outputs", c.outputs, "name at least one known output");
   }
   const auto unknown = [&](const char* field, auto value) {
-    return bad(field, std::to_string(static_cast<int>(value)), "there is none of this number");
+    return bad(field, static_cast<int>(value), "there is none of this number");
   };
   if (c.sort_order > SortOrder::camera_distance) return unknown("sort_order", c.sort_order);
   if (c.response > Response::ray) return unknown("response", c.response);
@@ -57,14 +54,14 @@ inline Status validate(const RenderConfig& c) {
   if (Status s = validate(c.quality); !s) return s;
   if (Status s = validate(c.tuning); !s) return s;
   if (!(c.first_hit_tau > 0 && c.first_hit_tau < 1)) {
-    return bad("first_hit_tau", std::to_string(c.first_hit_tau), "must be in (0, 1)");
+    return bad("first_hit_tau", c.first_hit_tau, "must be in (0, 1)");
   }
   if (!is_finite(c.background)) return bad("background", "not finite", "must be finite");
   if (c.compat != Compat::none && c.tuning.tile_size == 32) {
     return bad("tuning.tile_size", "32", "compat modes have tiles of 16 pixels: use 8 or 16");
   }
   if (c.compat != Compat::none && c.response != Response::ewa) {
-    return bad("response", std::to_string(static_cast<int>(c.response)), "compat modes know ewa only");
+    return bad("response", static_cast<int>(c.response), "compat modes know ewa only");
   }
   return {};
 }

@@ -7,8 +7,6 @@
 #include <cstdint>
 #include <limits>
 #include <span>
-#include <string>
-#include <vector>
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"

@@ -3,19 +3,16 @@
 
 #include <unistd.h>
 
-#include <algorithm>
 #include <cstddef>
-#include <cstdint>
 #include <limits>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/detail/core/guarded.hpp"
-#include "gsnav/detail/render/frame_lanes.hpp"
 #include "gsnav/detail/render/render_composite.hpp"
+#include "gsnav/detail/render/thread_frames.hpp"
 #include "gsnav/detail/scene/gaussian_arrays.hpp"
 #include "gsnav/render/frames.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
@@ -139,19 +136,19 @@ class BasicRenderer {
   /// Bytes of scratch held.
   std::size_t scratch_bytes() const noexcept {
     std::size_t sum = workspace_.bytes();
-    if constexpr (LaneBackend<B>) sum += lanes_.bytes();
+    if constexpr (ThreadFramesBackend<B>) sum += thread_frames_.bytes();
     return sum;
   }
 
  private:
-  struct NoLanes {};
+  struct NoThreadFrames {};
   template <class T>
-  struct LanesOf {
-    using type = NoLanes;
+  struct ThreadFramesOf {
+    using type = NoThreadFrames;
   };
-  template <LaneBackend T>
-  struct LanesOf<T> {
-    using type = FrameLanes<S, T>;
+  template <ThreadFramesBackend T>
+  struct ThreadFramesOf<T> {
+    using type = ThreadFrames<S, T>;
   };
 
   /// Makes `out`'s images as large as its size says.
@@ -224,9 +221,9 @@ class BasicRenderer {
   }
   template <class JobOf>
   Status draw_jobs(std::size_t count, const JobOf& job_of, std::span<RenderStats> stats) {
-    if constexpr (LaneBackend<B>) {
-      if (FrameLanes<S, B>::worth_it(*backend_, count)) {
-        if (Status s = lanes_.render(*backend_, count, job_of, stats); !s) return s;
+    if constexpr (ThreadFramesBackend<B>) {
+      if (ThreadFrames<S, B>::worth_it(*backend_, count)) {
+        if (Status s = thread_frames_.render(*backend_, count, job_of, stats); !s) return s;
         return backend_->synchronize();
       }
     }
@@ -281,7 +278,7 @@ class BasicRenderer {
   MeshLight light_;
   RenderWorkspace<S, B> workspace_;
   Buffer<S, B> device_images_;
-  [[no_unique_address]] typename LanesOf<B>::type lanes_;
+  [[no_unique_address]] typename ThreadFramesOf<B>::type thread_frames_;
 };
 
 }  // namespace gsnav

@@ -29,10 +29,7 @@ struct LodChoice {
 
 /// Names the field that cannot be, or ok.
 inline Status validate(const LodChoice& c) {
-  const auto bad = [](const char* field, double value, const char* rule) {
-    return Status(Errc::invalid_argument,
-                  std::string("LodChoice.") + field + " = " + std::to_string(value) + ": " + rule);
-  };
+  const BadArgument bad{"LodChoice."};
   if (!(c.pixels > 0 && is_finite(c.pixels))) return bad("pixels", c.pixels, "must be positive");
   if (!(c.grain > 0 && is_finite(c.grain))) return bad("grain", c.grain, "must be positive");
   if (!(c.hysteresis >= 0 && c.hysteresis < 1))
@@ -87,7 +84,7 @@ class LodCut {
     const GaussianSet whole = photo_set(*cloud_, choice, world_from_asset);
     const auto p = make_projection_camera<double>(camera, whole);
     const double per_metre = std::max(p.fx, p.fy) / choice.pixels;
-    if (tree_->places.empty()) {
+    if (tree_->boxes.empty()) {
       visit(tree_->levels() - 1, tree_->nodes.size() - 1, p, per_metre, choice);
     } else {
       for (const std::uint32_t root : tree_->roots) {
@@ -143,9 +140,9 @@ class LodCut {
   }
   /// The same of what a box of a forest shows: its finest node has the cloud's chunks.
   bool shows_seen(std::uint32_t node) const noexcept {
-    while (tree_->places[node].finer != LodPlace::kNone) node = tree_->places[node].finer;
-    const LodPlace& place = tree_->places[node];
-    return any_seen(place.first_chunk, std::uint64_t{place.first_chunk} + place.chunks);
+    while (tree_->boxes[node].finer != LodBox::kNone) node = tree_->boxes[node].finer;
+    const LodBox& box = tree_->boxes[node];
+    return any_seen(box.first_chunk, std::uint64_t{box.first_chunk} + box.chunks);
   }
   /// What a metre is at the node's nearest depth, in choice.pixels.
   static double scale_of(const LodNode& n, const ProjectionCamera<double>& camera,
@@ -169,19 +166,19 @@ class LodCut {
                const LodChoice& choice) {
     for (;;) {
       const LodNode& n = tree_->nodes[node];
-      const LodPlace& place = tree_->places[node];
+      const LodBox& box = tree_->boxes[node];
       if (!may_be_visible(camera, n.reach)) return;
       const double scale = scale_of(n, camera, per_metre);
-      const bool leaf = place.finer == LodPlace::kNone;
+      const bool leaf = box.finer == LodBox::kNone;
       if (!leaf && refine(node, scale, choice)) {
-        node = place.finer;
+        node = box.finer;
         continue;
       }
       std::vector<std::uint32_t>& chunks = leaf ? leaf_chunks_ : merged_chunks_;
-      for (std::uint32_t c = 0; c < place.chunks; ++c) chunks.push_back(place.first_chunk + c);
-      stats_.shown += place.shown;
-      stats_.merged += leaf ? 0 : place.shown;
-      stats_.drawn += place.rows;
+      for (std::uint32_t c = 0; c < box.chunks; ++c) chunks.push_back(box.first_chunk + c);
+      stats_.shown += box.shown;
+      stats_.merged += leaf ? 0 : box.shown;
+      stats_.drawn += box.rows;
       note_error(n, scale, choice);
       return;
     }

@@ -22,8 +22,8 @@ struct LodNode {
   ChunkBounds reach;  ///< of its own Gaussians and of all below it
 };
 
-/// A node of a set that ships its levels (detail/scene/lod_levels.hpp).
-struct LodPlace {
+/// A box of a set that ships its levels, at one of them (detail/scene/lod_levels.hpp).
+struct LodBox {
   static constexpr std::uint32_t kNone = 0xffffffffu;
   std::uint32_t first_chunk = 0, chunks = 0;  ///< of the cloud where nothing is finer, else of `merged`
   std::uint32_t finer = kNone;                ///< the node that shows the same in more Gaussians
@@ -36,7 +36,7 @@ struct LodPlace {
 /// many Gaussians, at most kProjectChunk. Any cut through the tree shows each Gaussian of the cloud
 /// once.
 ///
-/// Or a forest of the levels that a set ships: `places` and `roots` are not empty then. Nodes are boxes
+/// Or a forest of the levels that a set ships: `boxes` and `roots` are not empty then. Nodes are boxes
 /// of the set, each at one level, and have as many chunks as they need; a cut takes one level of each
 /// box.
 struct LodTree {
@@ -46,21 +46,21 @@ struct LodTree {
   std::vector<std::uint32_t>
       level_begin;  ///< first node of each level, and behind them the number of nodes
 
-  std::vector<LodPlace> places;      ///< of a forest, one a node
+  std::vector<LodBox> boxes;         ///< of a forest, one a node
   std::vector<std::uint32_t> roots;  ///< of a forest: the coarsest node of each box
 
   std::size_t levels() const noexcept { return level_begin.empty() ? 0 : level_begin.size() - 1; }
   std::size_t leaves() const noexcept { return levels() == 0 ? 0 : level_begin[1]; }
   /// Chunks of the cloud that it was made of.
   std::size_t cloud_chunks() const noexcept {
-    if (places.empty()) return leaves();
+    if (boxes.empty()) return leaves();
     std::size_t sum = 0;
-    for (std::size_t i = 0; i < leaves(); ++i) sum += places[i].chunks;
+    for (std::size_t i = 0; i < leaves(); ++i) sum += boxes[i].chunks;
     return sum;
   }
   /// Bytes beside those of the cloud.
   std::size_t bytes() const noexcept {
-    return merged.bytes() + nodes.size() * sizeof(LodNode) + places.size() * sizeof(LodPlace);
+    return merged.bytes() + nodes.size() * sizeof(LodNode) + boxes.size() * sizeof(LodBox);
   }
 };
 

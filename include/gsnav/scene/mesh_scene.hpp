@@ -119,9 +119,7 @@ class MeshScene {
   /// then as it was.
   Result<std::size_t> add(SurfaceMesh mesh) {
     const std::size_t n = mesh.geometry.vertices.size();
-    const auto bad = [](const std::string& what) {
-      return Status(Errc::invalid_argument, "SurfaceMesh: " + what);
-    };
+    const BadArgument bad{"SurfaceMesh: "};
     for (std::size_t t = 0; t < mesh.geometry.triangles.size(); ++t) {
       for (const std::uint32_t i : mesh.geometry.triangles[t]) {
         if (i >= n) {

@@ -16,7 +16,7 @@
 #include "gsnav/detail/scene/lod_merge.hpp"
 #include "gsnav/detail/scene/needed_bands.hpp"
 #include "gsnav/detail/scene/point_tree.hpp"
-#include "gsnav/detail/scene/scene_profile.hpp"
+#include "gsnav/detail/scene/scene_bands.hpp"
 #include "gsnav/detail/scene/sh_rotation.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/detail/scene/temporal_edit.hpp"

@@ -11,7 +11,6 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "gsnav/core/backend.hpp"
@@ -154,10 +153,7 @@ struct VisibleSettings {
 
 /// Names the field that cannot be, or ok.
 inline Status validate(const VisibleSettings& s) {
-  const auto bad = [](const char* field, double value, const char* rule) {
-    return Status(Errc::invalid_argument,
-                  std::string("VisibleSettings.") + field + " = " + std::to_string(value) + ": " + rule);
-  };
+  const BadArgument bad{"VisibleSettings."};
   if (!(s.cell > 0 && is_finite(s.cell))) return bad("cell", s.cell, "must be positive");
   if (!(s.margin >= 0 && is_finite(s.margin))) return bad("margin", s.margin, "must be >= 0");
   if (!(s.min_weight >= 0 && s.min_weight < 1))

@@ -17,7 +17,7 @@
 namespace gsnav {
 
 struct PackedCloud;
-struct SceneProfile;
+struct SceneBands;
 struct VisibleSets;
 
 /// A cloud, as floats or packed, and how it stands in the world.
@@ -31,9 +31,9 @@ struct SceneAsset {
   std::shared_ptr<const VisibleSets> visible{};
   /// In place of `cloud`. It has no levels of detail and no visible sets.
   std::shared_ptr<const PackedCloud> packed{};
-  /// SH bands that its chunks need (profile_scene), the others are not read; null: all are. Levels of
+  /// SH bands that its chunks need (scene_bands), the others are not read; null: all are. Levels of
   /// detail read all.
-  std::shared_ptr<const SceneProfile> profile{};
+  std::shared_ptr<const SceneBands> profile{};
 
   SortOrder sort_order() const noexcept;
 };

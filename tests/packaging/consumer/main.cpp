@@ -10,8 +10,11 @@
 #if defined(WITH_DEVICE)
 #include <gsnav/device/renderer.hpp>
 #endif
-#if defined(WITH_AVATAR)
-#include <gsnav/detail/avatar/humanoid.hpp>
+#if defined(WITH_DEMO)
+#include <gsnav/demo.hpp>
+#endif
+#if defined(WITH_RIGGING)
+#include <gsnav/rigging.hpp>
 #endif
 #if defined(WITH_IO)
 #include <gsnav/detail/io/sog.hpp>
@@ -21,7 +24,7 @@
 #include <gsnav/nav/navmesh_settings.hpp>
 #endif
 #if defined(WITH_SIM)
-#include <gsnav/sim/default_scene.hpp>
+#include <gsnav/detail/sim/task.hpp>
 #endif
 #if defined(WITH_EVAL)
 #include <gsnav/detail/eval/ssim.hpp>
@@ -70,7 +73,14 @@ int main() {
   check("openmp", renders_one_gaussian(openmp));
 #endif
 #if defined(WITH_AVATAR)
-  check("avatar", gsnav::try_make_humanoid({.gaussians = 2000}).ok());
+  check("avatar", gsnav::WalkTrajectory::create({{0, 0, 0}, {1, 0, 0}}).ok());
+#endif
+#if defined(WITH_RIGGING)
+  check("rigging", gsnav::find_feet(gsnav::Skeleton{}).empty());
+#endif
+#if defined(WITH_DEMO)
+  check("demo",
+        gsnav::try_make_humanoid({.gaussians = 2000}).ok() && gsnav::make_default_scene(0.05).ok());
 #endif
 #if defined(WITH_IO)
   // Each format's library must be linked: PNG, and WebP and zlib behind SOG.
@@ -83,7 +93,7 @@ int main() {
   check("nav", gsnav::NavMeshSettings{}.validate().ok());
 #endif
 #if defined(WITH_SIM)
-  check("sim", gsnav::make_default_scene(0.05).ok());
+  check("sim", gsnav::validate(gsnav::TaskConfig{}).ok());
 #endif
 #if defined(WITH_DEVICE)
   check("device", gsnav::Device::parse("best").ok() &&

@@ -57,22 +57,22 @@ struct RadixDigit {
 /// Keys and values that lie beside each other, as the sort's first source.
 struct PairSource {
   View<const std::uint32_t> keys, values;
-  SortBlocks cut;
+  SortBlocks split;
   template <class F>
   GSNAV_HD void for_each(std::size_t block, const F& f) const noexcept {
-    const std::size_t end = cut.begin(block + 1);
-    for (std::size_t i = cut.begin(block); i < end; ++i) f(keys[i], values[i]);
+    const std::size_t end = split.begin(block + 1);
+    for (std::size_t i = split.begin(block); i < end; ++i) f(keys[i], values[i]);
   }
 };
 
 /// What a pass left, as the source of the next: key in the upper half.
 struct RecordSource {
   View<const std::uint64_t> records;
-  SortBlocks cut;
+  SortBlocks split;
   template <class F>
   GSNAV_HD void for_each(std::size_t block, const F& f) const noexcept {
-    const std::size_t end = cut.begin(block + 1);
-    for (std::size_t i = cut.begin(block); i < end; ++i) {
+    const std::size_t end = split.begin(block + 1);
+    for (std::size_t i = split.begin(block); i < end; ++i) {
       f(static_cast<std::uint32_t>(records[i] >> 32), static_cast<std::uint32_t>(records[i]));
     }
   }
@@ -82,12 +82,12 @@ struct RecordSource {
 template <class Source>
 struct RadixCount {
   Source source;
-  SortBlocks cut;
+  SortBlocks split;
   RadixDigit digit;
   View<std::uint32_t> counts;  ///< [blocks][blocks][digit]
   View<std::uint32_t> used;    ///< [blocks]
   GSNAV_HD void operator()(std::size_t block) const noexcept {
-    const std::size_t row = cut.blocks * digit.size();
+    const std::size_t row = split.blocks * digit.size();
     std::uint32_t* const own = counts.data + block * row;
     for (std::size_t d = 0; d < row; ++d) own[d] = 0;
     std::uint32_t* const h = own + block * digit.size();
@@ -102,19 +102,19 @@ struct RadixCount {
 
 /// Turns what each block counted of each block into where that block's records of each digit go.
 struct RadixOffsets {
-  SortBlocks cut;
+  SortBlocks split;
   RadixDigit digit;
   View<const std::uint32_t> counts;  ///< [by][of][digit]
   View<std::uint32_t> cursors;       ///< [of][digit]
   GSNAV_HD void operator()(std::size_t) const noexcept {
-    const std::size_t row = cut.blocks * digit.size();
+    const std::size_t row = split.blocks * digit.size();
     for (std::size_t i = 0; i < row; ++i) cursors[i] = counts[i];
-    for (std::size_t by = 1; by < cut.blocks; ++by) {
+    for (std::size_t by = 1; by < split.blocks; ++by) {
       for (std::size_t i = 0; i < row; ++i) cursors[i] += counts[by * row + i];
     }
     std::uint32_t sum = 0;
     for (std::size_t d = 0; d < digit.size(); ++d) {
-      for (std::size_t block = 0; block < cut.blocks; ++block) {
+      for (std::size_t block = 0; block < split.blocks; ++block) {
         std::uint32_t& c = cursors[block * digit.size() + d];
         const std::uint32_t n = c;
         c = sum;
@@ -129,17 +129,17 @@ struct RadixOffsets {
 template <class Source>
 struct RadixScatter {
   Source source;
-  SortBlocks cut;
+  SortBlocks split;
   RadixDigit digit, next;
   View<std::uint32_t> cursors, counts;
   View<std::uint64_t> out;
   GSNAV_HD void operator()(std::size_t block) const noexcept {
-    const std::size_t row = cut.blocks * next.size();
+    const std::size_t row = split.blocks * next.size();
     std::uint32_t* const h = counts.data + block * row;
     for (std::size_t d = 0; d < row; ++d) h[d] = 0;
     std::uint32_t* const at = cursors.data + block * digit.size();
     std::uint64_t* const to = out.data;
-    source.for_each(block, [=, c = cut, d = digit, e = next](std::uint32_t key, std::uint32_t value) {
+    source.for_each(block, [=, c = split, d = digit, e = next](std::uint32_t key, std::uint32_t value) {
       const std::uint32_t place = at[d(key)]++;
       to[place] = std::uint64_t{key} << 32 | value;
       ++h[c.block_of(place) * e.size() + e(key)];
@@ -190,11 +190,11 @@ std::size_t sort_blocks(const B& backend, std::size_t n) noexcept {
   return n / kLeast + 1 < blocks ? n / kLeast + 1 : blocks;
 }
 
-/// Sorts what `source` gives, cut into the blocks of `cut`, by the lowest `bits` of the key (the others
-/// zero), stably, to `keys` and `values`; 1 to 2^32 - 1 pairs. LSD radix in as many passes as the keys
-/// in use need.
+/// Sorts what `source` gives, cut into the blocks of `split`, by the lowest `bits` of the key (the
+/// others zero), stably, to `keys` and `values`; 1 to 2^32 - 1 pairs. LSD radix in as many passes as the
+/// keys in use need.
 template <class Source, Backend B>
-void sort_from(B& backend, const Source& source, const detail::SortBlocks& cut, int bits,
+void sort_from(B& backend, const Source& source, const detail::SortBlocks& split, int bits,
                SortScratch<B>& s, View<std::uint32_t> keys, View<std::uint32_t> values) {
   // Two passes where they do; a digit of 9 bits else, whose 512 write positions stay in the nearest
   // cache.
@@ -202,38 +202,38 @@ void sort_from(B& backend, const Source& source, const detail::SortBlocks& cut, 
   const auto digit = [digit_bits](int pass) {
     return detail::RadixDigit{pass * digit_bits, digit_bits};
   };
-  const std::size_t row = cut.blocks * digit(0).size();
-  s.first.resize_discard(cut.size);
-  s.second.resize_discard(cut.size);
-  s.counts.resize_discard(cut.blocks * row);
+  const std::size_t row = split.blocks * digit(0).size();
+  s.first.resize_discard(split.size);
+  s.second.resize_discard(split.size);
+  s.counts.resize_discard(split.blocks * row);
   s.cursors.resize_discard(row);
-  s.used.resize_discard(cut.blocks);
+  s.used.resize_discard(split.blocks);
 
   backend.parallel_for(
-      cut.blocks, detail::RadixCount<Source>{source, cut, digit(0), s.counts.view(), s.used.view()});
+      split.blocks, detail::RadixCount<Source>{source, split, digit(0), s.counts.view(), s.used.view()});
   std::array<std::uint32_t, 64> used{};
-  s.used.download(used.data(), cut.blocks);
+  s.used.download(used.data(), split.blocks);
   backend.synchronize().throw_if_error();
   std::uint32_t all = 0;
-  for (std::size_t block = 0; block < cut.blocks; ++block) all |= used[block];
+  for (std::size_t block = 0; block < split.blocks; ++block) all |= used[block];
   int passes = 1;
   while (passes * digit_bits < 32 && (all >> (passes * digit_bits)) != 0) ++passes;
 
   const auto run_pass = [&](const auto& from, int pass) {
     using From = std::remove_cvref_t<decltype(from)>;
-    backend.parallel_for(1, detail::RadixOffsets{cut, digit(pass), s.counts.view(), s.cursors.view()});
+    backend.parallel_for(1, detail::RadixOffsets{split, digit(pass), s.counts.view(), s.cursors.view()});
     if (pass + 1 < passes) {
       backend.parallel_for(
-          cut.blocks, detail::RadixScatter<From>{from, cut, digit(pass), digit(pass + 1),
-                                                 s.cursors.view(), s.counts.view(), s.second.view()});
+          split.blocks, detail::RadixScatter<From>{from, split, digit(pass), digit(pass + 1),
+                                                   s.cursors.view(), s.counts.view(), s.second.view()});
       std::swap(s.first, s.second);
     } else {
-      backend.parallel_for(cut.blocks,
+      backend.parallel_for(split.blocks,
                            detail::RadixFinish<From>{from, digit(pass), s.cursors.view(), keys, values});
     }
   };
   run_pass(source, 0);
-  for (int pass = 1; pass < passes; ++pass) run_pass(detail::RecordSource{s.first.view(), cut}, pass);
+  for (int pass = 1; pass < passes; ++pass) run_pass(detail::RecordSource{s.first.view(), split}, pass);
 }
 
 /// Sorts (key, value) pairs by the lowest `bits` of the key (the others zero), stably; fewer than 2^32
@@ -250,8 +250,8 @@ void sort_pairs(B& backend, Buffer<std::uint32_t, B>& keys, Buffer<std::uint32_t
     in_scratch = backend.sort_pairs(keys.data(), values.data(), scratch.keys.data(),
                                     scratch.values.data(), n, bits);
   } else {
-    const auto cut = detail::SortBlocks::of(n, sort_blocks(backend, n));
-    sort_from(backend, detail::PairSource{keys.view(), values.view(), cut}, cut, bits, scratch,
+    const auto split = detail::SortBlocks::of(n, sort_blocks(backend, n));
+    sort_from(backend, detail::PairSource{keys.view(), values.view(), split}, split, bits, scratch,
               scratch.keys.view(), scratch.values.view());
   }
   if (in_scratch) {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <type_traits>
 
 #include "gsnav/core/view.hpp"
@@ -246,7 +244,7 @@ GSNAV_HD void blend_alpha(BlendState<L, D>& state, const BlendRules<S>& rules, L
   blend_drawn<Color, D, General>(state, rules, state.open(rules), alpha, color, depth, px, py);
 }
 
-/// The `cut` of blend_splat() for a splat that nothing hides in part: keeps all of its alpha.
+/// The `visible` of blend_splat() for a splat that nothing hides in part: keeps all of its alpha.
 struct WholeSplat {
   template <class L>
   GSNAV_HD L operator()(L alpha) const noexcept {
@@ -254,11 +252,12 @@ struct WholeSplat {
   }
 };
 
-/// Blends one splat onto pixels at (px, py). cut(alpha): what is left of its alpha, 0 where it is not
-/// seen. Returns the open pixels of its footprint.
-template <bool Color, DepthMode D, Exp2 M, bool General, class L, class S, class Cut = WholeSplat>
+/// Blends one splat onto pixels at (px, py). visible(alpha): what is left of its alpha, 0 where it
+/// is not seen. Returns the open pixels of its footprint.
+template <bool Color, DepthMode D, Exp2 M, bool General, class L, class S, class Visible = WholeSplat>
 GSNAV_HD mask_of<L> blend_splat(BlendState<L, D>& state, const BlendRules<S>& rules,
-                                const SplatRecords<S>& splat, L px, L py, const Cut& cut = {}) noexcept {
+                                const SplatRecords<S>& splat, L px, L py,
+                                const Visible& visible = {}) noexcept {
   const L exponent = splat_exponent(General && splat.perspective != nullptr, *splat.geometry,
                                     splat.perspective, px, py);
   const auto hit = state.open(rules) && in_footprint(rules, exponent);
@@ -266,7 +265,7 @@ GSNAV_HD mask_of<L> blend_splat(BlendState<L, D>& state, const BlendRules<S>& ru
   if constexpr (LaneTraits<L>::width == 1) {
     if (!hit) return hit;
   }
-  blend_drawn<Color, D, General>(state, rules, hit, cut(alpha_in_footprint<M>(rules, exponent)),
+  blend_drawn<Color, D, General>(state, rules, hit, visible(alpha_in_footprint<M>(rules, exponent)),
                                  splat.color, splat.depth, px, py);
   return hit;
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 
 #include "gsnav/detail/frame/packed_gaussians.hpp"
@@ -247,14 +246,14 @@ struct Splat {
 };
 
 /// The records of a row that was projected in T with its mean in U, rounded to S. False where no pixel
-/// centre lies in its bounds. `Plain`: neither depth nor perspective is asked for.
-template <bool Plain, class T, class U, class S>
+/// centre lies in its bounds. `GeometryOnly`: neither depth nor perspective is asked for.
+template <bool GeometryOnly, class T, class U, class S>
 GSNAV_HD bool make_splat(const ProjectionCamera<T>& camera, bool depth, const SeenRow<T>& seen, U mean_x,
                          U mean_y, Splat<S>& out) noexcept {
   if (!detail::splat_bounds(camera, seen.splat, out.bounds)) return false;
   const ReferencePixel<T> ref = reference_of<T>(camera.width, camera.height, mean_x, mean_y);
   out.geometry = record_cast<S>(splat_geometry(seen.splat, ref));
-  if constexpr (!Plain) {
+  if constexpr (!GeometryOnly) {
     if (camera.response != Response::ewa)
       out.perspective = record_cast<S>(splat_perspective(seen.splat, ref));
     if (depth) out.depth = record_cast<S>(make_splat_depth(camera, seen.axes, seen.splat));
@@ -263,13 +262,13 @@ GSNAV_HD bool make_splat(const ProjectionCamera<T>& camera, bool depth, const Se
 }
 
 /// The same of a row whose geometry float holds: only its mean is computed in double.
-template <bool Plain>
+template <bool GeometryOnly>
 GSNAV_HD bool make_splat(const ProjectionCamera<float>& camera, const ProjectionCamera<double>& camera64,
                          bool depth, const RowKey<float>& key, const SeenRow<float>& seen,
                          Splat<float>& out) noexcept {
   double mean_x, mean_y;
   detail::project_mean(camera64, key.delta64, mean_x, mean_y);
-  return make_splat<Plain>(camera, depth, seen, mean_x, mean_y, out);
+  return make_splat<GeometryOnly>(camera, depth, seen, mean_x, mean_y, out);
 }
 
 /// The same of a row in double: of the float64 reference, and where `needs_double` says so.

@@ -15,24 +15,18 @@ inline constexpr int kMaxImageSide = 16384;
 
 /// Names the field that cannot be, or ok.
 inline Status validate(const Camera& c) {
-  const auto bad = [](const char* field, const std::string& value, const char* rule) {
-    return Status(Errc::invalid_argument, std::string("Camera.") + field + " = " + value + ": " + rule);
-  };
-  if (c.width < 1 || c.width > kMaxImageSide) {
-    return bad("width", std::to_string(c.width), "must be in [1, 16384]");
-  }
-  if (c.height < 1 || c.height > kMaxImageSide) {
-    return bad("height", std::to_string(c.height), "must be in [1, 16384]");
-  }
-  if (!(c.fx > 0 && is_finite(c.fx))) return bad("fx", std::to_string(c.fx), "must be positive");
-  if (!(c.fy > 0 && is_finite(c.fy))) return bad("fy", std::to_string(c.fy), "must be positive");
-  if (!is_finite(c.cx)) return bad("cx", std::to_string(c.cx), "must be finite");
-  if (!is_finite(c.cy)) return bad("cy", std::to_string(c.cy), "must be finite");
+  const BadArgument bad{"Camera."};
+  if (c.width < 1 || c.width > kMaxImageSide) return bad("width", c.width, "must be in [1, 16384]");
+  if (c.height < 1 || c.height > kMaxImageSide) return bad("height", c.height, "must be in [1, 16384]");
+  if (!(c.fx > 0 && is_finite(c.fx))) return bad("fx", c.fx, "must be positive");
+  if (!(c.fy > 0 && is_finite(c.fy))) return bad("fy", c.fy, "must be positive");
+  if (!is_finite(c.cx)) return bad("cx", c.cx, "must be finite");
+  if (!is_finite(c.cy)) return bad("cy", c.cy, "must be finite");
   if (!(c.near_plane > 0 && is_finite(c.near_plane))) {
-    return bad("near_plane", std::to_string(c.near_plane), "must be positive");
+    return bad("near_plane", c.near_plane, "must be positive");
   }
   if (!(c.near_sigma >= 0 && is_finite(c.near_sigma))) {
-    return bad("near_sigma", std::to_string(c.near_sigma), "must be >= 0");
+    return bad("near_sigma", c.near_sigma, "must be >= 0");
   }
   if (!is_finite(c.viewmat.translation)) {
     return bad("viewmat", "a translation that is not finite", "must be finite");

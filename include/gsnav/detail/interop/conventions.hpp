@@ -44,9 +44,7 @@ Affine3<S> view_with_axes(const Affine3<S>& view, CameraAxes axes) noexcept {
 /// The similarity that an affine map is. Errors (invalid_argument): the map is not finite, mirrors, or
 /// scales or shears by more than `tolerance` relative, which Gaussians cannot follow.
 inline Result<Similarity> similarity_from(const Affine3<double>& a, double tolerance = 1e-4) {
-  const auto bad = [](const char* what) {
-    return Status(Errc::invalid_argument, std::string("not a similarity: the map ") + what);
-  };
+  const BadArgument bad{"not a similarity: the map "};
   const double volume = determinant(a.linear);
   if (!is_finite(volume) || !is_finite(a.translation)) return bad("is not finite");
   if (!(volume > 0)) return bad("mirrors or flattens");

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
-#include <limits>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <bit>
-
 #include "gsnav/detail/frame/packed_gaussians.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/lanes/isa.hpp"

@@ -50,7 +50,8 @@ struct MeshView {
   float base_alpha = 1;       ///< in [0, 1]
   float alpha_cutoff = 0.5f;  ///< of MeshAlpha::mask
   View<const float> alphas;   ///< in [0, 1], one a vertex; empty: 1
-  bool plain = false;  ///< base_color is what is seen, whatever colours and texture are; alpha stays
+  bool base_color_only =
+      false;  ///< base_color is what is seen, whatever colours and texture are; alpha stays
 
   GSNAV_HD std::size_t triangle_count() const noexcept { return indices.size / 3; }
 };

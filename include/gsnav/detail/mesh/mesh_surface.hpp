@@ -142,7 +142,7 @@ template <class S>
 GSNAV_HD Vec3<S> surface_color(const MeshView& mesh, const MeshTriangle<S>& t,
                                const SurfacePoint<S>& at) noexcept {
   Vec3<S> color = vec_cast<S>(mesh.base_color);
-  if (mesh.plain) return color;
+  if (mesh.base_color_only) return color;
   const auto times = [&color](const Vec3<S>& c) GSNAV_INLINED {
     color = {color.x * c.x, color.y * c.y, color.z * c.z};
   };

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
 #include "gsnav/detail/nav/obstacles.hpp"
 #include "gsnav/nav/navmesh.hpp"

@@ -92,9 +92,7 @@ struct MeshWorkspace {
 /// Checks an instance against what kernels assume, but for its indices; names what does not fit.
 inline Status validate(const MeshInstance& instance) {
   const MeshView& m = instance.mesh;
-  const auto bad = [](const std::string& what) {
-    return Status(Errc::invalid_argument, "MeshInstance: " + what);
-  };
+  const BadArgument bad{"MeshInstance: "};
   const auto sized = [&](std::size_t n, const char* name) {
     if (n == 0 || n == m.vertices.size) return Status();
     return bad(std::string(name) + " has " + std::to_string(n) + " values where " +

@@ -85,14 +85,14 @@ struct VisibleSource {
   std::array<std::size_t, kMostBlocks + 1> first_chunk;
 
   /// Cuts the chunks so that each block has about as many.
-  void cut_by(const SortBlocks& cut) noexcept {
+  void split_by(const SortBlocks& split) noexcept {
     first_chunk[0] = 0;
     std::size_t block = 1, seen = 0;
-    for (std::size_t c = 0; c < taken.size && block < cut.blocks; ++c) {
-      while (block < cut.blocks && seen >= cut.begin(block)) first_chunk[block++] = c;
+    for (std::size_t c = 0; c < taken.size && block < split.blocks; ++c) {
+      while (block < split.blocks && seen >= split.begin(block)) first_chunk[block++] = c;
       seen += taken[c];
     }
-    for (; block <= cut.blocks; ++block) first_chunk[block] = taken.size;
+    for (; block <= split.blocks; ++block) first_chunk[block] = taken.size;
   }
   template <class F>
   GSNAV_HD void for_each(std::size_t block, const F& f) const noexcept {
@@ -195,10 +195,10 @@ Result<std::size_t> order_visible(B& backend, VisibleOrder<B>& v, std::uint32_t 
   if (visible == 0) return visible;
 
   if constexpr (is_host_backend<B>) {
-    const auto cut = detail::SortBlocks::of(visible, sort_blocks(backend, visible));
+    const auto split = detail::SortBlocks::of(visible, sort_blocks(backend, visible));
     detail::VisibleSource source{v.chunk_keys.view(), counts, taken, range, base, {}};
-    source.cut_by(cut);
-    sort_from(backend, source, cut, bits, v.sort, v.keys.view(), v.order.view());
+    source.split_by(split);
+    sort_from(backend, source, split, bits, v.sort, v.keys.view(), v.order.view());
   } else {
     v.host_offsets.resize(chunks);
     std::uint64_t sum = 0;

@@ -38,28 +38,19 @@ struct Quality {
 
 /// invalid_argument, naming the field, or ok.
 inline Status validate(const Quality& q) {
-  const auto bad = [](const char* field, const std::string& value, const char* rule) {
-    return Status(Errc::invalid_argument,
-                  std::string("RenderConfig.quality.") + field + " = " + value + ": " + rule);
-  };
+  const BadArgument bad{"RenderConfig.quality."};
   if (q.exponential != Exponential::exact && q.exponential != Exponential::fast) {
     return bad("exponential", std::to_string(static_cast<int>(q.exponential)),
                "there is none of this number");
   }
   if (q.max_sh_degree < 0 || q.max_sh_degree > kMaxShDegree) {
-    return bad("max_sh_degree", std::to_string(q.max_sh_degree), "must be in [0, 3]");
+    return bad("max_sh_degree", q.max_sh_degree, "must be in [0, 3]");
   }
-  if (q.key_bits < 8 || q.key_bits > 32) {
-    return bad("key_bits", std::to_string(q.key_bits), "must be in [8, 32]");
-  }
-  if (!(q.alpha_min > 0 && q.alpha_min < 1)) {
-    return bad("alpha_min", std::to_string(q.alpha_min), "must be in (0, 1)");
-  }
-  if (!(q.max_alpha > 0 && q.max_alpha <= 1)) {
-    return bad("max_alpha", std::to_string(q.max_alpha), "must be in (0, 1]");
-  }
+  if (q.key_bits < 8 || q.key_bits > 32) return bad("key_bits", q.key_bits, "must be in [8, 32]");
+  if (!(q.alpha_min > 0 && q.alpha_min < 1)) return bad("alpha_min", q.alpha_min, "must be in (0, 1)");
+  if (!(q.max_alpha > 0 && q.max_alpha <= 1)) return bad("max_alpha", q.max_alpha, "must be in (0, 1]");
   if (!(q.transmittance_min >= 0 && q.transmittance_min < 1)) {
-    return bad("transmittance_min", std::to_string(q.transmittance_min), "must be in [0, 1)");
+    return bad("transmittance_min", q.transmittance_min, "must be in [0, 1)");
   }
   return {};
 }

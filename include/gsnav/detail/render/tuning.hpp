@@ -17,10 +17,7 @@ struct Tuning {
 
 /// invalid_argument, naming the field, or ok.
 inline Status validate(const Tuning& t) {
-  const auto bad = [](const char* field, int value, const char* rule) {
-    return Status(Errc::invalid_argument, std::string("RenderConfig.tuning.") + field + " = " +
-                                              std::to_string(value) + ": " + rule);
-  };
+  const BadArgument bad{"RenderConfig.tuning."};
   if (t.tile_size != 0 && t.tile_size != 8 && t.tile_size != 16 && t.tile_size != 32) {
     return bad("tile_size", t.tile_size, "must be 8, 16 or 32, or 0 to choose");
   }

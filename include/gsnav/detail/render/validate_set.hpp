@@ -109,9 +109,7 @@ inline Status validate(const GaussianSet& set) {
   const ShapeRows& shape = g.shape;
   const ColorRows& color = g.color;
   const std::size_t n = g.size(), chunks = g.chunk_count();
-  const auto bad = [](const std::string& what) {
-    return Status(Errc::invalid_argument, "GaussianSet: " + what);
-  };
+  const BadArgument bad{"GaussianSet: "};
   const auto counted = [&](const char* name, std::size_t has, std::size_t wanted) {
     return has == wanted ? Status()
                          : bad(std::string(name) + " has " + std::to_string(has) + " values where " +

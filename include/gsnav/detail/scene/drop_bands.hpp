@@ -47,18 +47,18 @@ inline std::size_t limit_sh_degree(PackedCloud& cloud, int degree) {
   return before - cloud.bytes();
 }
 
-/// Has the storage of a cloud (GaussianCloud or PackedCloud) follow its profile (profile_scene): bands
-/// that no chunk needs are let go. The profile fits the cloud as before, and says how many bytes that
-/// were. Bands that some chunks need are held for all: docs/lod.md has what storage by chunk would save.
+/// Lets go of the bands of a cloud (GaussianCloud or PackedCloud) that no chunk needs (scene_bands).
+/// `needed` fits the cloud as before, and says how many bytes that were. Bands that some chunks need are
+/// held for all: docs/lod.md has what storage by chunk would save.
 template <class Cloud>
-void drop_bands(Cloud& cloud, SceneProfile& profile) {
-  profile.bytes_let_go +=
-      limit_sh_degree(cloud, needed_sh_degree(profile.applied_to(cloud.set()).gaussians.color));
+void drop_bands(Cloud& cloud, SceneBands& needed) {
+  needed.bytes_let_go +=
+      limit_sh_degree(cloud, needed_sh_degree(needed.applied_to(cloud.set()).gaussians.color));
   const ColorRows v = cloud.view().color;
   const std::size_t number = !v.shN_codes.empty()  ? 1
                              : !v.shN_half.empty() ? sizeof(std::uint16_t)
                                                    : sizeof(float);
-  profile.bytes_unneeded = number * (v.rest() * cloud.size() - profile.sh_numbers_read);
+  needed.bytes_unneeded = number * (v.rest() * cloud.size() - needed.sh_numbers_read);
 }
 
 }  // namespace gsnav

@@ -22,11 +22,11 @@ class GaussianArrays {
   GaussianArrays(B& backend, const GaussianCloud& cloud) : set_(cloud.set()) {
     if constexpr (!is_host_backend<B>) upload(backend, cloud);
   }
-  /// Without the SH bands that the profile says no chunk needs (detail/scene/scene_profile.hpp):
+  /// Without the SH bands that no chunk needs (detail/scene/scene_bands.hpp):
   /// elsewhere than on host backends those that none does take no memory, those that a chunk does not
-  /// are not read. On host backends the profile must outlive it too.
-  GaussianArrays(B& backend, const GaussianCloud& cloud, const SceneProfile& profile)
-      : set_(profile.applied_to(cloud.set())) {
+  /// are not read. On host backends `bands` must outlive it too.
+  GaussianArrays(B& backend, const GaussianCloud& cloud, const SceneBands& bands)
+      : set_(bands.applied_to(cloud.set())) {
     if constexpr (!is_host_backend<B>) {
       upload(backend, cloud);
       to_device(backend, set_.gaussians.color.chunk_degrees, bytes_);
@@ -39,11 +39,11 @@ class GaussianArrays {
       upload(backend, floats);
     }
   }
-  GaussianArrays(B& backend, const PackedCloud& cloud, const SceneProfile& profile)
-      : set_(profile.applied_to(cloud.set())) {
+  GaussianArrays(B& backend, const PackedCloud& cloud, const SceneBands& bands)
+      : set_(bands.applied_to(cloud.set())) {
     if constexpr (!is_host_backend<B>) {
       const GaussianCloud floats = unpack_cloud(cloud);
-      set_ = profile.applied_to(floats.set());
+      set_ = bands.applied_to(floats.set());
       upload(backend, floats);
       to_device(backend, set_.gaussians.color.chunk_degrees, bytes_);
     }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <span>
@@ -12,7 +11,7 @@
 #include "gsnav/detail/render/count_culled.hpp"
 #include "gsnav/detail/render/render_workspace.hpp"
 #include "gsnav/detail/scene/load_report.hpp"
-#include "gsnav/detail/scene/scene_profile.hpp"
+#include "gsnav/detail/scene/scene_bands.hpp"
 #include "gsnav/render/config.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 
@@ -47,11 +46,11 @@ struct FrameLedger {
 };
 
 /// Fills a ledger for a frame of `sets` from `camera`, whose counts are `stats`.
-/// `report`, `profile`, `lod`: where there are any. Cuts read all bands that are held.
+/// `report`, `bands`, `lod`: where there are any. Cuts read all bands that are held.
 inline FrameLedger frame_ledger(std::span<const GaussianSet> sets, const Camera& camera,
                                 const RenderConfig& config, const RenderStats& stats,
-                                const LoadReport* report = nullptr,
-                                const SceneProfile* profile = nullptr, const LodCut* lod = nullptr) {
+                                const LoadReport* report = nullptr, const SceneBands* bands = nullptr,
+                                const LodCut* lod = nullptr) {
   FrameLedger out;
   std::size_t rows = 0;
   for (const GaussianSet& set : sets) {
@@ -75,10 +74,10 @@ inline FrameLedger frame_ledger(std::span<const GaussianSet> sets, const Camera&
     out.sh_storage_error = report->sh_storage_error;
     out.sh_bytes = report->sh_bytes_let_go;
   }
-  if (profile != nullptr) {
-    if (lod == nullptr) out.sh_skipped = profile->sh_numbers - profile->sh_numbers_read;
-    if (out.sh_skipped != 0 || profile->bytes_let_go != 0) out.sh_error = profile->color_error;
-    out.sh_bytes += profile->bytes_let_go;
+  if (bands != nullptr) {
+    if (lod == nullptr) out.sh_skipped = bands->sh_numbers - bands->sh_numbers_read;
+    if (out.sh_skipped != 0 || bands->bytes_let_go != 0) out.sh_error = bands->color_error;
+    out.sh_bytes += bands->bytes_let_go;
   }
   if (lod != nullptr) out.lod = lod->stats();
   return out;

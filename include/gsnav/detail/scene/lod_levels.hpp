@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -184,14 +183,14 @@ struct LevelForest {
 
   /// Makes a node of each box at each level, from the finest to the coarsest.
   void add_nodes() {
-    std::vector<std::uint32_t> node_of(rows[0].size(), LodPlace::kNone);  // the coarsest so far, by box
-    std::uint32_t first_chunk = 0;                                        // of the level, in merged
+    std::vector<std::uint32_t> node_of(rows[0].size(), LodBox::kNone);  // the coarsest so far, by box
+    std::uint32_t first_chunk = 0;                                      // of the level, in merged
     for (std::size_t l = 0; l < levels.size(); ++l) {
       tree.level_begin.push_back(static_cast<std::uint32_t>(tree.nodes.size()));
       for (std::uint32_t b = 0; b < node_of.size(); ++b) {
         const BoxRows& r = rows[l][b];
-        if (r.count == 0 || (l > 0 && node_of[b] == LodPlace::kNone)) continue;
-        tree.places.push_back(
+        if (r.count == 0 || (l > 0 && node_of[b] == LodBox::kNone)) continue;
+        tree.boxes.push_back(
             {r.first_chunk + first_chunk, r.chunks, node_of[b], r.count, rows[0][b].count});
         node_of[b] = static_cast<std::uint32_t>(tree.nodes.size());
         tree.nodes.emplace_back();
@@ -201,7 +200,7 @@ struct LevelForest {
     }
     tree.level_begin.push_back(static_cast<std::uint32_t>(tree.nodes.size()));
     for (const std::uint32_t node : node_of) {
-      if (node != LodPlace::kNone) tree.roots.push_back(node);
+      if (node != LodBox::kNone) tree.roots.push_back(node);
     }
   }
 
@@ -221,7 +220,7 @@ struct LevelForest {
       node.grain = grain.size();
       return node;
     }
-    const LodNode& finer = tree.nodes[tree.places[at].finer];
+    const LodNode& finer = tree.nodes[tree.boxes[at].finer];
     node.grain = finer.grain;
     node.reach = both(node.reach, finer.reach);
     const double distance = distance_to_level(levels[0].cloud, rows[0][b], own, r);

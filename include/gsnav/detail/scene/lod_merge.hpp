@@ -3,9 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <vector>
 
 #include "gsnav/math/mat.hpp"
 #include "gsnav/math/vec.hpp"

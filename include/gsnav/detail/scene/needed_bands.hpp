@@ -32,8 +32,8 @@ void cut_rows(const T* rows, std::size_t n, std::size_t from, std::size_t to, T*
   }
 }
 
-/// What of a cloud a frame has to read: measured once by profile_scene (detail/scene/scene_profile.hpp).
-struct SceneProfile {
+/// What of a cloud a frame has to read: measured once by scene_bands (detail/scene/scene_bands.hpp).
+struct SceneBands {
   std::vector<std::uint8_t> chunk_sh_degrees;  ///< what ColorRows::chunk_degrees takes, [chunks]
   std::uint64_t sh_numbers = 0;  ///< SH coefficients above degree 0, of all channels, that there are
   std::uint64_t sh_numbers_read = 0;  ///< of these, in the bands that are kept
@@ -42,8 +42,8 @@ struct SceneProfile {
   std::uint64_t bytes_let_go = 0;    ///< what it gave back
   std::uint64_t bytes_unneeded = 0;  ///< what is held of bands that their own chunk does not need
 
-  /// The set, of arrays in host memory, without the bands that were found to say nothing. The profile
-  /// must outlive it. For other backends: GaussianArrays.
+  /// The set, of arrays in host memory, without the bands that were found to say nothing. This must
+  /// outlive it. For other backends: GaussianArrays.
   GaussianSet applied_to(GaussianSet set) const noexcept {
     set.gaussians.color.chunk_degrees = {chunk_sh_degrees.data(), chunk_sh_degrees.size()};
     return set;

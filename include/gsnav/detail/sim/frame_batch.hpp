@@ -11,11 +11,10 @@
 #include <memory>
 #include <span>
 #include <unordered_map>
-#include <utility>
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
-#include "gsnav/detail/render/frame_lanes.hpp"
+#include "gsnav/detail/render/thread_frames.hpp"
 #include "gsnav/render/config.hpp"
 
 namespace gsnav {

@@ -4,9 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -120,7 +118,7 @@ class SceneOnBackend {
     return *slots_[slot];
   }
 
-  GaussianArrays<B> arrays_of(const SceneAsset& asset, const SceneProfile* profile) const {
+  GaussianArrays<B> arrays_of(const SceneAsset& asset, const SceneBands* profile) const {
     const auto of = [&](const auto& cloud) {
       return profile != nullptr ? GaussianArrays<B>(*backend_, cloud, *profile)
                                 : GaussianArrays<B>(*backend_, cloud);

@@ -59,7 +59,7 @@ class SemanticPasses {
     for (MeshInstance& m : out) {
       const std::size_t thing = sets + m.id,
                         channel = thing / kChannels == pass ? thing % kChannels : kChannels;
-      m.mesh.plain = true;  // holes and what is seen through stay
+      m.mesh.base_color_only = true;  // holes and what is seen through stay
       m.mesh.unlit = true;
       m.mesh.base_color = {channel == 0 ? 1.0f : 0.0f, channel == 1 ? 1.0f : 0.0f,
                            channel == 2 ? 1.0f : 0.0f};

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
@@ -83,7 +82,7 @@ class SemanticFrames {
     for (std::size_t i = 0; i < black_.size(); ++i) {
       if (Status s = validate(black_[i]); !s) return s;
       black_[i].id = static_cast<std::uint32_t>(i);
-      black_[i].mesh.plain = true;
+      black_[i].mesh.base_color_only = true;
       black_[i].mesh.base_color = {0, 0, 0};
       black_[i].mesh.unlit = true;
       if (black_[i].mesh.alpha_mode == MeshAlpha::blend) through_.push_back(i);

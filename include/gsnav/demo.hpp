@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What runs where there is no scene yet: the embedded flat, people made by code alone and their walks.
+// Link gsnav::demo.
+
+#include "gsnav/detail/demo/default_scene.hpp"
+#include "gsnav/detail/demo/gait.hpp"
+#include "gsnav/detail/demo/humanoid.hpp"
+#include "gsnav/detail/demo/people.hpp"

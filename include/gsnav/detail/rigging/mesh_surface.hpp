@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "gsnav/detail/avatar/skinned_mesh.hpp"
+
+namespace gsnav {
+
+/// sRGB's transfer function and its inverse, for one channel in [0, 1].
+double srgb_from_linear(double c) noexcept;
+double linear_from_srgb(double c) noexcept;
+
+/// Colour and opacity of a surface point.
+struct SurfaceColor {
+  Vec3d rgb{1, 1, 1};  ///< linear light
+  bool hole = false;   ///< its texel has less alpha than the material's cut-off
+};
+
+/// Answers what colour a mesh has where. Keeps a reference to the mesh.
+class MeshColors {
+ public:
+  explicit MeshColors(const SkinnedMesh& mesh);
+
+  /// At barycentric coordinates `at` of triangle t: texture (bilinear, repeated) times factor times
+  /// vertex colour.
+  SurfaceColor color(std::size_t t, const Vec3d& at) const;
+
+ private:
+  std::array<double, 4> sample(const TextureImage& t, double u, double v) const;
+
+  const SkinnedMesh& mesh_;
+  std::array<double, 256> linear_{};
+};
+
+}  // namespace gsnav

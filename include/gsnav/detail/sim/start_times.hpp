@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "gsnav/core/status.hpp"
+#include "gsnav/detail/sim/episode.hpp"
+#include "gsnav/detail/sim/task.hpp"
+#include "gsnav/sim/scene.hpp"
+
+namespace gsnav {
+
+/// Gives each episode a start time, a multiple of the control period in [0, 600) s, at which no avatar
+/// is within 0.6 m of its start (the last of a hundred tries where there is none). Errors: what
+/// CapsuleSet::create reports.
+Status draw_start_times(std::span<PointNavEpisode> episodes, const SimulatorScene& scene,
+                        const TaskConfig& task, std::uint64_t seed);
+
+}  // namespace gsnav

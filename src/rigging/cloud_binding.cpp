@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/detail/rigging/cloud_binding.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "mesh_weights.hpp"
+
+namespace gsnav {
+
+namespace {
+
+/// Barycentric coordinates of the point of triangle a b c nearest to p.
+Vec3d nearest_in_triangle(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& p) {
+  const auto on_edge = [&](const Vec3d& u, const Vec3d& v) {
+    const Vec3d d = v - u;
+    const double n = dot(d, d);
+    return n > 0 ? clamp(dot(p - u, d) / n, 0.0, 1.0) : 0.0;
+  };
+  const Vec3d n = cross(b - a, c - a);
+  const double area2 = dot(n, n);
+  if (area2 > 0) {
+    const Vec3d w{dot(cross(c - b, p - b), n) / area2, dot(cross(a - c, p - c), n) / area2,
+                  dot(cross(b - a, p - a), n) / area2};
+    if (w.x >= 0 && w.y >= 0 && w.z >= 0) return w;
+  }
+  const double s = on_edge(a, b), t = on_edge(b, c), u = on_edge(c, a);
+  const Vec3d candidates[3] = {{1 - s, s, 0}, {0, 1 - t, t}, {u, 0, 1 - u}};
+  Vec3d best{1, 0, 0};
+  double least = std::numeric_limits<double>::max();
+  for (const Vec3d& w : candidates) {
+    const Vec3d d = a * w.x + b * w.y + c * w.z - p;
+    if (dot(d, d) < least) least = dot(d, d), best = w;
+  }
+  return best;
+}
+
+}  // namespace
+
+namespace detail {
+
+NearestTriangle::NearestTriangle(const SkinnedMesh& mesh) : mesh_(mesh), around_(mesh.positions.size()) {
+  double edges = 0.0;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t v = mesh.triangles[t][k];
+      around_[v].push_back(static_cast<std::uint32_t>(t));
+      edges += norm(mesh.positions[v] - mesh.positions[mesh.triangles[t][(k + 1) % 3]]);
+    }
+  }
+  cell_ = max(2 * edges / (3 * static_cast<double>(mesh.triangles.size())), 1e-9);
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    if (around_[v].empty()) continue;
+    const auto c = cell_of(mesh.positions[v]);
+    cells_[key(c[0], c[1], c[2])].push_back(static_cast<std::uint32_t>(v));
+  }
+}
+
+MeshSample NearestTriangle::find(const Vec3d& p, double& distance) const {
+  MeshSample best;
+  distance = std::numeric_limits<double>::max();
+  const auto c = cell_of(p);
+  // Rings of cells outwards, one more than the first that has a vertex: a longer edge may come nearer.
+  for (std::int64_t ring = 0, last = kRings; ring <= last; ++ring) {
+    for (std::int64_t z = -ring; z <= ring; ++z) {
+      for (std::int64_t y = -ring; y <= ring; ++y) {
+        const bool shell = std::abs(z) == ring || std::abs(y) == ring;
+        for (std::int64_t x = -ring; x <= ring; x += shell || ring == 0 ? 1 : 2 * ring) {
+          const auto found = cells_.find(key(c[0] + x, c[1] + y, c[2] + z));
+          if (found == cells_.end()) continue;
+          last = std::min(last, ring + 1);
+          for (const std::uint32_t v : found->second) {
+            for (const std::uint32_t t : around_[v]) look(t, p, best, distance);
+          }
+        }
+      }
+    }
+  }
+  if (distance == std::numeric_limits<double>::max()) {  // far away from everything
+    for (std::size_t t = 0; t < mesh_.triangles.size(); ++t)
+      look(static_cast<std::uint32_t>(t), p, best, distance);
+  }
+  return best;
+}
+
+void NearestTriangle::look(std::uint32_t t, const Vec3d& p, MeshSample& best, double& distance) const {
+  const auto& v = mesh_.triangles[t];
+  const Vec3d &a = mesh_.positions[v[0]], &b = mesh_.positions[v[1]], &c = mesh_.positions[v[2]];
+  const Vec3d w = nearest_in_triangle(a, b, c, p), q = a * w.x + b * w.y + c * w.z;
+  if (norm(q - p) < distance) {
+    distance = norm(q - p);
+    best.triangle = t;
+    best.at = w;
+    best.position = q;
+  }
+}
+
+std::array<std::int64_t, 3> NearestTriangle::cell_of(const Vec3d& p) const {
+  const auto part = [&](double v) {
+    return static_cast<std::int64_t>(std::floor(clamp(v / cell_, -1e9, 1e9)));
+  };
+  return {part(p.x), part(p.y), part(p.z)};
+}
+
+std::uint64_t NearestTriangle::key(std::int64_t x, std::int64_t y, std::int64_t z) noexcept {
+  const auto part = [](std::int64_t v) { return static_cast<std::uint64_t>(v) & 0x1fffffu; };
+  return part(x) << 42 | part(y) << 21 | part(z);
+}
+
+}  // namespace detail
+
+Result<BoundCloud> bind_cloud(const GaussianCloud& cloud, const SkinnedMesh& mesh,
+                              const CloudBindingOptions& options) {
+  const BadArgument bad{"bind_cloud: "};
+  if (Status s = mesh.validate(); !s) return s;
+  const Similarity& to = options.mesh_from_cloud;
+  if (!(to.scale > 0) || !is_finite(to.scale) || !is_finite(to.translation))
+    return bad("mesh_from_cloud has no scale above zero");
+  if (!(options.furthest > 0)) return bad("furthest must be positive");
+  if (!cloud.shN_half.empty()) return bad("the cloud is compact: expand_sh first");
+  if (cloud.sh_degree > 0 && !(abs(to.rotation.w) > 1 - 1e-9)) {
+    return {Errc::unsupported, "bind_cloud: colours of SH degree " + std::to_string(cloud.sh_degree) +
+                                   " in a turned frame"};
+  }
+  BoundCloud out;
+  AvatarAsset& asset = out.asset;
+  asset.name = mesh.name;
+  asset.skeleton = mesh.skeleton;
+  GaussianCloudBuilder builder(cloud.sh_degree, mesh.name);
+  builder.reserve(cloud.size());
+  const detail::NearestTriangle nearest(mesh);
+  const std::size_t rest = cloud.shN.size() / max<std::size_t>(1, cloud.size());
+  std::vector<std::vector<std::pair<std::uint16_t, double>>> rows;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    RawGaussian g;
+    g.mean = to * cloud.mean(i);
+    double distance = 0.0;
+    const detail::MeshSample at = nearest.find(g.mean, distance);
+    if (distance > options.furthest) {
+      ++out.left_out;
+      continue;
+    }
+    g.quat =
+        to.rotation * Quatd{cloud.quats[0][i], cloud.quats[1][i], cloud.quats[2][i], cloud.quats[3][i]};
+    for (std::size_t k = 0; k < 3; ++k) {
+      g.log_scales[static_cast<int>(k)] = std::log(to.scale * static_cast<double>(cloud.scales[k][i]));
+      g.sh0[k] = cloud.sh0[3 * i + k];
+    }
+    const double o = static_cast<double>(cloud.opacities[i]);
+    g.opacity_logit = std::log(o) - std::log1p(-o);
+    g.shN = rest == 0 ? nullptr : cloud.shN.data() + rest * i;
+    if (!builder.add(g)) continue;
+    out.furthest = max(out.furthest, distance);
+    detail::blend_weights(mesh, at, rows.emplace_back());
+  }
+  if (rows.empty())
+    return bad("no Gaussian lies within " + std::to_string(options.furthest) + " m of the surface");
+  if (Status s = detail::finish_avatar(asset, builder, rows, options.weights, out.weights); !s) return s;
+  return out;
+}
+
+}  // namespace gsnav
