@@ -40,7 +40,7 @@ struct RenderConfig {
 /// invalid_argument, naming the field, or ok.
 inline Status validate(const RenderConfig& c) {
   const BadArgument bad{"RenderConfig."};
-  if (c.outputs == 0 || (c.outputs & ~(kRgb | kAlpha | kAnyDepth)) != 0) {
+  if (c.outputs == 0 || (c.outputs & ~kAllOutputs) != 0) {
     return bad("outputs", c.outputs, "name at least one known output");
   }
   const auto unknown = [&](const char* field, auto value) {

@@ -35,6 +35,14 @@ struct Frames {
   std::vector<S> accumulated_depth;  ///< [C][H][W]
   std::vector<S> first_hit_depth;    ///< [C][H][W]
   std::vector<RenderStats> stats;    ///< [C]
+
+  /// The images in the order of kImages (detail/frame/output.hpp).
+  static constexpr std::vector<S> Frames::*kVectors[] = {&Frames::rgb,
+                                                         &Frames::alpha,
+                                                         &Frames::median_depth,
+                                                         &Frames::expected_depth,
+                                                         &Frames::accumulated_depth,
+                                                         &Frames::first_hit_depth};
 };
 
 }  // namespace gsnav

@@ -120,16 +120,13 @@ class BasicRenderer {
   }
   /// Where the images of camera c lie in `out`.
   static FrameImages<S> images_of(Frames<S>& out, std::size_t c) noexcept {
-    const auto at = [&out, c](std::vector<S>& image, std::size_t channels) -> S* {
-      return image.empty() ? nullptr : image.data() + c * out.width * out.height * channels;
-    };
     FrameImages<S> images;
-    images.rgb = at(out.rgb, 3);
-    images.alpha = at(out.alpha, 1);
-    images.median_depth = at(out.median_depth, 1);
-    images.expected_depth = at(out.expected_depth, 1);
-    images.accumulated_depth = at(out.accumulated_depth, 1);
-    images.first_hit_depth = at(out.first_hit_depth, 1);
+    const std::size_t pixels = out.width * out.height;
+    for (std::size_t i = 0; i < kImageCount; ++i) {
+      std::vector<S>& values = out.*Frames<S>::kVectors[i];
+      if (!values.empty())
+        images.*kImages<S>[i].image = values.data() + c * pixels * kImages<S>[i].channels;
+    }
     return images;
   }
 
@@ -154,19 +151,8 @@ class BasicRenderer {
   /// Makes `out`'s images as large as its size says.
   static Status size_images(Frames<S>& out, unsigned outputs) {
     const std::size_t cameras = out.cameras, pixels = out.width * out.height;
-    struct Image {
-      std::vector<S>& values;
-      unsigned output;
-      std::size_t channels;
-    };
-    const Image images[] = {{out.rgb, kRgb, 3},
-                            {out.alpha, kAlpha, 1},
-                            {out.median_depth, kMedianDepth, 1},
-                            {out.expected_depth, kExpectedDepth, 1},
-                            {out.accumulated_depth, kAccumulatedDepth, 1},
-                            {out.first_hit_depth, kFirstHitDepth, 1}};
     std::size_t channels = 0;
-    for (const Image& i : images) channels += (outputs & i.output) != 0 ? i.channels : 0;
+    for (const ImageKind<S>& k : kImages<S>) channels += (outputs & k.output) != 0 ? k.channels : 0;
     const std::size_t bytes = pixels * channels * sizeof(S);  // of a camera: at most 2^34
     const auto refused = [&](const std::string& why) {
       return Status(Errc::out_of_memory, "Renderer: the images of " + std::to_string(cameras) +
@@ -184,8 +170,10 @@ class BasicRenderer {
         return refused("are more than the machine's memory: render fewer at a time");
     }
     Status s = detail::guarded([&] {
-      for (const Image& i : images) {
-        i.values.resize((outputs & i.output) != 0 ? cameras * pixels * i.channels : 0);
+      for (std::size_t i = 0; i < kImageCount; ++i) {
+        const ImageKind<S>& k = kImages<S>[i];
+        (out.*Frames<S>::kVectors[i])
+            .resize((outputs & k.output) != 0 ? cameras * pixels * k.channels : 0);
       }
       out.stats.assign(cameras, {});
       return Status();
@@ -242,34 +230,20 @@ class BasicRenderer {
       FrameJob<S> there = job;
       there.images = images;
       if (Status s = draw(there, stats); !s) return s;
-      for_each_image(job.images, images, [&](S* host, S* device, std::size_t channels) {
-        backend_->copy(host, device, pixels * channels * sizeof(S), CopyKind::device_to_host);
-      });
+      for (const ImageKind<S>& k : kImages<S>) {
+        if (job.images.*k.image == nullptr) continue;
+        backend_->copy(job.images.*k.image, images.*k.image, pixels * k.channels * sizeof(S),
+                       CopyKind::device_to_host);
+      }
       return {};
     }
   }
   MeshFrame mesh_frame() const noexcept { return {meshes_, light_}; }
 
-  /// f(image of a, image of b, channels) for each image that `a` has.
-  template <class F>
-  static void for_each_image(FrameImages<S> a, FrameImages<S>& b, const F& f) {
-    if (a.rgb != nullptr) f(a.rgb, b.rgb, 3);
-    if (a.alpha != nullptr) f(a.alpha, b.alpha, 1);
-    if (a.median_depth != nullptr) f(a.median_depth, b.median_depth, 1);
-    if (a.expected_depth != nullptr) f(a.expected_depth, b.expected_depth, 1);
-    if (a.accumulated_depth != nullptr) f(a.accumulated_depth, b.accumulated_depth, 1);
-    if (a.first_hit_depth != nullptr) f(a.first_hit_depth, b.first_hit_depth, 1);
-  }
   /// Room in the backend's memory for the images that `host` has.
   FrameImages<S> device_images(const FrameImages<S>& host, std::size_t pixels) {
-    device_images_.resize_discard(8 * pixels);
-    FrameImages<S> images;
-    S* next = device_images_.data();
-    for_each_image(host, images, [&next, pixels](S*, S*& device, std::size_t channels) {
-      device = next;
-      next += pixels * channels;
-    });
-    return images;
+    device_images_.resize_discard(channel_count(host) * pixels);
+    return images_in(device_images_.data(), host, pixels);
   }
 
   B* backend_;

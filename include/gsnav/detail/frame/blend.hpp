@@ -12,24 +12,6 @@
 
 namespace gsnav {
 
-/// Images of one camera; a null pointer is an image not asked for.
-template <class S>
-struct FrameImages {
-  S* rgb = nullptr;
-  S* alpha = nullptr;
-  S* median_depth = nullptr;
-  S* expected_depth = nullptr;
-  S* accumulated_depth = nullptr;
-  S* first_hit_depth = nullptr;
-
-  GSNAV_HD DepthMode depth_mode() const noexcept {
-    if (expected_depth != nullptr || accumulated_depth != nullptr || first_hit_depth != nullptr)
-      return DepthMode::any;
-    return median_depth != nullptr ? DepthMode::median : DepthMode::none;
-  }
-  bool operator==(const FrameImages&) const = default;
-};
-
 /// Where tiles are kept between the slices of depth that a frame is blended in.
 template <class S>
 struct TileProgress {
@@ -41,7 +23,10 @@ struct TileProgress {
 
 /// Values of a pixel that a slice leaves to the next.
 GSNAV_HD constexpr std::size_t blend_state_values(DepthMode mode) noexcept {
-  return mode == DepthMode::none ? 4 : mode == DepthMode::median ? 5 : 8;
+  const std::size_t bytes = mode == DepthMode::none     ? sizeof(BlendState<float, DepthMode::none>)
+                            : mode == DepthMode::median ? sizeof(BlendState<float, DepthMode::median>)
+                                                        : sizeof(BlendState<float, DepthMode::any>);
+  return bytes / sizeof(float);
 }
 
 /// Arguments of blending the tiles of one camera.
@@ -108,20 +93,6 @@ GSNAV_HD auto pixel_value(const RasterArgs<S>& args, const State& state) noexcep
   } else {
     static_assert(O == kFirstHitDepth);
     return state.first_hit;
-  }
-}
-
-/// Calls f.operator()<Output>(image) for each image that a state of mode D has values for: null where it
-/// was not asked for.
-template <DepthMode D, class S, class F>
-GSNAV_HD void for_each_image(const FrameImages<S>& images, const F& f) noexcept {
-  f.template operator()<kRgb>(images.rgb);
-  f.template operator()<kAlpha>(images.alpha);
-  if constexpr (D != DepthMode::none) f.template operator()<kMedianDepth>(images.median_depth);
-  if constexpr (D == DepthMode::any) {
-    f.template operator()<kExpectedDepth>(images.expected_depth);
-    f.template operator()<kAccumulatedDepth>(images.accumulated_depth);
-    f.template operator()<kFirstHitDepth>(images.first_hit_depth);
   }
 }
 

@@ -5,23 +5,13 @@
 
 #include "gsnav/core/view.hpp"
 #include "gsnav/detail/frame/depth.hpp"
+#include "gsnav/detail/frame/output.hpp"
 #include "gsnav/detail/frame/splat.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/image/mesh_layer.hpp"
 #include "gsnav/math/functions.hpp"
 
 namespace gsnav {
-
-/// Images a render may produce; combine with |. Nothing that is not asked for is computed.
-enum Output : unsigned {
-  kRgb = 1u << 0,               ///< [H][W][3], unclamped, over the background
-  kAlpha = 1u << 1,             ///< [H][W], 1 - transmittance
-  kMedianDepth = 1u << 2,       ///< [H][W] metres, where transmittance crosses 1/2; 0: no return
-  kExpectedDepth = 1u << 3,     ///< [H][W] metres, sum(w z) / sum(w); 0 where sum(w) = 0
-  kAccumulatedDepth = 1u << 4,  ///< [H][W] metres, sum(w z)
-  kFirstHitDepth = 1u << 5,     ///< [H][W] metres, where alpha first reaches first_hit_tau; 0: never
-};
-inline constexpr unsigned kAnyDepth = kMedianDepth | kExpectedDepth | kAccumulatedDepth | kFirstHitDepth;
 
 /// The rules of blending, in the scalar of the kernel.
 template <class S>
@@ -33,9 +23,6 @@ struct BlendRules {
   S return_alpha{S(0)};         ///< expected depth has no return where alpha is not above this
   bool exclusive_stop = false;  ///< the Gaussian that closes a pixel is not blended (Compat)
 };
-
-/// Which depth images a compiled blend loop serves; less is cheaper.
-enum class DepthMode { none, median, any };
 
 /// Transmittance of a pixel (or a pack of them) before and after a splat or a surface, and the weight
 /// that this has in the sums: before - after where it is blended, else 0.

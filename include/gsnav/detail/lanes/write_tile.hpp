@@ -79,7 +79,6 @@ void write_color(const BlockRow& row, float* image, const Value& value) noexcept
 
 /// The tile's rows are far apart in an image, and come in while it is blended.
 inline void prefetch_images(const RasterArgs<float>& args, int tile_x, int tile_y) noexcept {
-  const FrameImages<float>& out = args.images;
   const int tile_size = args.grid.tile_size;
   const auto prefetch = [=, &args](const float* image, std::size_t values) {
     if (image == nullptr) return;
@@ -92,11 +91,10 @@ inline void prefetch_images(const RasterArgs<float>& args, int tile_x, int tile_
       }
     }
   };
-  prefetch(out.rgb, 3);
-  for (const float* image :
-       {out.alpha, out.median_depth, out.expected_depth, out.accumulated_depth, out.first_hit_depth}) {
-    prefetch(image, 1);
-  }
+  for_each_image<DepthMode::any>(args.images, [&]<Output O>(const float* image) GSNAV_INLINED {
+    constexpr std::size_t kChannels = channels_of(O);
+    prefetch(image, kChannels);
+  });
 }
 
 }  // namespace GSNAV_LANES_TAG

@@ -65,8 +65,9 @@ BlendRules<S> blend_rules(const RenderConfig& c) noexcept {
 template <class S>
 BlendRules<S> blend_rules(const RenderConfig& c, const FrameImages<S>& images) noexcept {
   BlendRules<S> r = blend_rules<S>(c);
-  const bool sums = images.rgb != nullptr || images.alpha != nullptr ||
-                    images.expected_depth != nullptr || images.accumulated_depth != nullptr;
+  const bool sums =
+      std::any_of(std::begin(kImages<S>), std::end(kImages<S>),
+                  [&](const ImageKind<S>& k) { return k.sums && images.*k.image != nullptr; });
   if (sums || c.compat != Compat::none) return r;
   S needed(1);
   if (images.median_depth != nullptr) needed = S(0.5);

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
@@ -50,8 +49,8 @@ class FrameBatch {
     for (Known& k : known_) {
       // By where images go, so that they can be drawn there, or copied, together.
       const auto first = [&](std::size_t j) {
-        for (float* p : images_of(jobs[j].images)) {
-          if (p != nullptr) return p;
+        for (const ImageKind<float>& image : kImages<float>) {
+          if (float* const p = jobs[j].images.*image.image; p != nullptr) return p;
         }
         return static_cast<float*>(nullptr);
       };
@@ -70,14 +69,12 @@ class FrameBatch {
 
  private:
   using Batch = typename B::batch_renderer;
-  static constexpr std::size_t kImages = 6;
-  static constexpr std::array<std::size_t, kImages> kChannels{3, 1, 1, 1, 1, 1};
 
   /// What frames of one call have in common.
   struct Kind {
     RenderConfig config;
     int width = 0, height = 0;
-    unsigned images = 0;  // a bit each
+    unsigned images = 0;  // Output
     bool meshes = false;  // among which `fast` has the exponential of `exact`
     bool operator==(const Kind&) const = default;
   };
@@ -87,14 +84,12 @@ class FrameBatch {
     std::vector<std::size_t> jobs;  // of the present call
   };
 
-  static std::array<float*, kImages> images_of(const FrameImages<float>& i) noexcept {
-    return {i.rgb, i.alpha, i.median_depth, i.expected_depth, i.accumulated_depth, i.first_hit_depth};
-  }
   static Kind kind_of(const FrameJob<float>& job) noexcept {
     Kind k{*job.config, job.camera->width, job.camera->height, 0, !job.meshes.instances.empty()};
     k.config.outputs = kRgb;  // pointers say which images
-    const auto images = images_of(job.images);
-    for (std::size_t i = 0; i < kImages; ++i) k.images |= images[i] != nullptr ? 1u << i : 0u;
+    for (const ImageKind<float>& i : kImages<float>) {
+      k.images |= job.images.*i.image != nullptr ? i.output : 0u;
+    }
     return k;
   }
 
@@ -112,25 +107,18 @@ class FrameBatch {
     const std::size_t pixels =
         static_cast<std::size_t>(known.kind.width) * static_cast<std::size_t>(known.kind.height);
     const bool in_place = to == CopyKind::device_to_device && in_rows(which, jobs, pixels);
-    std::array<float*, kImages> at = images_of(jobs[which.front()].images);
-    if (!in_place) {
-      std::size_t channels = 0;
-      for (std::size_t i = 0; i < kImages; ++i) channels += at[i] != nullptr ? kChannels[i] : 0;
-      scratch_.resize_discard(channels * pixels * which.size());
-      float* next = scratch_.data();
-      for (std::size_t i = 0; i < kImages; ++i) {
-        if (at[i] == nullptr) continue;
-        at[i] = next;
-        next += kChannels[i] * pixels * which.size();
-      }
-    }
     typename Batch::images_type images;
-    images.floats = {at[0], at[1], at[2], at[3], at[4], at[5]};
+    images.floats = jobs[which.front()].images;
+    if (!in_place) {
+      scratch_.resize_discard(channel_count(images.floats) * pixels * which.size());
+      images.floats = images_in(scratch_.data(), images.floats, pixels * which.size());
+    }
     if (Status s = known.batch->render(sets_, std::span(cameras_).subspan(begin, count), images); !s)
       return s;
     const auto hand_out = [&] {
-      for (std::size_t i = 0; i < kImages && !in_place; ++i) {
-        if (at[i] != nullptr) copy(i, at[i], which, jobs, pixels * kChannels[i], to);
+      if (in_place) return;
+      for (const ImageKind<float>& k : kImages<float>) {
+        if (images.floats.*k.image != nullptr) copy(k, images.floats.*k.image, which, jobs, pixels, to);
       }
     };
     // At once, so that nothing waits for the host in between; once more where scratch had to grow.
@@ -192,19 +180,20 @@ class FrameBatch {
   /// Whether all images lie one behind the other, so that a batch may be drawn where they are.
   static bool in_rows(std::span<const std::size_t> which, std::span<const FrameJob<float>> jobs,
                       std::size_t pixels) {
-    const auto first = images_of(jobs[which.front()].images);
+    const FrameImages<float>& first = jobs[which.front()].images;
     for (std::size_t c = 1; c < which.size(); ++c) {
-      const auto here = images_of(jobs[which[c]].images);
-      for (std::size_t i = 0; i < kImages; ++i) {
-        if (first[i] != nullptr && here[i] != first[i] + c * pixels * kChannels[i]) return false;
+      for (const ImageKind<float>& k : kImages<float>) {
+        const float* const here = jobs[which[c]].images.*k.image;
+        if (first.*k.image != nullptr && here != first.*k.image + c * pixels * k.channels) return false;
       }
     }
     return true;
   }
 
-  void copy(std::size_t image, const float* from, std::span<const std::size_t> which,
-            std::span<const FrameJob<float>> jobs, std::size_t size, CopyKind kind) {
-    const auto target = [&](std::size_t c) { return images_of(jobs[which[c]].images)[image]; };
+  void copy(const ImageKind<float>& image, const float* from, std::span<const std::size_t> which,
+            std::span<const FrameJob<float>> jobs, std::size_t pixels, CopyKind kind) {
+    const std::size_t size = pixels * image.channels;
+    const auto target = [&](std::size_t c) { return jobs[which[c]].images.*image.image; };
     for (std::size_t begin = 0, end = 0; begin < which.size(); begin = end) {
       for (end = begin + 1; end < which.size() && target(end) == target(begin) + (end - begin) * size;)
         ++end;
