@@ -36,7 +36,7 @@ class AvatarArrayReader {
     return read_features();
   }
 
-  AvatarArrays out;
+  AvatarFileArrays out;
 
  private:
   Status error(Errc code, const std::string& what) const {
@@ -151,8 +151,8 @@ class AvatarArrayReader {
 
 }  // namespace
 
-Result<AvatarArrays> read_avatar_arrays(const NpzArrays& arrays, std::size_t joints, AvatarColors colors,
-                                        std::vector<std::string>& warnings) {
+Result<AvatarFileArrays> read_avatar_arrays(const NpzArrays& arrays, std::size_t joints,
+                                            AvatarColors colors, std::vector<std::string>& warnings) {
   AvatarArrayReader reader(arrays, joints);
   const bool gart = !arrays.file().contains("means") && arrays.file().contains("_xyz");
   if (Status s = gart ? reader.read_gart() : reader.read_habitat(colors, warnings); !s) return s;

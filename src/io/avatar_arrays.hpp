@@ -12,7 +12,7 @@
 namespace gsnav::io::detail {
 
 /// The Gaussians of an avatar's file, all values finite and in range.
-struct AvatarArrays {
+struct AvatarFileArrays {
   std::size_t count = 0;  ///< N
   int sh_degree = 0;
   NpyArray means;      ///< [N, 3]
@@ -25,7 +25,7 @@ struct AvatarArrays {
 
 /// Reads Habitat-GS's arrays, or those of GART's parameters where the file has them. Adds to `warnings`
 /// what was guessed. Errors: those of load_avatar.
-Result<AvatarArrays> read_avatar_arrays(const NpzArrays& arrays, std::size_t joints, AvatarColors colors,
-                                        std::vector<std::string>& warnings);
+Result<AvatarFileArrays> read_avatar_arrays(const NpzArrays& arrays, std::size_t joints,
+                                            AvatarColors colors, std::vector<std::string>& warnings);
 
 }  // namespace gsnav::io::detail

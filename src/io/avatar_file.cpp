@@ -220,7 +220,7 @@ class AvatarReader {
   const NpzFile& file_;
   detail::NpzArrays arrays_;
   const LoadAvatarOptions& options_;
-  detail::AvatarArrays in_;
+  detail::AvatarFileArrays in_;
   LoadedAvatar out_;
   std::vector<std::size_t> kept_;  ///< rows of the file that are in the cloud
 };

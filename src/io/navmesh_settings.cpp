@@ -7,6 +7,7 @@
 #include "file.hpp"
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/detail/io/navmesh_settings_file.hpp"
+#include "gsnav/detail/nav/navmesh_fields.hpp"
 #include "json.hpp"
 
 namespace gsnav::io {
@@ -15,25 +16,9 @@ namespace {
 using detail::Json;
 using detail::must_be;
 using detail::shown;
+using gsnav::detail::kSettingFields;
+using gsnav::detail::SettingField;
 
-struct NumberKey {
-  const char* key;
-  double NavMeshSettings::*value;
-};
-constexpr NumberKey kNumbers[] = {
-    {"cellSize", &NavMeshSettings::cell_size},
-    {"cellHeight", &NavMeshSettings::cell_height},
-    {"agentHeight", &NavMeshSettings::agent_height},
-    {"agentRadius", &NavMeshSettings::agent_radius},
-    {"agentMaxClimb", &NavMeshSettings::agent_max_climb},
-    {"agentMaxSlope", &NavMeshSettings::agent_max_slope},
-    {"regionMinSize", &NavMeshSettings::region_min_size},
-    {"regionMergeSize", &NavMeshSettings::region_merge_size},
-    {"edgeMaxLen", &NavMeshSettings::edge_max_len},
-    {"edgeMaxError", &NavMeshSettings::edge_max_error},
-    {"detailSampleDist", &NavMeshSettings::detail_sample_dist},
-    {"detailSampleMaxError", &NavMeshSettings::detail_sample_max_error},
-};
 struct FlagKey {
   const char* key;
   bool NavMeshSettings::*value;
@@ -56,8 +41,8 @@ Result<std::int64_t> whole(const Json& value, const std::string& what, double mo
 Status read_setting(const std::string& key, const Json& value, const std::string& at,
                     NavMeshSettings& s) {
   const std::string what = at + ": '" + key + "'";
-  for (const NumberKey& n : kNumbers) {
-    if (key != n.key) continue;
+  for (const SettingField& n : kSettingFields) {
+    if (n.value == nullptr || key != n.name) continue;
     if (!value.is_number()) return must_be(what, value, "a number");
     s.*n.value = value.get<double>();
     return {};
@@ -110,13 +95,14 @@ Status save_navmesh_settings(const NavMeshSettings& settings, const std::filesys
   return detail::guarded(path.string(), [&]() -> Status {
     const NavMeshSettings usual;
     nlohmann::ordered_json json;
-    for (const NumberKey& n : kNumbers) {
+    for (const SettingField& n : kSettingFields) {
+      if (n.value == nullptr) continue;
       const double v = settings.*n.value;
       if (!std::isfinite(v)) {
         return {Errc::invalid_argument,
-                path.string() + ": '" + n.key + "' = " + std::to_string(v) + " is not finite"};
+                path.string() + ": '" + n.name + "' = " + std::to_string(v) + " is not finite"};
       }
-      json[n.key] = v;
+      json[n.name] = v;
     }
     json[kVertsPerPoly] = static_cast<double>(settings.verts_per_poly);
     for (const FlagKey& f : kFlags) json[f.key] = settings.*f.value;

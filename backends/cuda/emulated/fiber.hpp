@@ -26,7 +26,7 @@ class Fiber {
   void* sp_ = nullptr;           ///< of a fiber that does not run
   const void* stack_ = nullptr;  ///< its lowest byte
   std::size_t bytes_ = 0;
-  void* fake_stack_ = nullptr;  ///< AddressSanitizer's
+  [[maybe_unused]] void* fake_stack_ = nullptr;  ///< AddressSanitizer's
 };
 
 }  // namespace gsnav::emulated

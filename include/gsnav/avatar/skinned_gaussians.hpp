@@ -13,6 +13,7 @@
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/detail/avatar/body_bounds.hpp"
+#include "gsnav/detail/core/move_to.hpp"
 #include "gsnav/detail/frame/cull.hpp"
 #include "gsnav/detail/render/rules.hpp"
 #include "gsnav/render/config.hpp"
@@ -25,42 +26,25 @@ namespace gsnav {
 template <Backend B>
 class AvatarArrays {
  public:
-  AvatarArrays(B& backend, std::shared_ptr<const AvatarAsset> asset)
-      : asset_(std::move(asset)), indices_(backend), weights_(backend) {
+  AvatarArrays(B& backend, std::shared_ptr<const AvatarAsset> asset) : asset_(std::move(asset)) {
     set_ = asset_->cloud.set();
     GaussianRows& v = set_.gaussians;
     args_.influences = asset_->influences;
     args_.joint_indices = view_of(asset_->joint_indices);
     args_.weights = view_of(asset_->skinning_weights);
     if constexpr (!is_host_backend<B>) {
-      const auto to_device = [&](View<const float>& from) {
-        floats_.emplace_back(backend).upload(from.data, from.size);
-        from = {floats_.back().data(), from.size};
-      };
-      const auto planes_to_device = [&](auto& planes) {
-        for (std::size_t k = 0; k < std::size(planes.data); ++k) {
-          View<const float> plane = planes[k];
-          to_device(plane);
-          planes.data[k] = plane.data;
-        }
-      };
-      planes_to_device(v.shape.means);
-      planes_to_device(v.shape.quats);
-      planes_to_device(v.shape.scales);
-      to_device(v.shape.opacities);
-      to_device(v.color.sh0);
-      to_device(v.color.shN);
-      indices_.upload(args_.joint_indices.data, args_.joint_indices.size);
-      args_.joint_indices = std::as_const(indices_).view();
-      weights_.upload(args_.weights.data, args_.weights.size);
-      args_.weights = std::as_const(weights_).view();
+      detail::move_to(backend, v.shape.means, floats_);
+      detail::move_to(backend, v.shape.quats, floats_);
+      detail::move_to(backend, v.shape.scales, floats_);
+      detail::move_to(backend, v.shape.opacities, floats_);
+      detail::move_to(backend, v.color.sh0, floats_);
+      detail::move_to(backend, v.color.shN, floats_);
+      detail::move_to(backend, args_.joint_indices, shorts_);
+      detail::move_to(backend, args_.weights, shorts_);
     }
     if (asset_->skinning == Skinning::linear_stretched) {
       args_.weight_gradients = view_of(asset_->weight_gradients);
-      if constexpr (!is_host_backend<B>) {
-        floats_.emplace_back(backend).upload(args_.weight_gradients.data, args_.weight_gradients.size);
-        args_.weight_gradients = {floats_.back().data(), args_.weight_gradients.size};
-      }
+      if constexpr (!is_host_backend<B>) detail::move_to(backend, args_.weight_gradients, floats_);
       for (std::size_t k = 0; k < 3; ++k) args_.scales[k] = v.shape.scales[k];
     }
     for (std::size_t k = 0; k < 3; ++k) args_.means[k] = v.shape.means[k];
@@ -77,8 +61,8 @@ class AvatarArrays {
   std::shared_ptr<const AvatarAsset> asset_;
   GaussianSet set_;
   SkinningArgs<float> args_;
-  Buffer<std::uint16_t, B> indices_, weights_;
-  std::vector<Buffer<float, B>> floats_;  // a Buffer's memory stays where it is when the vector grows
+  std::vector<Buffer<std::uint16_t, B>> shorts_;
+  std::vector<Buffer<float, B>> floats_;
 };
 
 /// The Gaussians of one actor, posed on a backend and ready to be rendered in one list with the scene.

@@ -8,6 +8,7 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"
+#include "gsnav/detail/core/move_to.hpp"
 #include "gsnav/detail/scene/needed_bands.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
@@ -29,7 +30,7 @@ class GaussianArrays {
       : set_(bands.applied_to(cloud.set())) {
     if constexpr (!is_host_backend<B>) {
       upload(backend, cloud);
-      to_device(backend, set_.gaussians.color.chunk_degrees, bytes_);
+      detail::move_to(backend, set_.gaussians.color.chunk_degrees, bytes_);
     }
   }
   GaussianArrays(B& backend, const PackedCloud& cloud) : set_(cloud.set()) {
@@ -45,7 +46,7 @@ class GaussianArrays {
       const GaussianCloud floats = unpack_cloud(cloud);
       set_ = bands.applied_to(floats.set());
       upload(backend, floats);
-      to_device(backend, set_.gaussians.color.chunk_degrees, bytes_);
+      detail::move_to(backend, set_.gaussians.color.chunk_degrees, bytes_);
     }
   }
   GaussianSet set(const Similarity& world_from_asset = {}) const noexcept {
@@ -57,20 +58,20 @@ class GaussianArrays {
  private:
   void upload(B& backend, const GaussianCloud& cloud) {
     GaussianRows& v = set_.gaussians;
-    to_device(backend, v.shape.means);
-    to_device(backend, v.shape.quats);
-    to_device(backend, v.shape.scales);
-    to_device(backend, v.shape.opacities, floats_);
-    to_device(backend, v.shape.origin_ids, ids_);
-    to_device(backend, v.color.sh0, floats_);
+    detail::move_to(backend, v.shape.means, floats_);
+    detail::move_to(backend, v.shape.quats, floats_);
+    detail::move_to(backend, v.shape.scales, floats_);
+    detail::move_to(backend, v.shape.opacities, floats_);
+    detail::move_to(backend, v.shape.origin_ids, ids_);
+    detail::move_to(backend, v.color.sh0, floats_);
     std::vector<float> floats;
     std::vector<std::uint16_t> halves;
     drop_bands(v.color, v.size(), floats, halves);
-    to_device(backend, v.color.shN, floats_);
-    to_device(backend, v.color.shN_half, halves_);
-    to_device(backend, v.row_ids, ids_);
-    to_device(backend, v.chunk_bounds, bounds_);
-    to_device(backend, v.part_bounds, bounds_);
+    detail::move_to(backend, v.color.shN, floats_);
+    detail::move_to(backend, v.color.shN_half, halves_);
+    detail::move_to(backend, v.row_ids, ids_);
+    detail::move_to(backend, v.chunk_bounds, bounds_);
+    detail::move_to(backend, v.part_bounds, bounds_);
     origins_ = cloud.origins;  // read by the host
     v.origins = view_of(std::as_const(origins_));
   }
@@ -88,19 +89,6 @@ class GaussianArrays {
     drop(v.shN, floats);
     drop(v.shN_half, halves);
     v.degree = most;
-  }
-  template <class T>
-  static void to_device(B& backend, View<const T>& v, std::vector<Buffer<T, B>>& held) {
-    held.emplace_back(backend).upload(v.data, v.size);
-    v = {held.back().data(), v.size};
-  }
-  template <std::size_t K>
-  void to_device(B& backend, Planes<const float, K>& planes) {
-    for (std::size_t k = 0; k < K; ++k) {
-      View<const float> plane = planes[k];
-      to_device(backend, plane, floats_);
-      planes.data[k] = plane.data;
-    }
   }
   GaussianSet set_;
   std::vector<Buffer<float, B>> floats_;

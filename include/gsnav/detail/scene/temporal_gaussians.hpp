@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "gsnav/detail/core/move_to.hpp"
 #include "gsnav/detail/render/at_time.hpp"
 #include "gsnav/detail/scene/temporal_edit.hpp"
 #include "gsnav/scene/basic_renderer.hpp"
@@ -18,13 +19,9 @@ class TemporalGaussians {
       : backend_(backend), arrays_(backend, scene.cloud), view_(scene.view()), moment_(backend) {
     view_.base = arrays_.set().gaussians;
     if constexpr (!is_host_backend<B>) {
-      const auto to_device = [&](View<const float>& from) {
-        held_.emplace_back(backend).upload(from.data, from.size);
-        from = {held_.back().data(), from.size};
-      };
-      to_device(view_.times);
-      to_device(view_.sigmas);
-      for (auto& plane : view_.motion) to_device(plane);
+      detail::move_to(backend, view_.times, held_);
+      detail::move_to(backend, view_.sigmas, held_);
+      for (auto& plane : view_.motion) detail::move_to(backend, plane, held_);
     }
   }
 
@@ -42,7 +39,7 @@ class TemporalGaussians {
   GaussianArrays<B> arrays_;
   TemporalView view_;
   Moment<B> moment_;
-  std::vector<Buffer<float, B>> held_;  // a Buffer's memory stays where it is when the vector grows
+  std::vector<Buffer<float, B>> held_;
 };
 
 }  // namespace gsnav

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+
+#include "gsnav/nav/navmesh_settings.hpp"
+
+namespace gsnav::detail {
+
+/// The numbers among a NavMesh's settings, as Habitat names them in JSON and orders them in its
+/// `.navmesh`.
+inline constexpr std::size_t kSettingCount = 13;
+struct SettingField {
+  const char* name;
+  double NavMeshSettings::*value;  ///< null: verts_per_poly
+};
+inline constexpr SettingField kSettingFields[kSettingCount] = {
+    {"cellSize", &NavMeshSettings::cell_size},
+    {"cellHeight", &NavMeshSettings::cell_height},
+    {"agentHeight", &NavMeshSettings::agent_height},
+    {"agentRadius", &NavMeshSettings::agent_radius},
+    {"agentMaxClimb", &NavMeshSettings::agent_max_climb},
+    {"agentMaxSlope", &NavMeshSettings::agent_max_slope},
+    {"regionMinSize", &NavMeshSettings::region_min_size},
+    {"regionMergeSize", &NavMeshSettings::region_merge_size},
+    {"edgeMaxLen", &NavMeshSettings::edge_max_len},
+    {"edgeMaxError", &NavMeshSettings::edge_max_error},
+    {"vertsPerPoly", nullptr},
+    {"detailSampleDist", &NavMeshSettings::detail_sample_dist},
+    {"detailSampleMaxError", &NavMeshSettings::detail_sample_max_error},
+};
+
+}  // namespace gsnav::detail
