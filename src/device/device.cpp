@@ -82,30 +82,41 @@ std::vector<std::string> Device::available() {
 }
 
 std::string Device::name() const {
-  if (kind_ == DeviceKind::cuda) return "cuda:" + std::to_string(index_);
-  if (kind_ == DeviceKind::serial) return "serial";
-  return threads_ == 0 ? "cpu" : "cpu:" + std::to_string(threads_);
+  switch (kind_) {
+    case DeviceKind::serial:
+      break;
+    case DeviceKind::cpu:
+      return threads_ == 0 ? "cpu" : "cpu:" + std::to_string(threads_);
+    case DeviceKind::cuda:
+      return "cuda:" + std::to_string(index_);
+  }
+  return "serial";
 }
 
 std::string Device::description() const {
   switch (kind_) {
-#if defined(GSNAV_DEVICE_OPENMP)
+    case DeviceKind::serial:
+      break;
     case DeviceKind::cpu: {
+#if defined(GSNAV_DEVICE_OPENMP)
       const int n = detail::cpu_threads(threads_);
       return "CPU, " + std::to_string(n) + (n == 1 ? " thread, " : " threads, ") + detail::cpu_lanes() +
              " lanes";
-    }
+#else
+      break;
 #endif
-#if defined(GSNAV_DEVICE_CUDA)
+    }
     case DeviceKind::cuda: {
+#if defined(GSNAV_DEVICE_CUDA)
       const Result<std::string> known =
           detail::guarded([this]() -> Result<std::string> { return detail::cuda_name(index_); });
       return (known ? *known : "GPU") + " (" + name() + ")";
-    }
+#else
+      break;
 #endif
-    default:
-      return "CPU, 1 thread, portable code";
+    }
   }
+  return "CPU, 1 thread, portable code";
 }
 
 }  // namespace gsnav

@@ -13,17 +13,20 @@ Result<const detail::EngineFactory*> engines_of(const Device& device) {
   switch (device.kind()) {
     case DeviceKind::serial:
       return &detail::serial_engines;
-#if defined(GSNAV_DEVICE_OPENMP)
     case DeviceKind::cpu:
+#if defined(GSNAV_DEVICE_OPENMP)
       return &detail::openmp_engines;
+#else
+      break;
 #endif
-#if defined(GSNAV_DEVICE_CUDA)
     case DeviceKind::cuda:
+#if defined(GSNAV_DEVICE_CUDA)
       return &detail::cuda_engines;
+#else
+      break;
 #endif
-    default:
-      return {Errc::unsupported, "device \"" + device.name() + "\": not in this build"};
   }
+  return {Errc::unsupported, "device \"" + device.name() + "\": not in this build"};
 }
 
 Status moved_from(const char* what) {

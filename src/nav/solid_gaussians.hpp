@@ -5,7 +5,7 @@
 #include <span>
 
 #include "gaussian_voxels.hpp"
-#include "gsnav/detail/frame/packed_gaussians.hpp"
+#include "gsnav/detail/frame/set_rows.hpp"
 
 // The steps between a scene's Gaussians and its solid voxels.
 

@@ -23,7 +23,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).parents[2]
-BACKENDS = [ROOT / "backends" / name for name in ("serial", "openmp", "cuda")]
+BACKENDS = sorted(p.parent for p in (ROOT / "backends").glob("*/gsnav"))
 NEEDS = {"gsnav/interop/eigen.hpp": "eigen", "gsnav/interop/glm.hpp": "glm",
          "gsnav/interop/dlpack.hpp": "dlpack"}
 DEVICE_LAYERS = ("math", "core", "image", "frame", "skin", "sweep", "mesh", "lanes", "render")

@@ -32,21 +32,18 @@ struct NoopFunctor {
 ///     template <class F> void parallel_for(std::size_t n, const F& f);   // f(i) for i in [0, n)
 ///     Status synchronize();
 ///
-/// Optional members. Each has a generic fallback:
-///     run(stage, args...)                     a stage by code of the backend's own; core/stages.hpp is
-///     the table of stages sort_pairs(keys, values, keys_alt, values_alt, n, bits)   stable sort by the
-///     lowest `bits` of the key; returns
-///                                             true where the result is in *_alt
-///     concurrency() -> std::size_t            how many pieces to cut work into (default 1)
-///     one_thread() -> B                       a backend of the same kind for the calling thread alone:
-///     batches
-///                                             of cameras are then cut by frames
-///                                             (detail/render/thread_frames.hpp)
-///     static constexpr bool bins_in_lanes     its binning reads BinArgs::spans, which projection then
-///     fills batch_renderer                          a type that draws many cameras by one call
-///     (detail/sim/frame_batch.hpp) static allocate_host(bytes) -> void*, deallocate_host(p)   host
-///     memory that it copies to and from by itself
-///                                             (detail/core/host_array.hpp); nullptr where there is none
+/// Optional members, each with a generic fallback:
+///
+/// - `run(stage, args...)`: a stage by code of its own. core/stages.hpp is the table of stages.
+/// - `sort_pairs(keys, values, keys_alt, values_alt, n, bits)`: a stable sort by the lowest `bits` of
+///   the key. Returns whether the result is in the _alt arrays.
+/// - `concurrency() -> std::size_t`: how many pieces to cut work into; 1 by default.
+/// - `one_thread() -> B`: a backend of the same kind for the calling thread alone. Batches of cameras
+///   are then cut by frames (detail/render/thread_frames.hpp).
+/// - `static constexpr bool bins_in_lanes`: binning reads BinArgs::spans, which projection then fills.
+/// - `batch_renderer`: a type that draws many cameras by one call (detail/sim/frame_batch.hpp).
+/// - `static allocate_host(bytes) -> void*` and `deallocate_host(p)`: host memory that it copies to
+///   and from without waiting (detail/core/host_array.hpp); nullptr where there is none.
 template <class B>
 concept Backend = requires(B& b, void* p, const void* q, std::size_t n, detail::NoopFunctor f) {
   typename B::memory_space;

@@ -34,7 +34,8 @@ class Device {
   /// machine has no such device. Both list the devices that there are.
   static Result<Device> parse(std::string_view text);
 
-  /// Names of the devices of this build on this machine, as parse takes them: "serial", "cpu", "cuda:0".
+  /// Names of the devices of this build on this machine, slowest kind first, as parse takes them:
+  /// "serial", "cpu", "cuda:0".
   static std::vector<std::string> available();
 
   DeviceKind kind() const noexcept { return kind_; }

@@ -37,7 +37,7 @@ struct ChunkBounds {
   float opacity_max = 0;  ///< in [0, 1]
 };
 
-/// How the rows of a chunk of kProjectChunk are packed (detail/frame/packed_gaussians.hpp).
+/// How the rows of a chunk of kProjectChunk are packed (detail/frame/set_rows.hpp).
 struct PackedChunk {
   Vec3<float> low{}, step{};  ///< offset of a mean: low + step code, metres
   float scale_step = 0;       ///< root of a standard deviation: scale_step code

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "gsnav/detail/core/huge_pages.hpp"
-#include "gsnav/detail/frame/packed_gaussians.hpp"
+#include "gsnav/detail/frame/set_rows.hpp"
 #include "gsnav/detail/scene/load_report.hpp"
 #include "gsnav/detail/scene/needed_bands.hpp"
 #include "gsnav/math/aabb.hpp"

@@ -9,7 +9,7 @@
 #include <cstdint>
 
 #include "gsnav/detail/eval/oracle_config.hpp"
-#include "gsnav/detail/frame/packed_gaussians.hpp"
+#include "gsnav/detail/frame/set_rows.hpp"
 #include "gsnav/detail/math/half.hpp"
 #include "gsnav/frame/gaussians.hpp"
 #include "gsnav/image/camera.hpp"
@@ -17,7 +17,7 @@
 #include "gsnav/render/config.hpp"
 
 // A row of a set as oracles see it, in long double and in metres. Only the decoding of stored rows
-// (packed_gaussians.hpp) is shared with the kernels: every formula here is written from the contract.
+// (set_rows.hpp) is shared with the kernels: every formula here is written from the contract.
 
 namespace gsnav::eval::detail {
 

@@ -6,8 +6,8 @@
 
 #include "gsnav/core/view.hpp"
 #include "gsnav/detail/frame/cull.hpp"
-#include "gsnav/detail/frame/packed_gaussians.hpp"
 #include "gsnav/detail/frame/project_row.hpp"
+#include "gsnav/detail/frame/set_rows.hpp"
 #include "gsnav/detail/frame/splat.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/math/half.hpp"

@@ -3,9 +3,9 @@
 
 #include <cstdint>
 
-#include "gsnav/detail/frame/packed_gaussians.hpp"
 #include "gsnav/detail/frame/projection.hpp"
 #include "gsnav/detail/frame/projection_camera.hpp"
+#include "gsnav/detail/frame/set_rows.hpp"
 #include "gsnav/detail/frame/splat.hpp"
 #include "gsnav/math/functions.hpp"
 

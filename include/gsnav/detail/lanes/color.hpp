@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <cstring>
 
-#include "gsnav/detail/frame/packed_gaussians.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
+#include "gsnav/detail/frame/set_rows.hpp"
 #include "gsnav/detail/lanes/isa.hpp"
 
 namespace gsnav::lanes {

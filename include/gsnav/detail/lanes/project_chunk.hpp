@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "gsnav/detail/frame/packed_gaussians.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
+#include "gsnav/detail/frame/set_rows.hpp"
 #include "gsnav/detail/lanes/isa.hpp"
 #include "gsnav/detail/lanes/write_splats.hpp"
 

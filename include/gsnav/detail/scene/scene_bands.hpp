@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "gsnav/detail/core/pool_backend.hpp"
-#include "gsnav/detail/frame/packed_gaussians.hpp"
+#include "gsnav/detail/frame/set_rows.hpp"
 #include "gsnav/detail/math/half.hpp"
 #include "gsnav/detail/scene/needed_bands.hpp"
 #include "gsnav/frame/gaussians.hpp"

@@ -10,8 +10,9 @@
 #include "gsnav/math/mat.hpp"
 #include "gsnav/math/quat.hpp"
 
-// Packed rows (scene/packed_cloud.hpp), read as the floats that they stand for: over lanes and one at a
-// time the same bits, as every operation is rounded once.
+// The rows of a set in any of its encodings, read as floats (SetRows). Packed rows
+// (scene/packed_cloud.hpp) have the same bits over lanes and one at a time, as every operation is
+// rounded once.
 
 namespace gsnav {
 
