@@ -4,10 +4,15 @@
 
 #include <cmath>
 #include <string>
+#include <vector>
 
+#include "gsnav/backends/serial.hpp"
 #include "gsnav/core/rng.hpp"
 #include "gsnav/detail/io/ply.hpp"
+#include "gsnav/detail/scene/views_around.hpp"
 #include "gsnav/io/image_file.hpp"
+#include "gsnav/io/scene_file.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "support/command.hpp"
 #include "support/files.hpp"
 
@@ -69,6 +74,48 @@ TEST_CASE("render tool: without cameras, views around the scene with its own gro
     }
     CHECK(left == doctest::Approx(right).epsilon(0.2));
   }
+}
+
+TEST_CASE("render tool: any device draws the same bits, and serial64 those of the float64 reference") {
+  const TempFolder folder("render_device");
+  REQUIRE(io::save_ply(folder / "a.ply", field_z_up()).ok());
+  write_file(folder / "m.obj", "v -1 -1 1\nv 1 -1 1\nv 0 1 2\nf 1 2 3\n");
+  const auto draw = [&](const std::string& device, const std::string& more) {
+    const Outcome out = run(folder, "--scene a.ply --out " + device +
+                                        " --orbit 2 --width 48 --height 32 --npy --ledger --device " +
+                                        device + " " + more);
+    CAPTURE(out.text);
+    REQUIRE(out.ok);
+    CHECK(out.says("camera 1:\nskipped: "));
+    return read_file(folder / (device + "/0001.rgb.npy")) +
+           read_file(folder / (device + "/0001.depth.npy"));
+  };
+  std::string plain;
+  for (const char* more : {"", "--storage packed --profile fast", "--profile lod --lod-error 8",
+                           "--mesh m.obj", "--mesh m.obj --composite hard_depth"}) {
+    CAPTURE(more);
+    const std::string serial = draw("serial", more);
+    CHECK(serial == draw("cpu:2", more));
+    CHECK(serial != draw("serial64", more));
+    CHECK(serial != plain);
+    if (plain.empty()) plain = serial;
+  }
+  // As the library draws what it reads.
+  static_cast<void>(draw("serial64", ""));
+  const auto read = io::load_scene(folder / "a.ply").value();
+  std::vector<Camera> cameras = views_around(read.cloud, read.report.up, 2, 48, 32);
+  cameras[1].near_plane = 0.2;
+  SerialBackend backend;
+  const auto want =
+      BasicRenderer<double, SerialBackend>(backend).render(read.cloud.set(), cameras[1]).value();
+  const std::vector<float> rgb(want.rgb.begin(), want.rgb.end());
+  REQUIRE(io::save_npy(folder / "want.npy", rgb, std::vector<std::size_t>{32, 48, 3}).ok());
+  CHECK(read_file(folder / "serial64/0001.rgb.npy") == read_file(folder / "want.npy"));
+
+  const Outcome none = run(folder, "--scene absent.ply --out o --device gpu");
+  CHECK_FALSE(none.ok);
+  CHECK(none.says("--device: device \"gpu\": must be best, cpu"));
+  CHECK(none.says("there are: serial"));
 }
 
 TEST_CASE("render tool: a folder that cannot be is said before the scene is read") {

@@ -8,18 +8,13 @@
 #include <cstdio>
 #include <filesystem>
 #include <iterator>
-#include <optional>
+#include <memory>
 #include <span>
 #include <string>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
-#include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
-#if defined(GSNAV_HAS_CUDA)
-#include "gsnav/backends/cuda.hpp"
-#endif
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/scene/basic_renderer.hpp"
@@ -48,25 +43,6 @@ std::vector<std::uint8_t> depth_picture(const std::vector<float>& metres, const 
     if (!(far > near)) far = near + 1.0f;
   }
   return io::colorize_depth(metres, near, far);
-}
-
-template <class B>
-std::vector<MeshInstance> place_meshes(B& backend, const std::vector<PlacedMeshes>& meshes,
-                                       std::vector<MeshArrays<B>>& mesh_arrays) {
-  std::vector<MeshInstance> instances;
-  std::size_t parts = 0;
-  for (const PlacedMeshes& file : meshes) parts += file.meshes.size();
-  mesh_arrays.reserve(parts);
-  for (const PlacedMeshes& file : meshes) {
-    const std::size_t first = mesh_arrays.size();
-    for (std::size_t i = 0; i < file.meshes.size(); ++i)
-      mesh_arrays.emplace_back(backend, file.meshes.view(i));
-    for (const TexturedScene::Instance& i : file.instances) {
-      const auto id = static_cast<std::uint32_t>(instances.size());
-      instances.push_back(mesh_arrays[first + i.part].instance(i.world_from_part, id));
-    }
-  }
-  return instances;
 }
 
 /// The files of one camera.
@@ -100,67 +76,62 @@ Status write_images(const Frames<S>& f, const Camera& camera, std::size_t index,
   return s;
 }
 
-RenderConfig config_of(const Options& o, const Scene& scene) {
-  RenderConfig config;
+RenderOptions how_to_draw(const Options& o, const SceneAsset& asset) {
+  RenderOptions how;
+  RenderConfig& config = how.render;
   config.outputs = kRgb | kAlpha | o.depth_choice.output;
   config.quality = o.profile == "exact" ? Quality::exact() : Quality::fast();
-  if (scene.tree) config = lod_config(config);
   config.quality.max_alpha = o.max_alpha;
   config.first_hit_tau = o.depth_choice.tau;
-  config.sort_order = scene.report.sort_order;
   config.composite = o.composite == "merged" ? Composite::merged : Composite::hard_depth;
-  return config;
+  if (asset.lod != nullptr) how.detail.lod.emplace().pixels = o.lod_pixels;
+  how.detail.visible_sets = asset.visible != nullptr;
+  return how;
 }
 
-/// The cloud as frames choose from it; `whole` is where the backend has it, as it will have the rest.
-template <class B>
-SceneDetail::Asset asset_of(B& backend, const GaussianCloud& cloud, const Scene& scene,
-                            const GaussianSet& whole, std::optional<GaussianArrays<B>>& merged,
-                            Buffer<std::uint32_t, B>& visible) {
-  SceneDetail::Asset asset{scene.tree ? &*scene.tree : nullptr, &cloud, {}};
-  asset.visible = scene.visible ? &*scene.visible : nullptr;
-  if constexpr (!is_host_backend<B>) {
-    if (scene.visible) {
-      visible.upload(scene.visible->bits.data(), scene.visible->bits.size());
-      asset.visible_there = visible.data();
-    }
-    if (scene.tree) {
-      asset.cloud_there = whole.gaussians;
-      asset.merged_there = merged.emplace(backend, scene.tree->merged).set().gaussians;
-    }
+/// What a camera is shown of the scene, in host memory: for the ledger and the float64 reference.
+class HostView {
+ public:
+  HostView(std::shared_ptr<const SimulatorScene> scene, const RenderOptions& how)
+      : scene_(backend_, std::move(scene), how.detail),
+        config_(scene_.render_config(how.render)),
+        reference_(backend_) {}
+
+  void look(const Camera& camera) {
+    const bool whole = scene_.detail() == nullptr;
+    sets_ = whole ? scene_.assets() : details_.select(*scene_.detail(), scene_.assets(), camera);
+    rules_ = whole ? config_ : details_.rules(config_);
   }
-  return asset;
-}
+  /// What the last camera was shown in a frame with these counts.
+  FrameLedger ledger(const Camera& camera, const RenderStats& stats, const LoadReport& report) const {
+    const SceneAsset& asset = scene_.scene().assets[0];
+    const LodCut* const cut = asset.lod != nullptr ? &details_.cut(0) : nullptr;
+    FrameLedger l = frame_ledger(sets_, camera, rules_, stats, &report, asset.profile.get(), cut);
+    l.unseen = details_.unseen();
+    if (asset.visible != nullptr) l.unseen_weight = asset.visible->min_weight;
+    return l;
+  }
+  /// Draws by the float64 reference.
+  Status render(const Camera& camera, const MeshLight& light, Frames<double>& out) {
+    look(camera);
+    reference_.set_config(rules_);
+    reference_.set_meshes(scene_.meshes().instances, light);
+    return reference_.render(sets_, std::span(&camera, 1), out);
+  }
 
-/// `Cloud`: GaussianCloud or PackedCloud.
-template <class S, class B, class Cloud>
-int run(B& backend, const Options& o, const Cloud& cloud, const Scene& scene) {
+ private:
+  SerialBackend backend_;
+  SceneOnBackend<SerialBackend> scene_;
+  RenderConfig config_, rules_;
+  DetailSets details_;
+  std::span<const GaussianSet> sets_;
+  BasicRenderer<double, SerialBackend> reference_;
+};
+
+/// `draw`: a Status of a camera, the meshes' light and the frames to write.
+template <class S, class Draw>
+int run(const Options& o, const Scene& scene, HostView& host, const Draw& draw) {
   const std::vector<Camera>& cameras = scene.cameras;
-  const LodTree* const tree = scene.tree ? &*scene.tree : nullptr;
-  const VisibleSets* const visible_sets = scene.visible ? &*scene.visible : nullptr;
-  const RenderConfig config = config_of(o, scene);
-  BasicRenderer<S, B> renderer(backend, config);
-  const bool profiled = is_host_backend<B> || tree == nullptr;
-  const GaussianArrays<B> arrays =
-      profiled ? GaussianArrays<B>(backend, cloud, scene.profile) : GaussianArrays<B>(backend, cloud);
-  const std::vector<GaussianSet> whole{arrays.set()};
-  const GaussianSet whole_here = cloud.set();  // in host memory, as cuts are
-  std::span<const GaussianSet> sets = whole,
-                               here = is_host_backend<B> ? sets : std::span(&whole_here, 1);
-  SceneDetail detail;
-  detail.choice.pixels = o.lod_pixels;
-  std::optional<GaussianArrays<B>> merged;
-  Buffer<std::uint32_t, B> visible(backend);
-  if constexpr (std::is_same_v<Cloud, GaussianCloud>) {
-    if (tree != nullptr || visible_sets != nullptr) {
-      detail.assets.push_back(asset_of(backend, cloud, scene, whole[0], merged, visible));
-    }
-  }
-  GaussianSet seen_here = whole_here;
-  DetailSets details;
-  ChosenChunks<B> chosen(backend);
-  std::vector<MeshArrays<B>> mesh_arrays;
-  const std::vector<MeshInstance> instances = place_meshes(backend, scene.meshes, mesh_arrays);
   MeshLight headlight;
   headlight.unlit = false;
   Frames<S> f;
@@ -169,35 +140,16 @@ int run(B& backend, const Options& o, const Cloud& cloud, const Scene& scene) {
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     const auto start = std::chrono::steady_clock::now();
     headlight.direction = -cameras[c].viewmat.linear.row[2];
-    renderer.set_meshes(instances, headlight);
-    const LodCut* cut = nullptr;
-    if (!detail.assets.empty()) {
-      sets = details.select(detail, whole, cameras[c]);
-      chosen.place(std::span(&details, 1));
-      if (tree != nullptr) {
-        cut = &details.cut(0);
-        here = cut->sets();
-      } else if (is_host_backend<B>) {
-        here = sets;
-      } else if (const auto cell = visible_sets->cell_of(cameras[c])) {
-        seen_here = whole_here;
-        seen_here.selection.seen = visible_sets->seen_from(*cell);
-        here = std::span(&seen_here, 1);
-      }
-      renderer.set_config(details.rules(config));
-    }
-    if (const Status s = renderer.render(sets, std::span(&cameras[c], 1), f); !s) {
+    if (const Status s = draw(cameras[c], headlight, f); !s) {
       std::fprintf(stderr, "gsnav-render: camera %zu: %s\n", c, s.message().c_str());
       return 1;
     }
     const auto end = std::chrono::steady_clock::now();
     total_ms += std::chrono::duration<double, std::milli>(end - start).count();
     if (o.ledger) {
-      FrameLedger l = frame_ledger(here, cameras[c], renderer.config(), f.stats[0], &scene.report,
-                                   &scene.profile, cut);
-      l.unseen = details.unseen();
-      if (visible_sets != nullptr) l.unseen_weight = visible_sets->min_weight;
-      std::printf("camera %zu:\n%s", c, ledger_text(l).c_str());
+      host.look(cameras[c]);
+      const FrameLedger ledger = host.ledger(cameras[c], f.stats[0], scene.report);
+      std::printf("camera %zu:\n%s", c, ledger_text(ledger).c_str());
     }
     if (const Status s = write_images(f, cameras[c], c, o); !s.ok()) return fail(s.message());
     if (terminal || c + 1 == cameras.size()) {
@@ -216,21 +168,19 @@ int main(int argc, char** argv) {
   Options o;
   if (const auto status = gsnav_render::parse_options(argc, argv, o)) return *status;
   if (Status s = make_output_folder(o.out); !s) return fail("--out " + s.message());
-  OpenMPBackend openmp(o.threads);
-  const auto scene = gsnav_render::load_scene(openmp, o);
+  const auto scene = gsnav_render::load_scene(o);
   if (!scene) return fail(scene.message());
-  const auto on = [&]<class S>(auto& backend) {
-    return scene->packed ? run<S>(backend, o, *scene->packed, *scene)
-                         : run<S>(backend, o, scene->full, *scene);
-  };
-  SerialBackend serial;
-  if (o.backend == "serial") return on.operator()<float>(serial);
-  if (o.backend == "serial64") return on.operator()<double>(serial);
-#if defined(GSNAV_HAS_CUDA)
-  if (o.backend == "cuda") {
-    CudaBackend cuda;
-    return on.operator()<float>(cuda);
+  const RenderOptions how = how_to_draw(o, scene->drawn->assets[0]);
+  HostView host(scene->drawn, how);
+  if (o.float64) {
+    return run<double>(o, *scene, host, [&](const Camera& camera, const MeshLight& light, auto& frames) {
+      return host.render(camera, light, frames);
+    });
   }
-#endif
-  return on.operator()<float>(openmp);
+  auto renderer = Renderer::create(o.device, scene->drawn, how);
+  if (!renderer) return fail(renderer.message());
+  return run<float>(o, *scene, host, [&](const Camera& camera, const MeshLight& light, auto& frames) {
+    if (Status s = renderer->set_light(light); !s) return s;
+    return renderer->render(std::span(&camera, 1), frames);
+  });
 }

@@ -5,10 +5,8 @@
 #include <cstdio>
 #include <exception>
 
+#include "../common/device_option.hpp"
 #include "../common/parse_options.hpp"
-#if defined(GSNAV_HAS_CUDA)
-#include "gsnav/backends/cuda.hpp"
-#endif
 #include "gsnav/core/printable.hpp"
 
 namespace gsnav_render {
@@ -57,10 +55,7 @@ void add_scene_options(CLI::App& app, Options& o) {
 }
 
 void add_drawing_options(CLI::App& app, Options& o) {
-  app.add_option("--backend", o.backend,
-                 "serial (float32), serial64 (the float64 reference), openmp, cuda")
-      ->check(CLI::IsMember({"serial", "serial64", "openmp", "cuda"}))
-      ->capture_default_str();
+  gsnav_tools::add_device_option(app, o.device, &o.float64);
   app.add_option("--profile", o.profile,
                  "exact, fast (docs/accuracy.md), or lod: a level of detail for each part of the scene "
                  "(docs/lod.md)")
@@ -94,8 +89,6 @@ void add_drawing_options(CLI::App& app, Options& o) {
   app.add_option("--composite", o.composite, "merged, or hard_depth: Habitat-GS's rule, to compare with")
       ->check(CLI::IsMember({"merged", "hard_depth"}))
       ->capture_default_str();
-  app.add_option("--threads", o.threads, "Threads of the openmp backend; 0: OMP_NUM_THREADS")
-      ->check(CLI::Range(0, 1024));
   app.add_option("--depth-near", o.depth_near, "Depth picture: nearest metre of the colour scale");
   app.add_option("--depth-far", o.depth_far,
                  "Depth picture: farthest; 0: the image's own range (2nd to 98th percentile)");
@@ -109,14 +102,6 @@ std::string refused(const Options& o) {
     return "--depth " + o.depth + ": use median, expected, accumulated, first or first:TAU, 0 < TAU < 1";
   }
   if ((o.width > 0) != (o.height > 0)) return "--width and --height go together";
-#if defined(GSNAV_HAS_CUDA)
-  if (o.backend == "cuda" && CudaBackend::device_count() == 0) {
-    return "--backend cuda: no GPU, or no driver for it; use openmp";
-  }
-#else
-  if (o.backend == "cuda") return "--backend cuda: this build has no CUDA backend; use openmp";
-#endif
-
   return "";
 }
 

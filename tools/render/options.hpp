@@ -19,12 +19,13 @@ struct DepthChoice {
 };
 
 struct Options {
-  std::string scene, cameras, out, backend = "openmp", profile = "exact", depth = "median",
-                                   composite = "merged", storage = "full", lod_levels = "shipped",
-                                   visible_sets;
+  std::string scene, cameras, out, profile = "exact", depth = "median", composite = "merged",
+                                   storage = "full", lod_levels = "shipped", visible_sets;
+  Device device;
+  bool float64 = false;  ///< by the float64 reference, whatever the device is
   DepthChoice depth_choice;
   std::vector<std::string> meshes;
-  int width = 0, height = 0, threads = 0, orbit = 4;
+  int width = 0, height = 0, orbit = 4;
   double time = 0, near_plane = 0.2, max_alpha = 0.99, depth_near = 0, depth_far = 0,
          lod_pixels = LodChoice{}.pixels;
   bool npy = false, png = false, ledger = false;
