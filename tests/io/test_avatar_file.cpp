@@ -5,6 +5,7 @@
 
 #include "avatar_npz.hpp"
 #include "gsnav/avatar.hpp"
+#include "gsnav/detail/demo/humanoid.hpp"
 #include "gsnav/detail/io/avatar_file.hpp"
 #include "support/files.hpp"
 

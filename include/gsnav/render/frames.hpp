@@ -37,12 +37,13 @@ struct Frames {
   std::vector<RenderStats> stats;    ///< [C]
 
   /// The images in the order of kImages (detail/frame/output.hpp).
-  static constexpr std::vector<S> Frames::*kVectors[] = {&Frames::rgb,
-                                                         &Frames::alpha,
-                                                         &Frames::median_depth,
-                                                         &Frames::expected_depth,
-                                                         &Frames::accumulated_depth,
-                                                         &Frames::first_hit_depth};
+  using VectorPointer = std::vector<S> Frames::*;
+  static constexpr VectorPointer kVectors[] = {&Frames::rgb,
+                                               &Frames::alpha,
+                                               &Frames::median_depth,
+                                               &Frames::expected_depth,
+                                               &Frames::accumulated_depth,
+                                               &Frames::first_hit_depth};
 };
 
 }  // namespace gsnav

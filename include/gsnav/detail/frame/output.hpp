@@ -39,6 +39,9 @@ struct FrameImages {
   bool operator==(const FrameImages&) const = default;
 };
 
+template <class S>
+using ImagePointer = S* FrameImages<S>::*;
+
 /// One image: values a pixel, the mode that a blend loop needs for it, and whether it is a sum over all
 /// Gaussians of a pixel, so that the pixel is not done before the last of them.
 template <class S>
@@ -47,7 +50,7 @@ struct ImageKind {
   std::size_t channels;
   DepthMode mode;
   bool sums;
-  S* FrameImages<S>::*image;
+  ImagePointer<S> image;
 };
 template <class S>
 inline constexpr ImageKind<S> kImages[] = {
