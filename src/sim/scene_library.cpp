@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "gsnav/detail/core/guarded.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 
 namespace gsnav {
