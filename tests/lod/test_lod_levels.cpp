@@ -53,12 +53,12 @@ TEST_CASE(
     const LodBox& box = set.tree.boxes[node];
     CHECK(box.finer == LodBox::kNone);
     CHECK(box.shown == box.rows);
-    std::uint32_t box = 99;
+    std::uint32_t number = 99;
     for (const std::size_t row : rows_of(box)) {
       const std::uint32_t id = set.cloud.row_ids[row];
       REQUIRE(id < levels[0].cloud.size());
-      if (box == 99) box = levels[0].boxes[id];
-      CHECK(levels[0].boxes[id] == box);
+      if (number == 99) number = levels[0].boxes[id];
+      CHECK(levels[0].boxes[id] == number);
       CHECK(set.cloud.mean(row) == levels[0].cloud.mean(id));
       CHECK(set.cloud.scales[1][row] == levels[0].cloud.scales[1][id]);
       CHECK(set.cloud.quats[2][row] == levels[0].cloud.quats[2][id]);
