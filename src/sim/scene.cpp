@@ -31,8 +31,8 @@ Status validate_assets(const SimulatorScene& scene) {
     if (a.cloud != nullptr && a.packed != nullptr)
       return bad("packed is there and cloud too: one is drawn");
     const std::size_t chunks = (a.packed != nullptr ? a.packed->view() : a.cloud->view()).chunk_count();
-    if (a.profile != nullptr && a.profile->chunk_sh_degrees.size() != chunks)
-      return bad("profile is of another cloud");
+    if (a.bands != nullptr && a.bands->chunk_sh_degrees.size() != chunks)
+      return bad("bands are of another cloud");
   }
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
     if (scene.meshes[i].surface == nullptr) {

@@ -162,7 +162,7 @@ TEST_CASE("renderer: a cloud alone, rules that change, errors that name what is 
   CHECK(has(Renderer::create(Device(), flat(), lod).message(), "lod is null"));
 }
 
-TEST_CASE("renderer: packed clouds, bands of a profile and a light on meshes, on every device") {
+TEST_CASE("renderer: packed clouds, bands that it needs and a light on meshes, on every device") {
   GaussianCloud cloud = random_cloud(12, {.count = 2500});
   sort_spatially(cloud);
   SceneBands bands;  // chunk c has the SH bands up to c % 4
@@ -170,7 +170,7 @@ TEST_CASE("renderer: packed clouds, bands of a profile and a light on meshes, on
     bands.chunk_sh_degrees.push_back(static_cast<std::uint8_t>(c % 4));
   SimulatorScene as_floats, as_packed;
   as_floats.assets.push_back({std::make_shared<const GaussianCloud>(cloud)});
-  as_floats.assets[0].profile = std::make_shared<const SceneBands>(bands);
+  as_floats.assets[0].bands = std::make_shared<const SceneBands>(bands);
   as_packed.assets.push_back({});
   as_packed.assets[0].packed = std::make_shared<const PackedCloud>(pack_cloud(cloud));
   SceneMesh mesh = turned_box(0.6);
@@ -218,8 +218,8 @@ TEST_CASE("renderer: assets that cannot be drawn so are named") {
   };
   CHECK(has(message({}), "assets[0].cloud is null"));
   SceneAsset asset{cloud};
-  asset.profile = std::make_shared<const SceneBands>();
-  CHECK(has(message(asset), "assets[0].profile is of another cloud"));
+  asset.bands = std::make_shared<const SceneBands>();
+  CHECK(has(message(asset), "assets[0].bands are of another cloud"));
   asset = {cloud};
   asset.packed = std::make_shared<const PackedCloud>(pack_cloud(*cloud));
   CHECK(has(message(asset), "assets[0].packed"));

@@ -106,7 +106,7 @@ class HostView {
   FrameLedger ledger(const Camera& camera, const RenderStats& stats, const LoadReport& report) const {
     const SceneAsset& asset = scene_.scene().assets[0];
     const LodCut* const cut = asset.lod != nullptr ? &details_.cut(0) : nullptr;
-    FrameLedger l = frame_ledger(sets_, camera, rules_, stats, &report, asset.profile.get(), cut);
+    FrameLedger l = frame_ledger(sets_, camera, rules_, stats, &report, asset.bands.get(), cut);
     l.unseen = details_.unseen();
     if (asset.visible != nullptr) l.unseen_weight = asset.visible->min_weight;
     return l;

@@ -27,7 +27,7 @@ struct Parts {
   std::optional<LodTree> tree;         ///< where the profile is lod
   std::optional<VisibleSets> visible;  ///< where some are given
   LoadReport report;
-  SceneBands profile;
+  SceneBands bands;
   std::vector<PlacedMeshes> meshes;
   std::vector<Camera> cameras;
 };
@@ -137,30 +137,29 @@ Status read_visible_sets(const Options& o, Parts& parts) {
   return {};
 }
 
-void profile_clouds(const Options& o, Parts& parts) {
+void fit_bands(const Options& o, Parts& parts) {
   // What cannot be seen is not held and not read; in exact, what is zero.
   const auto fit = [unseen = o.profile == "exact" ? 0 : kUnseenColor](auto& cloud) {
     SceneBands made = scene_bands(cloud, unseen);
     drop_bands(cloud, made);
     return made;
   };
-  SceneBands& profile = parts.profile;
-  profile = parts.packed ? fit(*parts.packed) : fit(parts.full);
+  SceneBands& bands = parts.bands;
+  bands = parts.packed ? fit(*parts.packed) : fit(parts.full);
   if (parts.tree) {
     const SceneBands merged = fit(parts.tree->merged);
-    profile.bytes_let_go += merged.bytes_let_go;
-    profile.color_error = std::max(profile.color_error, merged.color_error);
+    bands.bytes_let_go += merged.bytes_let_go;
+    bands.color_error = std::max(bands.color_error, merged.color_error);
   }
-  if (profile.sh_numbers != 0) {
+  if (bands.sh_numbers != 0) {
     std::array<std::size_t, kMaxShDegree + 1> chunks{};
-    for (const std::uint8_t degree : profile.chunk_sh_degrees) ++chunks[degree];
+    for (const std::uint8_t degree : bands.chunk_sh_degrees) ++chunks[degree];
     std::printf(
         "SH: %zu, %zu, %zu, %zu chunks need degree 0 to 3; %llu bytes let go that none needs, %llu held "
         "that only others "
         "need\n",
-        chunks[0], chunks[1], chunks[2], chunks[3],
-        static_cast<unsigned long long>(profile.bytes_let_go),
-        static_cast<unsigned long long>(profile.bytes_unneeded));
+        chunks[0], chunks[1], chunks[2], chunks[3], static_cast<unsigned long long>(bands.bytes_let_go),
+        static_cast<unsigned long long>(bands.bytes_unneeded));
   }
 }
 
@@ -172,7 +171,7 @@ Scene assemble(Parts parts) {
   if (!parts.packed) asset.cloud = shared(parts.full);
   if (parts.tree) asset.lod = shared(*parts.tree);
   if (parts.visible) asset.visible = shared(*parts.visible);
-  asset.profile = shared(parts.profile);
+  asset.bands = shared(parts.bands);
   SimulatorScene drawn;
   drawn.assets.push_back(std::move(asset));
   for (PlacedMeshes& surface : parts.meshes) drawn.meshes.push_back({shared(surface)});
@@ -189,7 +188,7 @@ Result<Scene> load_scene(const Options& o) {
   if (s.ok()) s = build_levels(o, parts);
   if (s.ok()) s = read_visible_sets(o, parts);
   if (!s.ok()) return s;
-  profile_clouds(o, parts);
+  fit_bands(o, parts);
   return assemble(std::move(parts));
 }
 

@@ -33,7 +33,7 @@ struct SceneAsset {
   std::shared_ptr<const PackedCloud> packed{};
   /// SH bands that its chunks need (scene_bands), the others are not read; null: all are. Levels of
   /// detail read all.
-  std::shared_ptr<const SceneBands> profile{};
+  std::shared_ptr<const SceneBands> bands{};
 
   SortOrder sort_order() const noexcept;
 };

@@ -29,7 +29,7 @@ class SceneOnBackend {
       : backend_(&backend), scene_(std::move(scene)) {
     if (choice.lod) detail_.choice = *choice.lod;
     for (const SceneAsset& a : scene_->assets) {
-      arrays_.push_back(arrays_of(a, choice.lod ? nullptr : a.profile.get()));
+      arrays_.push_back(arrays_of(a, choice.lod ? nullptr : a.bands.get()));
       sets_.push_back(arrays_.back().set(a.world_from_asset));
       if (!choice.lod && !choice.visible_sets) continue;
       detail_.assets.push_back({choice.lod ? a.lod.get() : nullptr, a.cloud.get(), a.world_from_asset});
@@ -118,10 +118,10 @@ class SceneOnBackend {
     return *slots_[slot];
   }
 
-  GaussianArrays<B> arrays_of(const SceneAsset& asset, const SceneBands* profile) const {
+  GaussianArrays<B> arrays_of(const SceneAsset& asset, const SceneBands* bands) const {
     const auto of = [&](const auto& cloud) {
-      return profile != nullptr ? GaussianArrays<B>(*backend_, cloud, *profile)
-                                : GaussianArrays<B>(*backend_, cloud);
+      return bands != nullptr ? GaussianArrays<B>(*backend_, cloud, *bands)
+                              : GaussianArrays<B>(*backend_, cloud);
     };
     return asset.packed != nullptr ? of(*asset.packed) : of(*asset.cloud);
   }
