@@ -44,7 +44,7 @@ struct Warp {
 /// Number of the lowest set bit.
 unsigned first_of(unsigned bits) { return static_cast<unsigned>(__builtin_ctz(bits)); }
 
-/// What every thread of a grid runs.
+/// The function that every thread of a grid runs, and its name.
 struct Kernel {
   const char* name = "";
   void (*thread)(const void* arguments) = nullptr;
@@ -113,7 +113,8 @@ void Block::fail(const std::string& why) const {
   std::abort();
 }
 
-/// What a thread's fiber runs: the thread of that number of one block after the other.
+/// The main function of a fiber. A fiber has one thread number, and runs that thread of each block in
+/// turn.
 void Block::main() {
   Block& b = block();
   Fiber::began();

@@ -70,7 +70,7 @@ bool Fiber::start(void (*main)()) {
   const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
   void* const memory = mmap(nullptr, kStackBytes + page, PROT_READ | PROT_WRITE,
                             MAP_PRIVATE | MAP_ANONYMOUS | MAP_STACK, -1, 0);
-  // An overflow runs into the lowest page, which nobody may touch.
+  // The lowest page is not accessible, so that a stack overflow faults.
   if (memory == MAP_FAILED || mprotect(memory, page, PROT_NONE) != 0) return false;
   char* const stack = static_cast<char*>(memory) + page;
   stack_ = stack;

@@ -9,14 +9,14 @@ namespace gsnav::emulated {
 class Fiber {
  public:
   Fiber() = default;
-  /// What the calling thread runs, on the stack that it has.
+  /// The fiber of the calling thread: it uses the stack that the thread has.
   static Fiber of_this_thread();
 
   /// Makes the stack on which main() begins at the first change to this fiber; nothing where it has one.
   /// False: no memory.
   bool start(void (*main)());
 
-  /// What a main() calls first.
+  /// Each main() must call this first.
   static void began();
 
   /// Leaves `from`, which runs, and goes on with `to`. Returns when something changes back to `from`.

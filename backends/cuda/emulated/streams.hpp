@@ -8,7 +8,7 @@
 
 #include "cuda_runtime.h"
 
-/// A queue of work. Whoever waits for the stream does the work.
+/// A queue of work. The thread that waits for a stream does its work.
 struct CUstream_st {
   std::recursive_mutex mutex;
   std::deque<gsnav::emulated::Work> queue;

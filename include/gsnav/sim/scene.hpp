@@ -35,6 +35,7 @@ struct SceneAsset {
   /// detail read all.
   std::shared_ptr<const SceneBands> bands{};
 
+  /// Of the cloud that is set; one of `cloud` and `packed` must be.
   SortOrder sort_order() const noexcept;
 };
 

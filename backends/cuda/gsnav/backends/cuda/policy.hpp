@@ -4,16 +4,18 @@
 #include <cstddef>
 #include <cstdint>
 
-/// What may be tuned for a GPU: a struct for each stage of a frame. Values change time and memory, and
-/// no bit of any image. bench/cuda/NOTES.md says what was tried. A multiprocessor's blocks are how many
-/// a launch of a fixed size has for each, or how many registers must leave room for (`kResident`).
+/// The numbers that tune gsnav for a GPU, a struct for each stage of a frame. They change time and
+/// memory, but no bit of an image. bench/cuda/NOTES.md has the values that were tried. `kBlocks` is the
+/// number of blocks that a launch has per multiprocessor. `kResident` is the number that must fit on a
+/// multiprocessor at once, which limits the registers of a thread.
 namespace gsnav::cuda::policy {
 
 /// Sizes of tiles, and which of the two ways a batch is drawn by.
 struct Batch {
   static constexpr int kTile = 16, kSmallTile = 8;  ///< pixels a side; small where cameras are few
-  /// Images of at most so many tiles of 16 pixels, and at most so many tiles of all cameras for each
-  /// multiprocessor, make a call of few cameras; with many Gaussians a camera, twice as many tiles.
+  /// A call has "few cameras" where an image has at most kFewTiles tiles of 16 pixels, and all images
+  /// together at most kFewTilesEach per multiprocessor. Twice as many are allowed where a camera sees
+  /// kManyGaussians or more.
   static constexpr std::uint64_t kFewTiles = 512, kFewTilesEach = 16, kManyGaussians = 2'500'000;
   /// In images of more tiles for each multiprocessor lists are short for the most part.
   static constexpr std::uint64_t kShortListTiles = 16;
@@ -27,9 +29,9 @@ struct Capacity {
   static constexpr std::uint32_t kSlotsPerHard = 32, kSlotsPerLarge = 32, kSlotsPerSeveral = 16,
                                  kSlotsPerSeveralOfFew = 4, kSlotsPerBeyond = 16, kPairsPerSlot = 2;
   static constexpr std::uint64_t kRoomStep = 32;  ///< a list's room is a multiple of so many pairs
-  /// Lists get more room where more than one of so many pairs was beyond it.
+  /// Lists get more room after a call in which more than one pair in kPairsPerBeyond did not fit.
   static constexpr std::uint32_t kPairsPerBeyond = 16;
-  /// Depth records are written where so many halves of a pixel or more are there for each slot.
+  /// Depth records are written where there are at least kHalfPixelsPerDepth / 2 pixels per slot.
   static constexpr std::size_t kHalfPixelsPerDepth = 5;
 };
 
