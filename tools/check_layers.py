@@ -13,13 +13,13 @@ import tempfile
 
 RANK = {"base": 0, "math": 1, "core": 2, "image": 3, "frame": 4, "skin": 4, "sweep": 4, "mesh": 5, "lanes": 6,
         "render": 6, "scene": 7, "avatar": 7, "nav": 7, "rigging": 8, "io": 8, "interop": 8, "sim": 8,
-        "eval": 8, "demo": 9, "device": 9}
+        "eval": 8, "demo": 9, "device": 9, "open": 10}
 # avatar may include these
 DATA_ONLY = {"scene/gaussian_cloud.hpp", "scene/load_report.hpp", "scene/surface_material.hpp"}
 # Not standard, but there wherever the code that includes them is compiled.
 PLATFORM_HEADERS = {"immintrin.h", "arm_neon.h", "fcntl.h", "sys/mman.h", "sys/stat.h", "unistd.h"}
 # headers that include what users need
-MODULES = {"render", "avatar", "rigging", "nav", "sim", "io", "eval", "demo", "gsnav"}
+MODULES = {"render", "avatar", "rigging", "nav", "sim", "io", "eval", "demo", "open", "gsnav"}
 MOST_PUBLIC = 70
 SOURCES = {".hpp", ".cpp", ".h", ".inl", ".cu", ".cuh"}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)

@@ -9,6 +9,7 @@
 #include "gsnav/detail/nav/local_planner.hpp"
 #include "gsnav/detail/nav/navmesh_file.hpp"
 #include "gsnav/detail/nav/navmesh_levels.hpp"
+#include "gsnav/detail/nav/navmesh_settings.hpp"
 #include "gsnav/detail/nav/obstacles.hpp"
 #include "gsnav/detail/nav/path_clearance.hpp"
 #include "gsnav/detail/nav/step.hpp"
@@ -16,4 +17,3 @@
 #include "gsnav/detail/nav/time_planner.hpp"
 #include "gsnav/detail/nav/viewpoints.hpp"
 #include "gsnav/nav/navmesh.hpp"
-#include "gsnav/nav/navmesh_settings.hpp"

@@ -5,11 +5,15 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <cstring>
+#include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "cloud_fill.hpp"
 #include "described.hpp"
+#include "file.hpp"
 #include "gltf_nodes.hpp"
 #include "gsnav/detail/io/spz.hpp"
 #include "gsnav/detail/scene/edit_cloud.hpp"
@@ -237,6 +241,23 @@ class SplatReader {
 };
 
 }  // namespace
+
+bool gltf_holds_gaussians(const std::filesystem::path& path) {
+  detail::RandomFile file;
+  if (!file.open(path)) return false;
+  std::array<char, 20> front{};  // of a GLB: its header and that of its first chunk, the JSON
+  std::uint64_t from = 0, size = file.size();
+  if (size >= front.size() && file.read(0, std::as_writable_bytes(std::span(front))) &&
+      std::memcmp(front.data(), "glTF", 4) == 0) {
+    std::uint32_t length = 0;
+    std::memcpy(&length, front.data() + 12, sizeof length);
+    from = front.size();
+    size = std::min<std::uint64_t>(length, size - from);
+  }
+  std::string json(size, '\0');
+  return file.read(from, std::as_writable_bytes(std::span(json))) &&
+         json.find(kExtension) != std::string::npos;
+}
 
 Result<LoadedCloud> load_gltf(const std::filesystem::path& path, const LoadGltfOptions& options) {
   return detail::guarded(path.string(), [&]() -> Result<LoadedCloud> {

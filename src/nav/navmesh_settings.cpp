@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gsnav/nav/navmesh_settings.hpp"
+#include "gsnav/detail/nav/navmesh_settings.hpp"
 
 #include <string>
 

@@ -12,10 +12,10 @@
 #include "gsnav/core/rng.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/detail/core/small_vector.hpp"
+#include "gsnav/detail/nav/navmesh_settings.hpp"
 #include "gsnav/math/aabb.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/math/vec.hpp"
-#include "gsnav/nav/navmesh_settings.hpp"
 
 namespace gsnav {
 

@@ -21,6 +21,7 @@
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/detail/scene/temporal_edit.hpp"
 #include "gsnav/detail/scene/temporal_gaussians.hpp"
+#include "gsnav/detail/scene/up_axis.hpp"
 #include "gsnav/detail/scene/views_around.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/scene/visible_sets.hpp"

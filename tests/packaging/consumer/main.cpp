@@ -21,7 +21,7 @@
 #include <gsnav/io/image_file.hpp>
 #endif
 #if defined(WITH_NAV)
-#include <gsnav/nav/navmesh_settings.hpp>
+#include <gsnav/detail/nav/navmesh_settings.hpp>
 #endif
 #if defined(WITH_SIM)
 #include <gsnav/detail/sim/task.hpp>

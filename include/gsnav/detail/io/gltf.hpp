@@ -39,6 +39,9 @@ struct LoadGltfOptions {
 /// out_of_memory. Never throws.
 Result<LoadedCloud> load_gltf(const std::filesystem::path& path, const LoadGltfOptions& options = {});
 
+/// Whether a glTF file has Gaussians: its JSON names the extension. False where it cannot be read.
+bool gltf_holds_gaussians(const std::filesystem::path& path);
+
 /// The same for a file's bytes, all of whose buffers are inside; `source` names them in messages.
 Result<LoadedCloud> parse_gltf(std::span<const std::byte> bytes, std::string source,
                                const LoadGltfOptions& options = {});

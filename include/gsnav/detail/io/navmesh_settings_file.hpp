@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/nav/navmesh_settings.hpp"
+#include "gsnav/detail/nav/navmesh_settings.hpp"
 
 namespace gsnav::io {
 

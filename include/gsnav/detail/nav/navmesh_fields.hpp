@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-#include "gsnav/nav/navmesh_settings.hpp"
+#include "gsnav/detail/nav/navmesh_settings.hpp"
 
 namespace gsnav::detail {
 

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <utility>
+
+#include "gsnav/core/lower_case.hpp"
+#include "gsnav/detail/demo/people.hpp"
+#include "gsnav/detail/io/visible_file.hpp"
+#include "gsnav/detail/nav/gaussian_navmesh.hpp"
+#include "gsnav/detail/nav/navmesh_file.hpp"
+#include "gsnav/detail/nav/viewpoints.hpp"
+#include "gsnav/device/renderer.hpp"
+#include "gsnav/scene/prepare.hpp"
+#include "parts.hpp"
+
+namespace gsnav::detail {
+namespace {
+
+/// Where a NavMesh comes from.
+struct NavMeshChoice {
+  std::string file;        ///< read it; else:
+  bool triangles = false;  ///< build it of triangles alone; else of Gaussians, and triangles
+};
+
+bool names_file(const std::string& navmesh) {
+  const std::string name = lower_case(navmesh);
+  return name.ends_with(".navmesh") || name.ends_with(".bin");
+}
+
+/// None: there is none, or none is wanted.
+Result<std::optional<NavMeshChoice>> choose(const OpeningScene& s) {
+  const std::string& asked = s.options.navmesh;
+  using Choice = std::optional<NavMeshChoice>;
+  if (asked == "none") return Choice();
+  if (names_file(asked)) return Choice({asked, false});
+  if ((asked.empty() || asked == "auto") && !s.source.navmesh.empty())
+    return Choice({s.source.navmesh, false});
+  if (asked.empty()) return Choice();
+  const bool gaussians = !s.scene.assets.empty(), triangles = !s.triangles.triangles.empty();
+  const auto bad = [&](const std::string& what) {
+    return Status(Errc::invalid_argument, "OpenOptions.navmesh = " + asked + ": " + what);
+  };
+  if (asked == "mesh") {
+    if (!triangles) return bad(s.source.name + " has no triangles; use gaussians or a file");
+    return Choice({"", true});
+  }
+  if (asked == "gaussians" || asked == "auto") {
+    if (asked == "gaussians" && !gaussians) return bad(s.source.name + " has no Gaussians; use mesh");
+    // A stage's own triangles are the whole of it; those of OpenOptions::meshes stand among Gaussians.
+    const bool whole = s.source.embedded || !s.source.stage_mesh.empty() || !s.source.collision_mesh.empty();
+    if (asked == "auto" && (whole || !gaussians)) return Choice({"", true});
+    if (s.scene.assets.front().packed != nullptr)
+      return bad("not of packed Gaussians; use storage full or compact, or a file");
+    return Choice({"", false});
+  }
+  return bad("use auto, none, mesh, gaussians, or a file that ends in .navmesh or .bin");
+}
+
+/// Builds a NavMesh for a body of this size; `what` is named in progress.
+Result<NavMesh> build(OpeningScene& s, const NavMeshChoice& choice, double radius, double height,
+                      const std::string& what) {
+  const OpenOptions& o = s.options;
+  NavMeshSettings settings = choice.triangles ? NavMeshSettings{} : gaussian_navmesh_settings();
+  settings.agent_radius = radius;
+  settings.agent_height = height;
+  settings.cell_size = o.cell_size;
+  if (choice.triangles) return NavMesh::build(settings, s.triangles.vertices, s.triangles.triangles);
+  settings.cell_height = std::max(settings.cell_height, o.cell_size);
+  GaussianNavOptions how;
+  how.crop = o.crop;
+  if (o.progress) {
+    how.progress = [&o, what](const char* stage, double share) { o.progress(what + ": " + stage, share); };
+  }
+  if (s.source.embedded) how.solid_alpha = 0.2;  // the flat's surfaces are as thin as paper
+  const SceneAsset& asset = s.scene.assets.front();
+  const GaussianSet set = asset.cloud->set(asset.world_from_asset);
+  const bool beside = !s.source.embedded;  // the flat's triangles are the same surfaces
+  auto built = build_navmesh(settings, std::span(&set, 1),
+                             beside ? std::span<const Vec3d>(s.triangles.vertices) : std::span<const Vec3d>(),
+                             beside ? std::span<const NavMesh::Triangle>(s.triangles.triangles)
+                                    : std::span<const NavMesh::Triangle>(),
+                             how);
+  if (!built) return {built.code(), s.source.name + ": " + built.message()};
+  return std::move(built->mesh);
+}
+
+/// The people that were asked for, or else those that belong to the scene.
+Status add_people(OpeningScene& s, const std::optional<NavMeshChoice>& choice) {
+  const OpenOptions& o = s.options;
+  if (o.people == 0) {
+    for (const std::string& w : s.source.avatars.warnings) s.warn(w);
+    if (s.source.avatars.avatars.empty()) return {};
+    auto actors = io::load_scene_actors(s.source.avatars);
+    if (!actors) return actors.status();
+    s.scene.avatars = std::move(*actors);
+    return {};
+  }
+  if (s.scene.navmesh == nullptr) {
+    return {Errc::invalid_argument, "OpenOptions.people = " + std::to_string(o.people) +
+                                        ": they walk on a NavMesh, and there is none; "
+                                        "OpenOptions.navmesh = auto builds it"};
+  }
+  // People are wider than the agent: they keep their shoulders clear of the furniture.
+  std::optional<NavMesh> wide;
+  if (choice->file.empty()) {
+    if (auto made = build(s, *choice, 0.3, 1.8, "NavMesh of people")) wide = std::move(*made);
+  }
+  auto people = walking_people(wide ? *wide : *s.scene.navmesh, o.people, o.seed, o.density);
+  if (!people) return people.status();
+  s.scene.avatars = std::move(*people);
+  return {};
+}
+
+}  // namespace
+
+Status open_navmesh(OpeningScene& s) {
+  const auto from = std::chrono::steady_clock::now();
+  const OpenOptions& o = s.options;
+  const auto choice = choose(s);
+  if (!choice) return choice.status();
+  if (*choice) {
+    const NavMeshChoice& c = **choice;
+    auto mesh = c.file.empty() ? build(s, c, o.agent_radius, o.agent_height, "NavMesh")
+                               : load_navmesh(c.file);
+    if (!mesh) return mesh.status();
+    s.out.navmesh_source = !c.file.empty() ? "from " + c.file
+                           : c.triangles   ? "from the mesh"
+                                           : "from the Gaussians";
+    char text[160];
+    std::snprintf(text, sizeof text, ": %zu polygons, %.1f m2, %zu islands", mesh->polygon_count(),
+                  mesh->navigable_area(), mesh->island_count());
+    s.note("NavMesh " + s.out.navmesh_source + text);
+    s.scene.navmesh = std::make_shared<const NavMesh>(std::move(*mesh));
+  }
+  s.out.navmesh_seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - from).count();
+  return add_people(s, *choice);
+}
+
+Status open_visible_sets(OpeningScene& s) {
+  const OpenOptions& o = s.options;
+  if (o.visible_sets.empty()) return {};
+  const auto bad = [&](const std::string& what) {
+    return Status(Errc::invalid_argument, "OpenOptions.visible_sets = " + o.visible_sets + ": " + what);
+  };
+  if (s.scene.assets.empty()) return bad(s.source.name + " has no Gaussians");
+  SceneAsset& asset = s.scene.assets.front();
+  if (asset.cloud == nullptr) return bad("not of packed Gaussians; use storage full or compact");
+  const auto take = [&](VisibleSets&& sets, const std::string& from) {
+    char text[200];
+    std::snprintf(text, sizeof text,
+                  "visible sets%s: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks, "
+                  "%.1f %% of the Gaussians",
+                  from.c_str(), sets.cells(), sets.viewpoints, 100 * sets.mean_share(),
+                  sets.cloud_chunks, 100 * sets.mean_row_share(asset.cloud->size()));
+    s.note(text);
+    asset.visible = std::make_shared<const VisibleSets>(std::move(sets));
+    return Status();
+  };
+  if (o.visible_sets != "auto") {
+    auto sets = io::load_visible_sets(o.visible_sets, *asset.cloud);
+    if (!sets) return sets.status();
+    return take(std::move(*sets), "");
+  }
+  if (s.scene.navmesh == nullptr) return bad("they are found from a NavMesh, and there is none");
+  VisibleSettings settings;
+  settings.serve(o.eye);
+  if (o.progress)
+    settings.progress = [&o](double share) { o.progress("visible sets", share); };
+  const double heights[] = {o.eye.position().y};
+  const auto viewpoints = navmesh_viewpoints(*s.scene.navmesh, heights, settings.spacing());
+  if (!viewpoints) return viewpoints.status();
+  const auto find = [&] {
+    return build_visible_sets(o.device, *asset.cloud, *viewpoints, settings, asset.world_from_asset);
+  };
+  Result<io::CachedVisibleSets> made = Status(Errc::unsupported, "");
+  if (s.source.embedded) {
+    auto found = find();
+    made = found ? Result<io::CachedVisibleSets>(io::CachedVisibleSets{std::move(*found), true, {}})
+                 : Result<io::CachedVisibleSets>(found.status());
+  } else {
+    made = io::cached_visible_sets(s.source.gaussians, *asset.cloud, *viewpoints, settings,
+                                   asset.world_from_asset, find);
+  }
+  if (made.code() == Errc::unsupported) {  // too much is seen from everywhere
+    s.warn(made.message() + ": drawn without them");
+    return {};
+  }
+  if (!made) return made.status();
+  if (!made->warning.empty()) s.warn(made->warning);
+  return take(std::move(made->sets), "");
+}
+
+}  // namespace gsnav::detail

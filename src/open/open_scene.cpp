@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gsnav/detail/open/open_scene.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <new>
+#include <string>
+#include <utility>
+
+#include "gsnav/detail/scene/up_axis.hpp"
+#include "parts.hpp"
+
+namespace gsnav {
+namespace {
+
+/// Names the field that cannot be, or ok.
+Status validate(const OpenOptions& o) {
+  const auto bad = [](const char* field, double value, const char* rule) {
+    char text[128];
+    std::snprintf(text, sizeof text, "OpenOptions.%s = %g: must be %s", field, value, rule);
+    return Status(Errc::invalid_argument, text);
+  };
+  if (!std::isfinite(o.time)) return bad("time", o.time, "finite");
+  if (!(o.unseen_color >= 0 && std::isfinite(o.unseen_color)))
+    return bad("unseen_color", o.unseen_color, "0 or more");
+  if (!(o.cell_size > 0 && std::isfinite(o.cell_size)))
+    return bad("cell_size", o.cell_size, "positive, metres");
+  if (!(o.agent_radius >= 0 && std::isfinite(o.agent_radius)))
+    return bad("agent_radius", o.agent_radius, "0 or more, metres");
+  if (!(o.agent_height > 0 && std::isfinite(o.agent_height)))
+    return bad("agent_height", o.agent_height, "positive, metres");
+  if (!(o.density >= 0.05 && o.density <= 20)) return bad("density", o.density, "in [0.05, 20]");
+  if (o.up != "auto" && o.up != "keep") {
+    if (const auto turned = upright(o.up); !turned)
+      return {turned.code(), "OpenOptions.up: " + turned.message() + ", or auto or keep"};
+  }
+  return {};
+}
+
+Result<OpenedScene> open(const std::string& name, const OpenOptions& options) {
+  const auto from = std::chrono::steady_clock::now();
+  if (Status s = validate(options); !s) return s;
+  auto source = detail::scene_source(name);
+  if (!source) return source.status();
+  detail::OpeningScene s{options, std::move(*source), {}, {}, {}, {}};
+  s.out.name = s.source.name;
+  if (Status status = detail::open_gaussians(s); !status) return status;
+  if (Status status = detail::open_triangles(s); !status) return status;
+  s.out.load_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - from).count();
+  if (Status status = detail::open_navmesh(s); !status) return status;
+  if (Status status = detail::open_visible_sets(s); !status) return status;
+  s.out.scene = std::make_shared<const SimulatorScene>(std::move(s.scene));
+  return std::move(s.out);
+}
+
+}  // namespace
+
+Result<OpenedScene> open_scene(const std::string& name, const OpenOptions& options) {
+  try {
+    return open(name, options);
+  } catch (const std::bad_alloc&) {
+    return {Errc::out_of_memory, name + ": out of memory"};
+  } catch (const std::exception& e) {
+    return {Errc::backend_failure, name + ": " + e.what()};
+  }
+}
+
+}  // namespace gsnav

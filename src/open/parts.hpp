@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "gsnav/detail/open/open_scene.hpp"
+#include "gsnav/nav/navmesh.hpp"
+#include "scene_source.hpp"
+
+// The steps of open_scene. Each adds its part to `scene` and `out`.
+
+namespace gsnav::detail {
+
+/// A scene that is being opened.
+struct OpeningScene {
+  const OpenOptions& options;
+  SceneSource source;
+  OpenedScene out;
+  SimulatorScene scene;
+  Similarity world_from_file{};  ///< by the axis that is up
+  NavMeshTriangles triangles;    ///< world; what a NavMesh may be built of
+
+  void note(std::string text) { out.notes.push_back(std::move(text)); }
+  void warn(std::string text) { out.warnings.push_back(std::move(text)); }
+  bool wants_navmesh() const { return !options.navmesh.empty() && options.navmesh != "none"; }
+};
+
+/// Reads or makes the Gaussians, decides which way is up, reads or builds levels of detail.
+Status open_gaussians(OpeningScene& s);
+/// Reads the triangles that are drawn, and those that a NavMesh may be built of.
+Status open_triangles(OpeningScene& s);
+/// Reads or builds the NavMesh; adds the people who walk on it.
+Status open_navmesh(OpeningScene& s);
+/// Reads or finds what is seen from where.
+Status open_visible_sets(OpeningScene& s);
+
+}  // namespace gsnav::detail
