@@ -115,7 +115,6 @@ void add_run(CLI::App& app, Options& o) {
   app.add_flag("--resume", o.resume,
                "Keeps the rows of OUT/report.csv and makes those that are missing");
   app.add_flag("--no-html", o.no_html, "No page, the CSV only");
-  app.set_version_flag("--version", o.commit);
 }
 
 }  // namespace
@@ -136,15 +135,13 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   add_scenes(app, o, sizes, knob_size);
   add_kinds_of_rows(app, o, oracles);
   add_run(app, o);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    exit_code = gsnav_tools::print_parse_error(app, e);
+  if (const auto status = gsnav_tools::parse_options(app, argc, argv)) {
+    exit_code = *status;
     return std::nullopt;
   }
   const auto fail = [&](const std::string& message) {
     std::fprintf(stderr, "gsnav-report: %s\n", gsnav::printable(message).c_str());
-    exit_code = 1;
+    exit_code = gsnav_tools::kUsage;
     return std::nullopt;
   };
   const auto size_of = [](const std::string& option, const std::string& text) {

@@ -5,8 +5,8 @@
 #include <chrono>
 #include <cstdio>
 #include <exception>
+#include <string>
 
-#include "../../tools/common/device_option.hpp"
 #include "../../tools/common/parse_options.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/device/simulator.hpp"
@@ -34,13 +34,10 @@ Status run(const Options& options) {
   gsnav::SimulatorConfig config;
   config.task.max_steps = options.max_steps;
   config.sensors = sensors_of(options);
-  config.render.quality = options.profile == "exact" ? gsnav::Quality::exact() : gsnav::Quality::fast();
-  if (options.profile == "lod") {
-    config.lod = gsnav::LodChoice{};
-    config.lod->pixels = options.lod_error;
-  }
-  config.visible_sets = options.visible_sets;
-  const auto episodes = make_episodes(options, setup.scene, config.task);
+  config.render.quality = gsnav_tools::quality_of(options);
+  config.lod = setup.detail.lod;
+  config.visible_sets = setup.detail.visible_sets;
+  const auto episodes = make_episodes(options, *setup.scene, config.task);
   if (!episodes) return episodes.status();
   auto made = gsnav::Simulator::create(options.device, setup.scene, config);
   if (!made) return made.status();
@@ -89,7 +86,7 @@ Status run(const Options& options) {
     records.push_back(record);
     recorder.end(sim.world(), sim.scene().avatars);
   }
-  if (Status s = recorder.finish(setup.scene); !s) return s;
+  if (Status s = recorder.finish(*setup.scene); !s) return s;
   print_table(options, setup.facts, records, t);
   if (Status s = write_json(options.out + "/metrics.json", options, setup.facts, records); !s) return s;
   if (Status s = write_timings(options.out + "/timings.json", options.device, t); !s) return s;
@@ -108,20 +105,9 @@ int main(int argc, char** argv) try {
       "strip, a\n"
       "map, metrics.json and timings.json. Without arguments: an embedded furnished flat with three "
       "people."};
-  app.add_option("--scene", o.scene,
-                 "scene to load: .ply, .sog, meta.json or its folder; a comma joins sibling tiles");
-  app.add_option("--up", o.up, "axis of the scene that points up: x, y, z, -x, -y or -z")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"x", "y", "z", "+x", "+y", "+z", "-x", "-y", "-z"}));
-  app.add_option("--avatars", o.avatars, "people walking about")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 64));
   app.add_option("--episodes", o.episodes, "episodes to run")
       ->capture_default_str()
       ->check(CLI::Range(1, 100000));
-  gsnav_tools::add_device_option(app, o.device);
-  app.add_option("--seed", o.seed, "decides episodes and ways; the same seed gives the same run")
-      ->capture_default_str();
   app.add_option("--out", o.out, "folder for everything written; made where missing")
       ->capture_default_str();
   app.add_option("--width", o.width, "image width, pixels")
@@ -136,21 +122,6 @@ int main(int argc, char** argv) try {
   app.add_option("--eye-height", o.eye_height, "camera above the floor, metres")
       ->capture_default_str()
       ->check(CLI::Range(0.05, 3.0));
-  app.add_option("--profile", o.profile,
-                 "accuracy: exact, fast (a cheaper exponential), or lod: a level of detail for each "
-                 "part of the scene, kept "
-                 "beside its file")
-      ->check(CLI::IsMember({"exact", "fast", "lod"}))
-      ->capture_default_str();
-  app.add_option("--lod-error", o.lod_error,
-                 "of the profile lod: how far merged Gaussians may be off, pixels")
-      ->check(CLI::Range(0.01, 100.0))
-      ->capture_default_str();
-  app.add_flag("--visible-sets", o.visible_sets,
-               "of the profiles fast and lod: draw only what is seen from the NavMesh's cell that the "
-               "agent is in; found "
-               "first, and kept beside the scene's file");
-  nav_loop::add_navmesh_options(app, o);
   app.add_option("--frames-every", o.frame_every, "write every k-th RGB and depth frame, 0: none")
       ->capture_default_str()
       ->check(CLI::Range(0, 100000));
@@ -161,18 +132,14 @@ int main(int argc, char** argv) try {
   app.add_option("--max-steps", o.max_steps, "actions after which an episode is cut off")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000000));
-  if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
-  if (o.shown_episode >= o.episodes) {
-    std::fprintf(stderr, "nav_loop: --show %d: of %d episodes the last is %d\n", o.shown_episode,
-                 o.episodes, o.episodes - 1);
-    return 2;
-  }
-  if (o.visible_sets && o.profile == "exact") {
-    std::fprintf(stderr,
-                 "nav_loop: --visible-sets: sampled, so not for --profile exact; use fast or lod\n");
-    return 2;
-  }
-
+  gsnav_tools::add_scene_options(app, o);
+  const auto check = [&o] {
+    if (o.shown_episode < o.episodes) return;
+    throw CLI::ValidationError("--show " + std::to_string(o.shown_episode) + ": of " +
+                               std::to_string(o.episodes) + " episodes the last is " +
+                               std::to_string(o.episodes - 1));
+  };
+  if (const auto status = gsnav_tools::parse_options(app, argc, argv, check)) return *status;
   const gsnav::Status s = nav_loop::run(o);
   if (!s) std::fprintf(stderr, "nav_loop: %s\n", s.message().c_str());
   return s ? 0 : 1;

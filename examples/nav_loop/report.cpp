@@ -49,8 +49,8 @@ void print_table(const Options& options, const SceneFacts& facts,
   const gsnav::MetricsSummary s = gsnav::summarize(metrics);
   std::size_t pushed = 0;
   for (const EpisodeRecord& r : records) pushed += r.pushed ? 1 : 0;
-  std::printf("\n%s: %zu Gaussians, %d avatars (%zu Gaussians each), NavMesh %.1f m2 (%s), on %s\n\n",
-              facts.name.c_str(), facts.gaussians, options.avatars, facts.avatar_gaussians, facts.area,
+  std::printf("\n%s: %zu Gaussians, %zu avatars (%zu Gaussians each), NavMesh %.1f m2 (%s), on %s\n\n",
+              facts.name.c_str(), facts.gaussians, facts.avatars, facts.avatar_gaussians, facts.area,
               facts.navmesh_source.c_str(), options.device.name().c_str());
   std::printf("  %-34s %10zu\n", "episodes", s.episodes);
   const auto row = [](const char* name, double v, const char* format = "%10.3f") {

@@ -21,7 +21,7 @@ struct Timings {
 struct SceneFacts {
   std::string name;
   std::string navmesh_source;
-  std::size_t gaussians = 0, avatar_gaussians = 0;
+  std::size_t gaussians = 0, avatars = 0, avatar_gaussians = 0;
   std::size_t navmesh_polygons = 0, islands = 0;
   double area = 0, island_area = 0;  ///< square metres: all, and the largest island
 };

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "gsnav/sim/basic_simulator.hpp"
+#include <memory>
+
+#include "gsnav/sim.hpp"
 #include "options.hpp"
 #include "report.hpp"
 
@@ -9,7 +11,8 @@ namespace nav_loop {
 
 /// Everything that a run needs before the first episode.
 struct Setup {
-  gsnav::SimulatorScene scene;
+  std::shared_ptr<const gsnav::SimulatorScene> scene;
+  gsnav::DetailChoice detail;
   SceneFacts facts;
   Timings timings;
 };
@@ -17,8 +20,7 @@ struct Setup {
 /// The agent's cameras.
 std::vector<gsnav::SensorSpec> sensors_of(const Options& options);
 
-/// Loads or makes the scene, builds its NavMesh and sends avatars on their ways. Errors name the file
-/// or option.
+/// Opens the scene, with a NavMesh and people on their ways. Errors name the file or option.
 gsnav::Result<Setup> prepare(const Options& options);
 
 /// Episodes that begin at a moment when no avatar is within 0.6 m of the start.

@@ -298,7 +298,7 @@ TEST_CASE("navmesh tool: from Gaussians") {
   }
   io::save_ply(folder / "floor.ply", builder.cloud()).throw_if_error();
   const Outcome made =
-      run(folder, quoted(folder / "floor.ply") + " --out " + quoted(folder / "g.navmesh"));
+      run(folder, quoted(folder / "floor.ply") + " --up y --out " + quoted(folder / "g.navmesh"));
   INFO(made.text);
   REQUIRE(made.ok);
   CHECK(made.says("2400 Gaussians used"));
@@ -310,8 +310,8 @@ TEST_CASE("navmesh tool: from Gaussians") {
              "v 2 0 1\nv 4 0 1\nv 4 0 3\nv 2 0 3\nv 2 1 1\nv 4 1 1\nv 4 1 3\nv 2 1 3\n"
              "f 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\nf 5 8 7 6\n");
   const Outcome both =
-      run(folder, quoted(folder / "floor.ply") + " --mesh " + quoted(folder / "box.obj") + " --out " +
-                      quoted(folder / "b.navmesh"));
+      run(folder, quoted(folder / "floor.ply") + " --up y --mesh " + quoted(folder / "box.obj") +
+                      " --out " + quoted(folder / "b.navmesh"));
   INFO(both.text);
   REQUIRE(both.ok);
   CHECK(both.says("10 triangles"));

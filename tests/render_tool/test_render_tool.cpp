@@ -101,7 +101,7 @@ TEST_CASE("render tool: any device draws the same bits, and serial64 those of th
     if (plain.empty()) plain = serial;
   }
   // As the library draws what it reads.
-  static_cast<void>(draw("serial64", ""));
+  static_cast<void>(draw("serial64", "--up keep"));
   const auto read = io::load_scene(folder / "a.ply").value();
   std::vector<Camera> cameras = views_around(read.cloud, read.report.up, 2, 48, 32);
   cameras[1].near_plane = 0.2;

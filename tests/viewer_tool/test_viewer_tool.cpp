@@ -44,12 +44,13 @@ class Viewer {
     words.insert(words.end(), kScene.begin(), kScene.end());
     words.insert(words.end(), more.begin(), more.end());
     process_.emplace(words, folder_.path());
-    std::string line;
-    for (int i = 0; i < 6000 && !line.ends_with('\n') && process_->runs(); ++i) {
+    std::string line;  // the last: what there is to say of the scene comes before it
+    const auto said = [&] { return contains(line, "http://127.0.0.1:") && line.ends_with('\n'); };
+    for (int i = 0; i < 6000 && !said() && process_->runs(); ++i) {
       usleep(20000);
       line = read_file(folder_ / "log");
     }
-    REQUIRE(line.starts_with("http://127.0.0.1:"));
+    REQUIRE(said());
     port = std::atoi(line.c_str() + line.rfind(':') + 1);
   }
 

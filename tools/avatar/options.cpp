@@ -164,15 +164,13 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   from_makehuman->add_option("--target", targets, "Shape (.target), FILE or FILE=AMOUNT; any number");
   CLI::App* walks = add_walk(app, walk, from, to, via);
   CLI::App* strips = add_strip(app, strip, eye, target);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    exit_code = gsnav_tools::print_parse_error(app, e) == 0 ? 0 : 1;
+  if (const auto status = gsnav_tools::parse_options(app, argc, argv)) {
+    exit_code = *status;
     return std::nullopt;
   }
   const auto bad = [&](const std::string& text, const char* what) {
     std::fprintf(stderr, "gsnav-avatar: '%s' is no %s\n", gsnav::printable(text).c_str(), what);
-    exit_code = 1;
+    exit_code = gsnav_tools::kUsage;
     return std::nullopt;
   };
   for (const std::string& t : targets) {

@@ -1,33 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <CLI/CLI.hpp>
-#include <cstdio>
+#include <functional>
 #include <optional>
-#include <sstream>
+#include <string>
 
-#include "gsnav/core/printable.hpp"
+namespace CLI {
+class App;
+}
 
 namespace gsnav_tools {
 
-/// Prints what CLI11 says of an error, or its help. Control characters of arguments become \xHH, so that
-/// a file name cannot steer a terminal. Returns CLI11's exit status, 0 for help.
-inline int print_parse_error(const CLI::App& app, const CLI::ParseError& error) {
-  std::ostringstream out, err;
-  const int status = app.exit(error, out, err);
-  std::fputs(gsnav::printable(out.str()).c_str(), stdout);
-  std::fputs(gsnav::printable(err.str()).c_str(), stderr);
-  return status;
-}
+// Exit statuses of all programs.
+inline constexpr int kFailed = 1;  ///< what was asked for could not be done
+inline constexpr int kUsage = 2;   ///< the command line cannot be
 
-/// Reads the command line. Returns nothing if the program goes on, else the status to exit with.
-inline std::optional<int> parse_options(CLI::App& app, int argc, const char* const* argv) {
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return print_parse_error(app, error);
-  }
-  return {};
-}
+/// Reads the command line; adds --version. Prints help, the version, or what is wrong: control
+/// characters of arguments become \xHH, so that a file name cannot steer a terminal. Returns nothing if
+/// the program goes on, else the status to exit with. `check` looks at options together and throws
+/// CLI::ValidationError.
+std::optional<int> parse_options(CLI::App& app, int argc, const char* const* argv,
+                                 const std::function<void()>& check = {});
+
+/// Prints "PROGRAM: `message`" on stderr. Returns kFailed.
+int fail(const std::string& program, const std::string& message);
 
 }  // namespace gsnav_tools

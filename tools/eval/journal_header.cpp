@@ -19,7 +19,9 @@ using gsnav::Status;
 constexpr int kFormat = 2;
 
 std::string shown(const OptionValue& v) {
-  return v.value.empty() ? "no " + v.flag : v.flag + " " + v.value;
+  std::string value = v.value;
+  std::replace(value.begin(), value.end(), '\n', ' ');
+  return value.empty() ? "no " + v.flag : v.flag + " " + value;
 }
 
 }  // namespace
@@ -138,10 +140,10 @@ Status compare_contents(const fs::path& path, const Header& header, const Option
     const auto same_name = [&n = name](const auto& entry) { return entry.first == n; };
     const auto was = std::find_if(header.contents.begin(), header.contents.end(), same_name);
     if (was != header.contents.end() && was->second == hash) continue;
-    const std::string file = name == "scene"                       ? o.scene
-                             : name == "episodes"                  ? o.episode_file
-                             : name == "navmesh" && o.ready_made() ? o.navmesh
-                                                                   : std::string();
+    const std::string file = name == "scene" && o.scene != "default" ? o.scene
+                             : name == "episodes"                    ? o.episode_file
+                             : name == "navmesh" && names_navmesh(o) ? o.navmesh
+                                                                     : std::string();
     return {Errc::invalid_argument, path.string() + " is of other contents: the " + name +
                                         (file.empty() ? " that gsnav made" : " in " + file) +
                                         (name == "scene" || name == "navmesh" ? " has" : " have") +

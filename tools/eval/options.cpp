@@ -8,8 +8,6 @@
 #include <string_view>
 #include <type_traits>
 
-#include "../common/device_option.hpp"
-
 namespace gsnav_eval {
 namespace {
 
@@ -23,7 +21,7 @@ std::string text_of(const T& value) {
                              .ptr};  // the shortest that reads back
   } else {
     std::string all;
-    for (const auto& v : value) all += (all.empty() ? "" : " ") + text_of(v);
+    for (const auto& v : value) all += (all.empty() ? "" : "\n") + text_of(v);
     return all;
   }
 }
@@ -33,12 +31,19 @@ std::string text_of(const T& value) {
 template <class O, class F>
 void for_each_option(O& o, const F& f) {
   using enum OptionRole;
-  f("--scene", o.scene, file, !o.scene.empty());
-  f("--density", o.density, result, false);
+  f("--scene", o.scene, file, o.scene != "default");
   f("--up", o.up, result, false);
-  f("--navmesh", o.navmesh, file, o.ready_made());
+  f("--time", o.time, result, false);
+  f("--storage", o.storage, result, false);
+  f("--profile", o.profile, view, false);
+  f("--lod-error", o.lod_error, view, false);
+  f("--lod-levels", o.lod_levels, view, false);
+  f("--visible-sets", o.visible_sets, view, false);
+  f("--mesh", o.meshes, result, false);
+  f("--navmesh", o.navmesh, file, names_navmesh(o));
   f("--cell-size", o.cell_size, result, false);
   f("--crop", o.crop, result, false);
+  f("--density", o.density, result, false);
   f("--avatars", o.avatars, result, false);
   f("--episodes", o.episodes, result, false);
   f("--episode-file", o.episode_file, file, !o.episode_file.empty());
@@ -67,10 +72,10 @@ gsnav::Status take_options(const CLI::App& app, const std::vector<OptionValue>& 
   std::vector<std::string> words;
   for (const OptionValue& v : values) {
     if (v.value.empty() || app.get_option(v.flag)->count() > 0) continue;
-    if (v.flag == "--crop") {
+    if (v.flag == "--crop" || v.flag == "--mesh") {
       words.push_back(v.flag);
-      std::istringstream numbers(v.value);
-      for (std::string one; numbers >> one;) words.push_back(one);
+      std::istringstream lines(v.value);
+      for (std::string one; std::getline(lines, one);) words.push_back(one);
     } else {
       words.push_back(v.flag + "=" + v.value);
     }
@@ -96,16 +101,11 @@ gsnav::Status take_options(const CLI::App& app, const std::vector<OptionValue>& 
   return {};
 }
 
+bool names_navmesh(const Options& o) {
+  return o.navmesh != "auto" && o.navmesh != "mesh" && o.navmesh != "gaussians" && o.navmesh != "none";
+}
+
 void add_scene_options(CLI::App& app, Options& o) {
-  app.add_option("--scene", o.scene, "scene to load; without: the embedded flat");
-  app.add_option("--density", o.density, "of the embedded flat's Gaussians and of people's")
-      ->capture_default_str()
-      ->check(CLI::Range(0.05, 20.0));
-  app.add_option("--up", o.up, "axis of the scene that points up")->capture_default_str();
-  nav_loop::add_navmesh_options(app, o);
-  app.add_option("--avatars", o.avatars, "people walking about")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 64));
   app.add_option("--episodes", o.episodes, "episodes to generate")
       ->capture_default_str()
       ->check(CLI::Range(1, 100000));
@@ -115,8 +115,6 @@ void add_scene_options(CLI::App& app, Options& o) {
                  "body and rules: v1, v2 (PointNav challenges), avatar (v1 with people charged)")
       ->capture_default_str()
       ->check(CLI::IsMember({"v1", "v2", "avatar"}));
-  app.add_option("--seed", o.seed, "decides episodes, people and the random policy")
-      ->capture_default_str();
   app.add_option("--width", o.width, "image width, pixels")
       ->capture_default_str()
       ->check(CLI::Range(16, 4096));
@@ -129,7 +127,7 @@ void add_scene_options(CLI::App& app, Options& o) {
   app.add_option("--eye-height", o.eye_height, "camera above the floor, metres")
       ->capture_default_str()
       ->check(CLI::Range(0.05, 3.0));
-  gsnav_tools::add_device_option(app, o.device);
+  gsnav_tools::add_scene_options(app, o);
 }
 
 void add_world_options(CLI::App& app, Options& o) {

@@ -16,6 +16,9 @@ struct Options : nav_loop::Options {
   std::string preset = "avatar";    ///< v1, v2, avatar
 };
 
+/// Whether --navmesh names a file.
+bool names_navmesh(const Options& options);
+
 /// Scene, people, episodes, body and picture.
 void add_scene_options(CLI::App& app, Options& options);
 /// These and the policy: the options that decide what happens: an evaluation goes on, and is replayed,
@@ -31,7 +34,7 @@ enum class OptionRole {
 /// An option as a command line has it.
 struct OptionValue {
   std::string flag;   ///< with its dashes
-  std::string value;  ///< several numbers are separated by spaces
+  std::string value;  ///< several are lines
   OptionRole role = OptionRole::result;
   bool names_file = false;  ///< the value is a file's name
 };

@@ -54,7 +54,7 @@ std::string page(const Options& o, const gsnav::MetricsSummary& s, const std::ve
       "charset=\"utf-8\"/><title>Evaluation</title><style>";
   out += kStyle;
   out += "</style></head><body>\n<h1>Evaluation</h1>\n<p>" +
-         escape(o.scene.empty() ? "embedded flat" : o.scene) + ", " + std::to_string(o.avatars) +
+         escape(o.scene == "default" ? "embedded flat" : o.scene) + ", " + std::to_string(o.avatars) +
          " people, policy " + escape(o.policy) + ", preset " + escape(o.preset) + ", seed " +
          std::to_string(o.seed) + "</p>\n<table>\n";
   row(out, "episodes", "", static_cast<double>(s.episodes));

@@ -16,6 +16,10 @@ using gsnav::Result;
 using gsnav::Status;
 
 Result<Stage> prepare(const Options& o) {
+  if (o.storage == "packed") {
+    return {gsnav::Errc::invalid_argument,
+            "--storage packed: journals and maps read the floats; use full or compact"};
+  }
   auto setup = nav_loop::prepare(o);
   if (!setup) return setup.status();
   Stage stage;
@@ -23,9 +27,12 @@ Result<Stage> prepare(const Options& o) {
                       : o.preset == "avatar" ? gsnav::TaskConfig::avatar_pointnav()
                                              : gsnav::TaskConfig{};
   stage.config.task.max_steps = o.max_steps;
+  stage.config.render.quality = gsnav_tools::quality_of(o);
+  stage.config.lod = setup->detail.lod;
+  stage.config.visible_sets = setup->detail.visible_sets;
   stage.config.sensors = gsnav::rgbd_sensors(o.height, o.width, o.hfov, {0, o.eye_height, 0});
   if (o.episode_file.empty()) {
-    auto made = nav_loop::make_episodes(o, setup->scene, stage.config.task);
+    auto made = nav_loop::make_episodes(o, *setup->scene, stage.config.task);
     if (!made) return made.status();
     stage.episodes = std::move(*made);
   } else {
@@ -35,7 +42,7 @@ Result<Stage> prepare(const Options& o) {
       std::fprintf(stderr, "%s\n", gsnav::printable(w).c_str());
     stage.episodes = std::move(file->episodes);
   }
-  stage.scene = std::make_shared<const gsnav::SimulatorScene>(std::move(setup->scene));
+  stage.scene = setup->scene;
   return stage;
 }
 

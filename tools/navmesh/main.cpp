@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cstdio>
 #include <limits>
-#include <map>
+#include <string>
 #include <vector>
 
-#include "../common/navmesh_options.hpp"
+#include "../common/progress.hpp"
 #include "draw.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/core/replace_file.hpp"
@@ -16,6 +16,7 @@
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/nav.hpp"
+#include "gsnav/scene/prepare.hpp"
 #include "options.hpp"
 
 namespace {
@@ -23,13 +24,10 @@ namespace {
 using namespace gsnav;
 using namespace gsnav_navmesh;
 
-/// The rotation that takes an axis to Y.
-Quatd upright(const std::string& up) {
-  constexpr double h = 0.70710678118654752;
-  static const std::map<std::string, Quatd> turns{{"y", {1, 0, 0, 0}},  {"-y", {0, 1, 0, 0}},
-                                                  {"z", {h, -h, 0, 0}}, {"-z", {h, h, 0, 0}},
-                                                  {"x", {h, 0, 0, h}},  {"-x", {h, 0, 0, -h}}};
-  return turns.at(up);
+Result<Similarity> placement(const Options& o, const std::string& up) {
+  auto placed = upright(up);
+  if (placed) placed->scale = o.scale;
+  return placed;
 }
 
 /// Adds the triangles of a file to `all`.
@@ -59,8 +57,10 @@ Result<NavMeshTriangles> load_triangles(const Options& o, const std::string& pat
   return all;
 }
 
-Result<NavMesh> from_triangles(const Options& o, const Similarity& placed) {
-  auto mesh = load_triangles(o, o.input, placed);
+Result<NavMesh> from_triangles(const Options& o) {
+  const auto placed = placement(o, o.up == "auto" ? "y" : o.up);
+  if (!placed) return placed.status();
+  auto mesh = load_triangles(o, o.input, *placed);
   if (!mesh) return mesh.status();
   return NavMesh::build(o.settings, mesh->vertices, mesh->triangles, o.threads);
 }
@@ -72,7 +72,9 @@ Status write_visible_sets(const Options& o, const GaussianCloud& cloud, const Na
   if (!viewpoints) return viewpoints.status();
   VisibleSettings settings = o.visible;
   settings.margin = settings.spacing();
-  settings.progress = nav_loop::visible_progress();
+  settings.progress = [print = gsnav_tools::progress_printer()](double share) {
+    print("visible sets", share);
+  };
   OpenMPBackend backend(o.threads);
   const auto sets = build_visible_sets(backend, cloud, *viewpoints, settings, placed);
   if (sets.code() == Errc::unsupported) {
@@ -90,9 +92,18 @@ Status write_visible_sets(const Options& o, const GaussianCloud& cloud, const Na
   return {};
 }
 
-Result<NavMesh> from_gaussians(const Options& o, const Similarity& placed) {
+Result<NavMesh> from_gaussians(const Options& o) {
   auto scene = io::load_scene(o.input);
   if (!scene) return scene.status();
+  std::string up = o.up;
+  if (up == "auto") {
+    up = axis_name(scene->report.up);
+    std::printf("up is %s, %s\n", up.c_str(),
+                scene->report.up_seen ? "by the scene's ground" : "as usual for such files");
+  }
+  const auto placed_by = placement(o, up);
+  if (!placed_by) return placed_by.status();
+  const Similarity& placed = *placed_by;
   const GaussianSet set = scene->cloud.set(placed);
   const auto beside = load_triangles(o, o.mesh, placed);
   if (!beside) return beside.status();
@@ -117,14 +128,13 @@ Result<NavMesh> from_gaussians(const Options& o, const Similarity& placed) {
 }
 
 Result<NavMesh> make(const Options& o) {
-  const Similarity placed{upright(o.up), {}, o.scale};
   switch (kind_of(o.input)) {
     case InputKind::navmesh:
       return load_navmesh(o.input);
     case InputKind::mesh:
-      return from_triangles(o, placed);
+      return from_triangles(o);
     default:
-      return from_gaussians(o, placed);
+      return from_gaussians(o);
   }
 }
 

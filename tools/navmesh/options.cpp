@@ -4,17 +4,14 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <sstream>
-#include <system_error>
+#include <string>
 
-#include "../common/navmesh_options.hpp"
 #include "../common/parse_options.hpp"
+#include "../common/progress.hpp"
+#include "../common/voxel_options.hpp"
 #include "gsnav/core/lower_case.hpp"
 #include "gsnav/io.hpp"
 
@@ -28,26 +25,7 @@ const char kDescription[] =
     ".obj, .glb or .gltf (a glTF of Gaussians has those), and from "
     "its Gaussians otherwise. What it is made of is printed; --out, --obj and --png write it. Lengths "
     "in metres, "
-    "Y up. Exit status: 0, or 1 with one line that says what is wrong.";
-
-/// Whether a glTF holds Gaussians: its JSON, at the begin of either form, then names the extension.
-bool has_gaussians(const std::string& gltf) {
-  std::ifstream in(gltf, std::ios::binary);
-  std::string text(20, '\0');
-  in.read(text.data(), 20);
-  if (in && text.compare(0, 4, "glTF") == 0) {
-    std::uint32_t length = 0;  // of the JSON
-    std::memcpy(&length, text.data() + 12, 4);
-    std::error_code error;
-    text.resize(std::min<std::uintmax_t>(length, std::filesystem::file_size(gltf, error)));
-    in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  } else {
-    in.clear();
-    in.seekg(0);
-    text.assign(std::istreambuf_iterator<char>(in), {});
-  }
-  return text.find("KHR_gaussian_splatting") != std::string::npos;
-}
+    "Y up. Exit status: 0; 1 with one line that says what is wrong; 2 where the command line cannot be.";
 
 /// FILE[@X,Y,Z[,YAW[,SCALE]]]; none where what follows the @ is something else.
 std::optional<StaticObject> parse_object(const std::string& text) {
@@ -85,8 +63,10 @@ void add_input(CLI::App& app, Options& o, Given& given) {
                  ".ksplat, a SOG "
                  "folder, or sibling tiles: DIR/2_0,2_1)")
       ->required();
-  given.up = app.add_option("--up", o.up, "Axis of the input that points up; not for a NavMesh")
-                 ->check(CLI::IsMember({"x", "y", "z", "-x", "-y", "-z"}))
+  given.up = app.add_option("--up", o.up,
+                            "Axis of the input that points up; auto: of Gaussians guessed from the "
+                            "ground, of triangles y; not for a NavMesh")
+                 ->check(CLI::IsMember({"auto", "x", "y", "z", "+x", "+y", "+z", "-x", "-y", "-z"}))
                  ->capture_default_str();
   given.scale = app.add_option("--scale", o.scale, "Metres a unit of the input; not for a NavMesh")
                     ->check(CLI::PositiveNumber)
@@ -140,7 +120,7 @@ void add_build(CLI::App& app, Options& o, Given& given) {
   const auto number = [&](const char* name, double& value, const char* text) {
     app.add_option(name, value, text)->capture_default_str()->group(build);
   };
-  nav_loop::add_voxel_options(app, s.cell_size, o.crop);
+  gsnav_tools::add_voxel_options(app, s.cell_size, o.crop, build);
   given.cell_height = app.add_option("--cell-height", s.cell_height, "Voxel height; 0.05 for Gaussians")
                           ->capture_default_str()
                           ->group(build);
@@ -241,7 +221,7 @@ InputKind kind_of(const std::string& input) {
   if (extension == ".navmesh" || extension == ".bin") return InputKind::navmesh;
   if (extension == ".obj") return InputKind::mesh;
   const bool gltf = extension == ".glb" || extension == ".gltf";
-  return gltf && !has_gaussians(input) ? InputKind::mesh : InputKind::gaussians;
+  return gltf && !gsnav::io::gltf_holds_gaussians(input) ? InputKind::mesh : InputKind::gaussians;
 }
 
 namespace {
@@ -288,18 +268,19 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   add_build(app, o, given);
   add_gaussians(app, o, given);
   add_visible_sets(app, o, given);
-  try {
-    app.parse(argc, argv);
-    check_together(o, given);
-  } catch (const CLI::ParseError& error) {
-    exit_code = gsnav_tools::print_parse_error(app, error) == 0 ? 0 : 1;
+  const auto status = gsnav_tools::parse_options(app, argc, argv, [&] { check_together(o, given); });
+  if (status) {
+    exit_code = *status;
     return std::nullopt;
   }
   if (kind_of(o.input) == InputKind::gaussians) {
     gsnav::NavMeshSettings& s = o.settings;
-    const double height = s.cell_height;
-    nav_loop::apply(s.cell_size, o.crop, s, o.gaussians);
-    if (given.cell_height->count() + given.settings->count() > 0) s.cell_height = height;
+    if (given.cell_height->count() + given.settings->count() == 0)
+      s.cell_height = std::max(gsnav::gaussian_navmesh_settings().cell_height, s.cell_size);
+    if (!o.crop.empty()) o.gaussians.crop = gsnav_tools::box_of(o.crop);
+    o.gaussians.progress = [print = gsnav_tools::progress_printer()](const char* stage, double share) {
+      print(std::string("NavMesh: ") + stage, share);
+    };
     o.gaussians.threads = o.threads;
   }
   return o;

@@ -7,7 +7,6 @@
 
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/nav.hpp"
-#include "gsnav/nav/navmesh_settings.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 
 namespace gsnav_navmesh {
@@ -24,7 +23,7 @@ struct StaticObject {
 
 struct Options {
   std::string input;
-  std::string up = "y";
+  std::string up = "auto";
   double scale = 1.0;
   std::string mesh;  ///< triangles beside the Gaussians of the input
   std::vector<StaticObject> objects;

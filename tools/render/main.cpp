@@ -76,16 +76,15 @@ Status write_images(const Frames<S>& f, const Camera& camera, std::size_t index,
   return s;
 }
 
-RenderOptions how_to_draw(const Options& o, const SceneAsset& asset) {
+RenderOptions how_to_draw(const Options& o, const OpenedScene& scene) {
   RenderOptions how;
   RenderConfig& config = how.render;
   config.outputs = kRgb | kAlpha | o.depth_choice.output;
-  config.quality = o.profile == "exact" ? Quality::exact() : Quality::fast();
+  config.quality = gsnav_tools::quality_of(o);
   config.quality.max_alpha = o.max_alpha;
   config.first_hit_tau = o.depth_choice.tau;
   config.composite = o.composite == "merged" ? Composite::merged : Composite::hard_depth;
-  if (asset.lod != nullptr) how.detail.lod.emplace().pixels = o.lod_pixels;
-  how.detail.visible_sets = asset.visible != nullptr;
+  how.detail = gsnav_tools::detail_of(o, scene);
   return how;
 }
 
@@ -148,7 +147,7 @@ int run(const Options& o, const Scene& scene, HostView& host, const Draw& draw) 
     total_ms += std::chrono::duration<double, std::milli>(end - start).count();
     if (o.ledger) {
       host.look(cameras[c]);
-      const FrameLedger ledger = host.ledger(cameras[c], f.stats[0], scene.report);
+      const FrameLedger ledger = host.ledger(cameras[c], f.stats[0], scene.opened.report);
       std::printf("camera %zu:\n%s", c, ledger_text(ledger).c_str());
     }
     if (const Status s = write_images(f, cameras[c], c, o); !s.ok()) return fail(s.message());
@@ -170,14 +169,16 @@ int main(int argc, char** argv) {
   if (Status s = make_output_folder(o.out); !s) return fail("--out " + s.message());
   const auto scene = gsnav_render::load_scene(o);
   if (!scene) return fail(scene.message());
-  const RenderOptions how = how_to_draw(o, scene->drawn->assets[0]);
-  HostView host(scene->drawn, how);
+  if (o.ledger && scene->opened.scene->assets.empty())
+    return fail("--ledger: " + o.scene + " has no Gaussians");
+  const RenderOptions how = how_to_draw(o, scene->opened);
+  HostView host(scene->opened.scene, how);
   if (o.float64) {
     return run<double>(o, *scene, host, [&](const Camera& camera, const MeshLight& light, auto& frames) {
       return host.render(camera, light, frames);
     });
   }
-  auto renderer = Renderer::create(o.device, scene->drawn, how);
+  auto renderer = Renderer::create(o.device, scene->opened.scene, how);
   if (!renderer) return fail(renderer.message());
   return run<float>(o, *scene, host, [&](const Camera& camera, const MeshLight& light, auto& frames) {
     if (Status s = renderer->set_light(light); !s) return s;

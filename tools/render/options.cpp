@@ -5,9 +5,7 @@
 #include <cstdio>
 #include <exception>
 
-#include "../common/device_option.hpp"
 #include "../common/parse_options.hpp"
-#include "gsnav/core/printable.hpp"
 
 namespace gsnav_render {
 namespace {
@@ -28,72 +26,61 @@ std::optional<DepthChoice> parse_depth(const std::string& text) {
   return std::nullopt;
 }
 
-void add_scene_options(CLI::App& app, Options& o) {
-  app.add_option("--scene", o.scene,
-                 "Any scene of Gaussians that can be read, or a folder's sibling tiles: DIR/2_0,2_1,2_2")
-      ->required();
-  app.add_option("--time", o.time, "Moment of a scene that moves (4D Gaussians), seconds");
-  app.add_option("--storage", o.storage,
-                 "full; compact: SH in half of the memory; packed: all in a third (docs/formats.md)")
-      ->check(CLI::IsMember({"full", "compact", "packed"}))
-      ->capture_default_str();
-  app.add_option("--cameras", o.cameras,
-                 "INRIA cameras.json (camera-to-world, OpenCV axes); without it --orbit views around "
-                 "the scene, upright by "
-                 "the guess of which way is up");
-  app.add_option("--orbit", o.orbit, "Number of views around the scene where no --cameras are given")
+void add_cameras(CLI::App& app, Options& o) {
+  const char* group = "Cameras";
+  auto* cameras = app.add_option("--cameras", o.cameras,
+                                 "INRIA cameras.json (camera-to-world, OpenCV axes), in the axes of the "
+                                 "scene's file")
+                      ->type_name("FILE")
+                      ->group(group);
+  auto* eye = app.add_option("--eye", o.eye,
+                             "where a single camera stands, X Y Z metres in the world (the file's axes "
+                             "with --up keep)")
+                  ->expected(3)
+                  ->excludes(cameras)
+                  ->group(group);
+  app.add_option("--target", o.target, "what it looks at, X Y Z")->expected(3)->needs(eye)->group(group);
+  app.add_option("--hfov", o.hfov, "horizontal field of view where no --cameras are given, degrees")
+      ->check(CLI::Range(1.0, 170.0))
+      ->capture_default_str()
+      ->group(group);
+  app.add_option("--orbit", o.orbit,
+                 "number of views around the scene where no --cameras and no --eye are given")
       ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  app.add_option("--out", o.out, "Folder for the images; made where it does not exist")->required();
-  app.add_option("--width", o.width, "Image width; with --height, focal lengths scale by it")
-      ->check(CLI::Range(1, kMaxImageSide));
-  app.add_option("--height", o.height, "Image height")->check(CLI::Range(1, kMaxImageSide));
+      ->capture_default_str()
+      ->group(group);
+  app.add_option("--width", o.width,
+                 "image width, 640 where the cameras have none; with --height, focal lengths of "
+                 "--cameras scale by it")
+      ->check(CLI::Range(1, kMaxImageSide))
+      ->group(group);
+  app.add_option("--height", o.height, "image height, 480 where the cameras have none")
+      ->check(CLI::Range(1, kMaxImageSide))
+      ->group(group);
   app.add_option("--near", o.near_plane,
                  "Gaussians whose centre is not beyond this are not drawn, metres")
       ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+      ->capture_default_str()
+      ->group(group);
 }
 
-void add_drawing_options(CLI::App& app, Options& o) {
-  gsnav_tools::add_device_option(app, o.device, &o.float64);
-  app.add_option("--profile", o.profile,
-                 "exact, fast (docs/accuracy.md), or lod: a level of detail for each part of the scene "
-                 "(docs/lod.md)")
-      ->check(CLI::IsMember({"exact", "fast", "lod"}))
-      ->capture_default_str();
-  app.add_option("--lod-error", o.lod_pixels,
-                 "Of the profile lod: how far merged Gaussians may be off, pixels")
-      ->check(CLI::Range(0.01, 100.0))
-      ->capture_default_str();
-  app.add_option("--lod-levels", o.lod_levels,
-                 "Of the profile lod: shipped, those that a streamed set has, where it has any; built: "
-                 "the tree of its finest")
-      ->check(CLI::IsMember({"shipped", "built"}))
-      ->capture_default_str();
-  app.add_option("--visible-sets", o.visible_sets,
-                 "Of the profiles fast and lod: file of what is seen from where (gsnav-navmesh writes "
-                 "it); the rest is "
-                 "not drawn")
-      ->check(CLI::ExistingFile);
-  app.add_flag("--ledger", o.ledger,
-               "Print what each frame skipped, merged, limited and rounded, and by how much");
+void add_images(CLI::App& app, Options& o) {
+  app.add_option("--out", o.out, "folder for the images; made where it does not exist")->required();
+  app.add_flag("--npy", o.npy, "write NPY arrays");
+  app.add_flag("--png", o.png, "write PNG pictures (both are written where neither flag is given)");
   app.add_option("--depth", o.depth, "median, expected, accumulated, first or first:TAU")
       ->capture_default_str();
-  app.add_option("--max-alpha", o.max_alpha, "Largest alpha of one Gaussian at a pixel")
+  app.add_option("--depth-near", o.depth_near, "depth picture: nearest metre of the colour scale");
+  app.add_option("--depth-far", o.depth_far,
+                 "depth picture: farthest; 0: the image's own range (2nd to 98th percentile)");
+  app.add_option("--max-alpha", o.max_alpha, "largest alpha of one Gaussian at a pixel")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
-  app.add_option("--mesh", o.meshes,
-                 "Triangle meshes among the Gaussians (.gltf and .glb with colours and textures; .obj "
-                 "and .ply grey), in the "
-                 "scene's frame, lit from the camera (docs/composition.md)");
   app.add_option("--composite", o.composite, "merged, or hard_depth: Habitat-GS's rule, to compare with")
       ->check(CLI::IsMember({"merged", "hard_depth"}))
       ->capture_default_str();
-  app.add_option("--depth-near", o.depth_near, "Depth picture: nearest metre of the colour scale");
-  app.add_option("--depth-far", o.depth_far,
-                 "Depth picture: farthest; 0: the image's own range (2nd to 98th percentile)");
-  app.add_flag("--npy", o.npy, "Write NPY arrays");
-  app.add_flag("--png", o.png, "Write PNG pictures (both are written where neither flag is given)");
+  app.add_flag("--ledger", o.ledger,
+               "print what each frame skipped, merged, limited and rounded, and by how much");
 }
 
 /// Why the options do not go together, or nothing.
@@ -102,27 +89,31 @@ std::string refused(const Options& o) {
     return "--depth " + o.depth + ": use median, expected, accumulated, first or first:TAU, 0 < TAU < 1";
   }
   if ((o.width > 0) != (o.height > 0)) return "--width and --height go together";
+  if (o.eye.empty() != o.target.empty()) return "--eye and --target go together";
   return "";
 }
 
 }  // namespace
 
-int fail(const std::string& message) {
-  std::fprintf(stderr, "gsnav-render: %s\n", printable(message).c_str());
-  return 1;
-}
+int fail(const std::string& message) { return gsnav_tools::fail("gsnav-render", message); }
 
 std::optional<int> parse_options(int argc, char** argv, Options& o) {
   CLI::App app{
-      "Renders a scene of 3D Gaussians from the cameras of an INRIA cameras.json or from around it. "
-      "Writes NNNN.rgb.npy "
-      "(H, W, 3 float32, unclamped), NNNN.depth.npy and NNNN.alpha.npy (H, W float32; metres, 0 = no "
-      "return) and PNG pictures. The scene is used in its own frame: no up axis is applied."};
-  add_scene_options(app, o);
-  add_drawing_options(app, o);
-  if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
+      "Renders a scene from the cameras of an INRIA cameras.json, from one place, or from around it.\n"
+      "Writes NNNN.rgb.npy (H, W, 3 float32, unclamped), NNNN.depth.npy and NNNN.alpha.npy (H, W "
+      "float32; "
+      "metres, 0 = no return) and PNG pictures."};
+  o.navmesh = "none";
+  o.avatars = 0;
+  add_images(app, o);
+  add_cameras(app, o);
+  gsnav_tools::add_scene_options(app, o, &o.float64);
+  const auto check = [&o] {
+    if (const std::string why = refused(o); !why.empty()) throw CLI::ValidationError(why);
+  };
+  if (const auto status = gsnav_tools::parse_options(app, argc, argv, check)) return *status;
   if (!o.npy && !o.png) o.npy = o.png = true;
-  if (const std::string why = refused(o); !why.empty()) return fail(why);
+  if (o.avatars > 0 && o.navmesh == "none") o.navmesh = "auto";
   o.depth_choice = *parse_depth(o.depth);
   return std::nullopt;
 }

@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/render.hpp"
-#include "gsnav/scene/lod_cut.hpp"
+#include "../common/scene_options.hpp"
 
 namespace gsnav_render {
 
@@ -18,20 +17,17 @@ struct DepthChoice {
   double tau = 0.5;
 };
 
-struct Options {
-  std::string scene, cameras, out, profile = "exact", depth = "median", composite = "merged",
-                                   storage = "full", lod_levels = "shipped", visible_sets;
-  Device device;
-  bool float64 = false;  ///< by the float64 reference, whatever the device is
+struct Options : gsnav_tools::SceneOptions {
+  std::string cameras, out, depth = "median", composite = "merged";
+  std::vector<double> eye, target;  ///< x y z
+  bool float64 = false;             ///< by the float64 reference, whatever the device is
   DepthChoice depth_choice;
-  std::vector<std::string> meshes;
   int width = 0, height = 0, orbit = 4;
-  double time = 0, near_plane = 0.2, max_alpha = 0.99, depth_near = 0, depth_far = 0,
-         lod_pixels = LodChoice{}.pixels;
+  double hfov = 60, near_plane = 0.2, max_alpha = 0.99, depth_near = 0, depth_far = 0;
   bool npy = false, png = false, ledger = false;
 };
 
-/// Prints "gsnav-render: `message`". Returns the exit status 1.
+/// Prints "gsnav-render: `message`". Returns the exit status.
 int fail(const std::string& message);
 
 /// The exit status where there is nothing to draw: --help, or options that do not go together.

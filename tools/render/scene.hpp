@@ -1,20 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <memory>
 #include <vector>
 
-#include "gsnav/io.hpp"
-#include "gsnav/sim.hpp"
 #include "options.hpp"
 
 namespace gsnav_render {
 
-/// What is drawn, one cloud and meshes, and from where.
+/// What is drawn, and from where.
 struct Scene {
-  std::shared_ptr<const SimulatorScene> drawn;
-  LoadReport report;
-  std::vector<Camera> cameras;
+  OpenedScene opened;
+  std::vector<Camera> cameras;  ///< in the world
 };
 
 /// Reads all that the options name, and prints what it is.

@@ -72,7 +72,7 @@ Result<std::unique_ptr<Session>> Session::create(const gsnav_eval::Options& opti
                                       gsnav::append_bodies(*scene, t0, t1, out);
                                     });
   if (!world) return world.status();
-  gsnav::RenderOptions draws{stage.config.render};
+  gsnav::RenderOptions draws{stage.config.render, gsnav::detail_choice(stage.config)};
   draws.render.outputs = gsnav::kRgb | gsnav::kMedianDepth;
   auto renderer = gsnav::Renderer::create(options.device, stage.scene, draws);
   if (!renderer) return renderer.status();
@@ -91,7 +91,7 @@ Session::Session(const gsnav_eval::Options& options, gsnav_eval::Stage stage, co
     : stage_(std::move(stage)),
       how_(how),
       depth_colors_(depth_colors(how)),
-      scene_name_(options.scene.empty() ? "embedded flat" : options.scene),
+      scene_name_(options.scene == "default" ? "embedded flat" : options.scene),
       world_(std::move(world)),
       renderer_(std::move(renderer)),
       without_people_(std::move(without_people)),

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "device_option.hpp"
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+namespace gsnav_tools {
+
+void add_device_option(CLI::App& app, gsnav::Device& device, bool* float64) {
+  const auto read = [&device, float64](const std::string& name) {
+    if (float64 != nullptr && name == "serial64") {
+      *float64 = true;
+      return;
+    }
+    const auto found = gsnav::Device::parse(name);
+    if (!found) throw CLI::ValidationError("--device", found.message());
+    device = *found;
+  };
+  std::string what =
+      "what renders: best (a GPU if there is one, else cpu), cpu, cpu:THREADS, cuda, cuda:NUMBER, "
+      "serial";
+  if (float64 != nullptr) what += ", serial64 (the float64 reference)";
+  app.add_option_function<std::string>("--device", read, what)->default_str("best")->force_callback();
+}
+
+}  // namespace gsnav_tools

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "parse_options.hpp"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <sstream>
+#include <string>
+
+#include "gsnav/core/printable.hpp"
+#include "gsnav/version.hpp"
+
+namespace gsnav_tools {
+namespace {
+
+std::string version() {
+  return std::to_string(GSNAV_VERSION_MAJOR) + "." + std::to_string(GSNAV_VERSION_MINOR) + "." +
+         std::to_string(GSNAV_VERSION_PATCH);
+}
+
+/// What to say of an option that there is not, with one that was perhaps meant; empty where all are known.
+std::string unknown_option(const CLI::App& app) {
+  for (const std::string& word : app.remaining(true)) {
+    if (!word.starts_with("-")) continue;
+    const std::string option = word.substr(0, word.find('='));
+    for (const CLI::Option* known : app.get_options()) {
+      const std::string name = "--" + (known->get_lnames().empty() ? "" : known->get_lnames()[0]);
+      if (name.starts_with(option) || option.starts_with(name))
+        return "there is no option " + option + "; did you mean " + name + "?";
+    }
+    return "there is no option " + option;
+  }
+  return {};
+}
+
+}  // namespace
+
+std::optional<int> parse_options(CLI::App& app, int argc, const char* const* argv,
+                                 const std::function<void()>& check) {
+  const std::string name = argc > 0 ? std::filesystem::path(argv[0]).filename().string() : "";
+  app.name(name);
+  app.set_version_flag("--version", name + " " + version());
+  std::setvbuf(stdout, nullptr, _IOLBF, BUFSIZ);  // what goes to a pipe keeps its place among errors
+  try {
+    app.parse(argc, argv);
+    if (check) check();
+  } catch (const CLI::ParseError& error) {
+    if (const std::string unknown = unknown_option(app);
+        !unknown.empty() && error.get_exit_code() != 0) {
+      std::fprintf(stderr, "%s: %s\nRun with --help for more information.\n", name.c_str(),
+                   gsnav::printable(unknown).c_str());
+      return kUsage;
+    }
+    std::ostringstream out, err;
+    const int status = app.exit(error, out, err);
+    std::fputs(gsnav::printable(out.str()).c_str(), stdout);
+    std::fputs(gsnav::printable(err.str()).c_str(), stderr);
+    return status == 0 ? 0 : kUsage;
+  }
+  return {};
+}
+
+int fail(const std::string& program, const std::string& message) {
+  std::fprintf(stderr, "%s: %s\n", program.c_str(), gsnav::printable(message).c_str());
+  return kFailed;
+}
+
+}  // namespace gsnav_tools

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene_options.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+
+#include "device_option.hpp"
+#include "gsnav/core/lower_case.hpp"
+#include "gsnav/core/printable.hpp"
+#include "gsnav/scene/prepare.hpp"
+#include "progress.hpp"
+#include "voxel_options.hpp"
+
+namespace gsnav_tools {
+namespace {
+
+constexpr const char* kGroup = "Scene";
+
+void add_file_options(CLI::App& app, SceneOptions& o) {
+  app.add_option("--scene", o.scene,
+                 "default (the embedded flat), a file of Gaussians (.ply, .sog, .spz, .splat, .ksplat, "
+                 ".glb), a folder, tiles (DIR/2_0,2_1), triangles (.glb, .obj), or a Habitat scene "
+                 "(SET.scene_dataset_config.json#NAME, NAME.stage_config.json)")
+      ->capture_default_str()
+      ->type_name("SCENE")
+      ->group(kGroup);
+  app.add_option("--up", o.up,
+                 "axis of the file that points up: x, y, z, -x, -y or -z; auto: guessed from the ground; "
+                 "keep: the file's axes stay")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "keep", "x", "y", "z", "+x", "+y", "+z", "-x", "-y", "-z"}))
+      ->type_name("AXIS")
+      ->group(kGroup);
+  app.add_option("--time", o.time, "moment of a scene that moves (4D Gaussians), seconds")
+      ->capture_default_str()
+      ->group(kGroup);
+}
+
+void add_storage_option(CLI::App& app, SceneOptions& o) {
+  app.add_option("--storage", o.storage,
+                 "full; compact: SH in half of the memory; packed: all in a third (docs/formats.md)")
+      ->check(CLI::IsMember({"full", "compact", "packed"}))
+      ->capture_default_str()
+      ->group(kGroup);
+}
+
+void add_drawing_options(CLI::App& app, SceneOptions& o) {
+  app.add_option("--profile", o.profile,
+                 "accuracy: exact, fast (docs/accuracy.md), or lod: a level of detail for each part of "
+                 "the scene (docs/lod.md)")
+      ->check(CLI::IsMember({"exact", "fast", "lod"}))
+      ->capture_default_str()
+      ->group(kGroup);
+  app.add_option("--lod-error", o.lod_error,
+                 "of the profile lod: how far merged Gaussians may be off, pixels")
+      ->check(CLI::Range(0.01, 100.0))
+      ->capture_default_str()
+      ->group(kGroup);
+  app.add_option("--lod-levels", o.lod_levels,
+                 "of the profile lod: shipped, those that a streamed set has, where it has any; built: "
+                 "from its finest level. What was built is kept beside the scene's file")
+      ->check(CLI::IsMember({"shipped", "built"}))
+      ->capture_default_str()
+      ->group(kGroup);
+  app.add_option("--visible-sets", o.visible_sets,
+                 "of the profiles fast and lod: draw only what is seen from where the camera is; a file "
+                 "(gsnav-navmesh writes it), or auto: found for places on the NavMesh, and kept beside "
+                 "the scene's file")
+      ->type_name("FILE")
+      ->group(kGroup);
+  app.add_option("--mesh", o.meshes,
+                 "triangle meshes among the Gaussians (.gltf and .glb with colours and textures; .obj "
+                 "and .ply grey), in the axes of the scene's file (docs/composition.md)")
+      ->type_name("FILE")
+      ->group(kGroup);
+}
+
+void add_navmesh_options(CLI::App& app, SceneOptions& o) {
+  app.add_option("--navmesh", o.navmesh,
+                 "a file (.navmesh, .bin); auto: the one beside the scene's file, else built; built of "
+                 "gaussians, or mesh (triangles); none")
+      ->capture_default_str()
+      ->type_name("FILE")
+      ->check([](const std::string& v) {
+        const std::string name = gsnav::lower_case(v);
+        const bool known = v == "auto" || v == "mesh" || v == "gaussians" || v == "none";
+        if (known || name.ends_with(".navmesh") || name.ends_with(".bin")) return std::string();
+        return "--navmesh " + v +
+               ": use auto, mesh, gaussians, none, or a file that ends in .navmesh or .bin";
+      })
+      ->group(kGroup);
+  add_voxel_options(app, o.cell_size, o.crop, kGroup);
+}
+
+void add_people_options(CLI::App& app, SceneOptions& o) {
+  app.add_option("--avatars", o.avatars,
+                 "people walking about; 0: those of a Habitat data set, where it has any")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 64))
+      ->group(kGroup);
+  app.add_option("--seed", o.seed, "decides people, episodes and random policies; the same gives the same run")
+      ->capture_default_str()
+      ->group(kGroup);
+  app.add_option("--density", o.density, "of the embedded flat's Gaussians and of people's")
+      ->capture_default_str()
+      ->check(CLI::Range(0.05, 20.0))
+      ->group(kGroup);
+}
+
+}  // namespace
+
+void add_scene_options(CLI::App& app, SceneOptions& o, bool* float64) {
+  add_file_options(app, o);
+  add_storage_option(app, o);
+  add_drawing_options(app, o);
+  add_navmesh_options(app, o);
+  add_people_options(app, o);
+  add_device_option(app, o.device, float64);
+}
+
+gsnav::OpenOptions open_options(const SceneOptions& o) {
+  gsnav::OpenOptions how;
+  how.device = o.device;
+  how.up = o.up;
+  how.time = o.time;
+  how.storage = o.storage == "packed"    ? gsnav::CloudStorage::packed
+                : o.storage == "compact" ? gsnav::CloudStorage::compact
+                                         : gsnav::CloudStorage::full;
+  how.unseen_color = o.profile == "exact" ? 0 : gsnav::kUnseenColor;
+  how.levels = o.profile != "lod"        ? gsnav::SceneLevels::none
+               : o.lod_levels == "built" ? gsnav::SceneLevels::built
+                                         : gsnav::SceneLevels::shipped;
+  how.visible_sets = o.visible_sets;
+  how.meshes = o.meshes;
+  how.navmesh = o.navmesh;
+  how.cell_size = o.cell_size;
+  if (o.crop.size() == 6) how.crop = box_of(o.crop);
+  how.people = static_cast<std::size_t>(o.avatars);
+  how.seed = o.seed;
+  how.density = o.density;
+  return how;
+}
+
+gsnav::Result<gsnav::OpenedScene> open_scene(const SceneOptions& o, const gsnav::OpenOptions& how,
+                                             std::FILE* notes) {
+  if (!o.visible_sets.empty() && o.profile == "exact") {
+    return {gsnav::Errc::invalid_argument,
+            "--visible-sets: sampled, so not for --profile exact; use fast or lod"};
+  }
+  gsnav::OpenOptions asked = how;
+  asked.progress = progress_printer();
+  auto scene = gsnav::open_scene(o.scene, asked);
+  if (!scene) return scene;
+  for (const std::string& note : scene->notes)
+    std::fprintf(notes, "%s\n", gsnav::printable(note).c_str());
+  std::fflush(notes);
+  for (const std::string& warning : scene->warnings)
+    std::fprintf(stderr, "warning: %s\n", gsnav::printable(warning).c_str());
+  return scene;
+}
+
+gsnav::Quality quality_of(const SceneOptions& o) {
+  return o.profile == "exact" ? gsnav::Quality::exact() : gsnav::Quality::fast();
+}
+
+gsnav::DetailChoice detail_of(const SceneOptions& o, const gsnav::OpenedScene& scene) {
+  gsnav::DetailChoice out;
+  if (o.profile == "lod") {
+    out.lod = gsnav::LodChoice{};
+    out.lod->pixels = o.lod_error;
+  }
+  const auto& assets = scene.scene->assets;
+  out.visible_sets = !assets.empty() && assets.front().visible != nullptr;
+  return out;
+}
+
+}  // namespace gsnav_tools

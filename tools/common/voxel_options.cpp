@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "voxel_options.hpp"
+
+#include <CLI/CLI.hpp>
+
+namespace gsnav_tools {
+
+void add_voxel_options(CLI::App& app, double& cell_size, std::vector<double>& crop,
+                       const std::string& group) {
+  app.add_option("--cell-size", cell_size,
+                 "voxel edge of the NavMesh, metres; from Gaussians its height too, if 0.05 or more")
+      ->capture_default_str()
+      ->group(group);
+  app.add_option("--crop", crop,
+                 "build the NavMesh in this box only: X0 Y0 Z0 X1 Y1 Z1, metres in the world (Y up)")
+      ->expected(6)
+      ->group(group);
+}
+
+gsnav::Aabb<double> box_of(const std::vector<double>& corners) {
+  gsnav::Aabb<double> box;
+  box.add(gsnav::Vec3d{corners[0], corners[1], corners[2]});
+  box.add(gsnav::Vec3d{corners[3], corners[4], corners[5]});
+  return box;
+}
+
+}  // namespace gsnav_tools
