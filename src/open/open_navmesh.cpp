@@ -48,7 +48,8 @@ Result<std::optional<NavMeshChoice>> choose(const OpeningScene& s) {
   if (asked == "gaussians" || asked == "auto") {
     if (asked == "gaussians" && !gaussians) return bad(s.source.name + " has no Gaussians; use mesh");
     // A stage's own triangles are the whole of it; those of OpenOptions::meshes stand among Gaussians.
-    const bool whole = s.source.embedded || !s.source.stage_mesh.empty() || !s.source.collision_mesh.empty();
+    const bool whole =
+        s.source.embedded || !s.source.stage_mesh.empty() || !s.source.collision_mesh.empty();
     if (asked == "auto" && (whole || !gaussians)) return Choice({"", true});
     if (s.scene.assets.front().packed != nullptr)
       return bad("not of packed Gaussians; use storage full or compact, or a file");
@@ -70,17 +71,20 @@ Result<NavMesh> build(OpeningScene& s, const NavMeshChoice& choice, double radiu
   GaussianNavOptions how;
   how.crop = o.crop;
   if (o.progress) {
-    how.progress = [&o, what](const char* stage, double share) { o.progress(what + ": " + stage, share); };
+    how.progress = [&o, what](const char* stage, double share) {
+      o.progress(what + ": " + stage, share);
+    };
   }
   if (s.source.embedded) how.solid_alpha = 0.2;  // the flat's surfaces are as thin as paper
   const SceneAsset& asset = s.scene.assets.front();
   const GaussianSet set = asset.cloud->set(asset.world_from_asset);
   const bool beside = !s.source.embedded;  // the flat's triangles are the same surfaces
-  auto built = build_navmesh(settings, std::span(&set, 1),
-                             beside ? std::span<const Vec3d>(s.triangles.vertices) : std::span<const Vec3d>(),
-                             beside ? std::span<const NavMesh::Triangle>(s.triangles.triangles)
-                                    : std::span<const NavMesh::Triangle>(),
-                             how);
+  auto built =
+      build_navmesh(settings, std::span(&set, 1),
+                    beside ? std::span<const Vec3d>(s.triangles.vertices) : std::span<const Vec3d>(),
+                    beside ? std::span<const NavMesh::Triangle>(s.triangles.triangles)
+                           : std::span<const NavMesh::Triangle>(),
+                    how);
   if (!built) return {built.code(), s.source.name + ": " + built.message()};
   return std::move(built->mesh);
 }
@@ -121,8 +125,8 @@ Status open_navmesh(OpeningScene& s) {
   if (!choice) return choice.status();
   if (*choice) {
     const NavMeshChoice& c = **choice;
-    auto mesh = c.file.empty() ? build(s, c, o.agent_radius, o.agent_height, "NavMesh")
-                               : load_navmesh(c.file);
+    auto mesh =
+        c.file.empty() ? build(s, c, o.agent_radius, o.agent_height, "NavMesh") : load_navmesh(c.file);
     if (!mesh) return mesh.status();
     s.out.navmesh_source = !c.file.empty() ? "from " + c.file
                            : c.triangles   ? "from the mesh"
@@ -133,8 +137,7 @@ Status open_navmesh(OpeningScene& s) {
     s.note("NavMesh " + s.out.navmesh_source + text);
     s.scene.navmesh = std::make_shared<const NavMesh>(std::move(*mesh));
   }
-  s.out.navmesh_seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - from).count();
+  s.out.navmesh_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - from).count();
   return add_people(s, *choice);
 }
 
@@ -166,8 +169,7 @@ Status open_visible_sets(OpeningScene& s) {
   if (s.scene.navmesh == nullptr) return bad("they are found from a NavMesh, and there is none");
   VisibleSettings settings;
   settings.serve(o.eye);
-  if (o.progress)
-    settings.progress = [&o](double share) { o.progress("visible sets", share); };
+  if (o.progress) settings.progress = [&o](double share) { o.progress("visible sets", share); };
   const double heights[] = {o.eye.position().y};
   const auto viewpoints = navmesh_viewpoints(*s.scene.navmesh, heights, settings.spacing());
   if (!viewpoints) return viewpoints.status();

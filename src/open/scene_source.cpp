@@ -63,8 +63,9 @@ Result<SceneSource> of_dataset(const std::string& file, const std::string& wante
     for (std::size_t i = 0; i < dataset->scenes.size() && i < 20; ++i)
       list += (i == 0 ? "" : ", ") + dataset->scenes[i].name;
     if (dataset->scenes.size() > 20) list += ", ...";
-    return {Errc::invalid_argument, file + (wanted.empty() ? ": name one of its scenes, " + file + "#NAME"
-                                                           : ": has no scene '" + wanted + "'") +
+    return {Errc::invalid_argument, file +
+                                        (wanted.empty() ? ": name one of its scenes, " + file + "#NAME"
+                                                        : ": has no scene '" + wanted + "'") +
                                         "; it has " + std::to_string(dataset->scenes.size()) +
                                         (list.empty() ? "" : ": " + list)};
   }

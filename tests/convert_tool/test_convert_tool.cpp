@@ -366,6 +366,24 @@ TEST_CASE("convert: edits, in their order") {
   CHECK(kept == 20);
 }
 
+TEST_CASE("convert: the axis that is said to be up points to +Y afterwards") {
+  const TempFolder folder("convert_up");
+  REQUIRE(io::save_ply(folder / "in.ply", cloud_of_random_rows(40, 0, 4)).ok());
+  const GaussianCloud source = load(folder, "in.ply");
+  const Outcome out = run(folder, "in.ply a.ply --views 0 --up -z");
+  CAPTURE(out.text);
+  REQUIRE(out.ok);
+  const GaussianCloud made = load(folder, "a.ply");
+  for (std::size_t i = 0; i < source.size(); ++i) {
+    const Vec3d m = source.mean(i), turned{m.x, -m.z, m.y};
+    double nearest = 1e9;
+    for (std::size_t k = 0; k < made.size(); ++k)
+      nearest = std::min(nearest, norm(made.mean(k) - turned));
+    CHECK(nearest < 1e-4);
+  }
+  CHECK_FALSE(run(folder, "in.ply a.ply --up w").ok);
+}
+
 TEST_CASE("convert: what was read, dropped and repaired is said line by line") {
   const TempFolder folder("convert_report");
   PlyFile file;

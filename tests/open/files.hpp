@@ -39,8 +39,8 @@ inline gsnav::GaussianCloud room_z_up() {
 /// A square floor as a Wavefront OBJ: y up, corners at (+-half, 0, +-half).
 inline std::string floor_obj(double half) {
   const std::string h = std::to_string(half);
-  return "v -" + h + " 0 -" + h + "\nv -" + h + " 0 " + h + "\nv " + h + " 0 " + h + "\nv " + h + " 0 -" +
-         h + "\nf 1 2 3\nf 1 3 4\n";
+  return "v -" + h + " 0 -" + h + "\nv -" + h + " 0 " + h + "\nv " + h + " 0 " + h + "\nv " + h +
+         " 0 -" + h + "\nf 1 2 3\nf 1 3 4\n";
 }
 
 }  // namespace gsnav_test

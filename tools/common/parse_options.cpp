@@ -18,7 +18,8 @@ std::string version() {
          std::to_string(GSNAV_VERSION_PATCH);
 }
 
-/// What to say of an option that there is not, with one that was perhaps meant; empty where all are known.
+/// What to say of an option that there is not, with one that was perhaps meant; empty where all are
+/// known.
 std::string unknown_option(const CLI::App& app) {
   for (const std::string& word : app.remaining(true)) {
     if (!word.starts_with("-")) continue;

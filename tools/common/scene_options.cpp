@@ -24,9 +24,10 @@ void add_file_options(CLI::App& app, SceneOptions& o) {
       ->capture_default_str()
       ->type_name("SCENE")
       ->group(kGroup);
-  app.add_option("--up", o.up,
-                 "axis of the file that points up: x, y, z, -x, -y or -z; auto: guessed from the ground; "
-                 "keep: the file's axes stay")
+  app.add_option(
+         "--up", o.up,
+         "axis of the file that points up: x, y, z, -x, -y or -z; auto: guessed from the ground; "
+         "keep: the file's axes stay")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "keep", "x", "y", "z", "+x", "+y", "+z", "-x", "-y", "-z"}))
       ->type_name("AXIS")
@@ -98,7 +99,8 @@ void add_people_options(CLI::App& app, SceneOptions& o) {
       ->capture_default_str()
       ->check(CLI::Range(0, 64))
       ->group(kGroup);
-  app.add_option("--seed", o.seed, "decides people, episodes and random policies; the same gives the same run")
+  app.add_option("--seed", o.seed,
+                 "decides people, episodes and random policies; the same gives the same run")
       ->capture_default_str()
       ->group(kGroup);
   app.add_option("--density", o.density, "of the embedded flat's Gaussians and of people's")

@@ -23,15 +23,15 @@ struct SceneOptions {
   std::string scene = "default";
   std::string up = "auto";
   double time = 0;
-  std::string storage = "full";            ///< full, compact, packed
-  std::string profile = "exact";           ///< exact, fast, lod
+  std::string storage = "full";   ///< full, compact, packed
+  std::string profile = "exact";  ///< exact, fast, lod
   double lod_error = gsnav::LodChoice{}.pixels;
-  std::string lod_levels = "shipped";      ///< shipped, built
-  std::string visible_sets;                ///< auto or a file; empty: none
+  std::string lod_levels = "shipped";  ///< shipped, built
+  std::string visible_sets;            ///< auto or a file; empty: none
   std::vector<std::string> meshes;
-  std::string navmesh = "auto";            ///< as gsnav::OpenOptions::navmesh
-  double cell_size = 0.05;                 ///< metres
-  std::vector<double> crop;                ///< x0 y0 z0 x1 y1 z1 in the world; empty: all of the scene
+  std::string navmesh = "auto";  ///< as gsnav::OpenOptions::navmesh
+  double cell_size = 0.05;       ///< metres
+  std::vector<double> crop;      ///< x0 y0 z0 x1 y1 z1 in the world; empty: all of the scene
   int avatars = 3;
   std::uint64_t seed = 1;
   double density = 1.0;

@@ -23,7 +23,7 @@ using namespace gsnav;
 struct Options {
   std::vector<std::string> paths;
   std::vector<double> crop, rotate, translate;
-  std::string cameras, order = "read";
+  std::string cameras, order = "read", up = "keep";
   double time = 0, scale = 1, min_opacity = 0, max_scale = 0;
   int level = 0, degree = kMaxShDegree, views = 6, width = 640, height = 480;
 };
@@ -101,8 +101,13 @@ Status edit(GaussianCloud& cloud, const Options& o) {
     if (!(norm(axis) > 0)) return {Errc::invalid_argument, "--rotate: the axis is zero"};
     by.rotation = axis_angle(normalized(axis), o.rotate[3] * 3.14159265358979323846 / 180);
   }
+  if (o.up != "keep") {
+    const auto turned = upright(o.up == "auto" ? axis_name(guess_up(cloud).up) : o.up);
+    if (!turned) return {turned.code(), "--up: " + turned.message()};
+    by.rotation = by.rotation * turned->rotation;
+  }
   if (!o.translate.empty()) by.translation = {o.translate[0], o.translate[1], o.translate[2]};
-  if (!o.rotate.empty() || !o.translate.empty() || o.scale != 1) transform(cloud, by);
+  if (o.up != "keep" || !o.rotate.empty() || !o.translate.empty() || o.scale != 1) transform(cloud, by);
   if (cloud.size() == 0) return {Errc::invalid_argument, "no Gaussian is left"};
   if (!is_finite(cloud))
     return {Errc::invalid_argument,
@@ -203,7 +208,12 @@ int main(int argc, char** argv) {
   app.add_option("--max-scale", o.max_scale, "Drop Gaussians with a larger standard deviation, metres");
   app.add_option("--sh", o.degree, "Keep SH bands up to this degree")
       ->check(CLI::Range(0, kMaxShDegree));
-  app.add_option("--rotate", o.rotate, "Turn about the axis X Y Z by DEGREES")->expected(4);
+  app.add_option("--up", o.up,
+                 "Turn the scene so that this axis points to +Y: x, y, z, -x, -y or -z; auto: as the "
+                 "ground says")
+      ->check(CLI::IsMember({"keep", "auto", "x", "y", "z", "+x", "+y", "+z", "-x", "-y", "-z"}))
+      ->capture_default_str();
+  app.add_option("--rotate", o.rotate, "Then turn about the axis X Y Z by DEGREES")->expected(4);
   app.add_option("--scale", o.scale, "Then scale by this factor")->check(CLI::PositiveNumber);
   app.add_option("--translate", o.translate, "Then move by X Y Z metres")->expected(3);
   app.add_option("--order", o.order,

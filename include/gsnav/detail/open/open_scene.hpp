@@ -56,8 +56,8 @@ struct OpenOptions {
   /// "gaussians": built of the Gaussians, and triangles where there are any; else a file (.navmesh,
   /// .bin).
   std::string navmesh{};
-  double cell_size = 0.05;                 ///< edge of its voxels, metres
-  std::optional<Aabb<double>> crop{};      ///< build it in this box only; world, metres
+  double cell_size = 0.05;                        ///< edge of its voxels, metres
+  std::optional<Aabb<double>> crop{};             ///< build it in this box only; world, metres
   double agent_radius = 0.1, agent_height = 1.5;  ///< it is built for, metres
 
   // ---- what is seen from where
@@ -82,23 +82,25 @@ struct OpenOptions {
 /// A scene with all that was found or asked for. World frame: metres, Y up (with OpenOptions::up "keep",
 /// the file's own).
 struct OpenedScene {
-  std::string name;                             ///< as it was asked for; "embedded flat" for "default"
-  std::shared_ptr<const SimulatorScene> scene;  ///< of it assets[0] are the Gaussians, where there are any
-  LoadReport report;                            ///< of reading the Gaussians
-  std::string up = "y";        ///< axis of the file that was taken as up, as OpenOptions::up has it
-  bool up_guessed = false;     ///< from the ground, report.up_confidence
-  std::string navmesh_source;  ///< "from the mesh", "from FILE", ...; empty: there is none
-  std::vector<std::string> notes;     ///< what was found and made, step by step
-  std::vector<std::string> warnings;  ///< what was left out or taken otherwise than asked for
+  std::string name;  ///< as it was asked for; "embedded flat" for "default"
+  std::shared_ptr<const SimulatorScene>
+      scene;                       ///< of it assets[0] are the Gaussians, where there are any
+  LoadReport report;               ///< of reading the Gaussians
+  std::string up = "y";            ///< axis of the file that was taken as up, as OpenOptions::up has it
+  bool up_guessed = false;         ///< from the ground, report.up_confidence
+  std::string navmesh_source;      ///< "from the mesh", "from FILE", ...; empty: there is none
+  std::vector<std::string> notes;  ///< what was found and made, step by step
+  std::vector<std::string> warnings;             ///< what was left out or taken otherwise than asked for
   double load_seconds = 0, navmesh_seconds = 0;  ///< time taken
 };
 
 /// Opens a scene by its name:
 ///
 ///     "default"                                   the flat that gsnav makes by code alone
-///     flat.ply, flat.spz, flat.sog, flat.glb ...  what io::load_scene reads; a folder, tiles: DIR/2_0,2_1
-///     room.glb, room.obj                          triangles alone
-///     set.scene_dataset_config.json#NAME          a scene of a Habitat dataset; #NAME may be left out of a
+///     flat.ply, flat.spz, flat.sog, flat.glb ...  what io::load_scene reads; a folder, tiles:
+///     DIR/2_0,2_1 room.glb, room.obj                          triangles alone
+///     set.scene_dataset_config.json#NAME          a scene of a Habitat dataset; #NAME may be left out
+///     of a
 ///                                                 dataset of one
 ///     flat.stage_config.json                      a Habitat stage
 ///
