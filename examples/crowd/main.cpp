@@ -6,7 +6,8 @@
 #include <filesystem>
 #include <string>
 
-#include "../nav_loop/canvas.hpp"
+#include "../../tools/common/canvas.hpp"
+#include "../../tools/common/parse_options.hpp"
 #include "crowd.hpp"
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/demo.hpp"
@@ -15,8 +16,8 @@
 namespace {
 
 using namespace gsnav;
-using nav_loop::Canvas;
-using nav_loop::Rgb;
+using gsnav_tools::Canvas;
+using gsnav_tools::Rgb;
 
 constexpr double kPixels = 32;  // a metre
 constexpr Rgb kPaper{0.97f, 0.97f, 0.96f}, kFloor{0.86f, 0.88f, 0.90f}, kPeople{0.85f, 0.45f, 0.25f},
@@ -64,12 +65,14 @@ Status pictures(const std::filesystem::path& folder, const NavMesh& mesh, const 
   for (int c = 0; c < kColumns; ++c) {
     const std::size_t tick = last * static_cast<std::size_t>(c + 1) / kColumns;
     char text[32];
-    std::snprintf(text, sizeof text, "%.1f", static_cast<double>(tick) * crowd::kTick);
+    std::snprintf(text, sizeof text, "%.1f S", static_cast<double>(tick) * crowd::kTick);
     strip.text(kGap + c * w, 4, text, 2, kInk);
     for (int r = 0; r < rows; ++r) {
       draw(strip, mesh, e, outcomes[static_cast<std::size_t>(r)], tick, kGap + c * w, 14 + kGap + r * h);
     }
   }
+  for (int r = 0; r < rows; ++r)
+    strip.text(kGap + 4, 14 + kGap + r * h + 4, crowd::name_of(crowd::kPolicies[r]), 2, kInk);
   if (Status s = save(folder / "strip.png", strip); !s) return s;
   for (std::size_t tick = 0; frames && tick <= last; ++tick) {
     Canvas frame(2 * w + kGap, 2 * h + kGap, kPaper);
@@ -111,7 +114,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--out", out, "Folder for the pictures");
   app.add_flag("--frames", frames, "A picture for each tick, too");
-  CLI11_PARSE(app, argc, argv);
+  if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
   if (const Status s = out.empty() ? Status() : make_output_folder(out); !s) {
     std::fprintf(stderr, "crowd: --out %s\n", s.message().c_str());
     return 1;

@@ -10,14 +10,11 @@
 namespace nav_loop {
 namespace {
 
-constexpr float kNear = 0.3f, kFar = 7.0f;  // range of depth colours, metres
-constexpr std::size_t kMostShots = 64;      // kept in memory for the strip
+using gsnav_tools::Canvas;
+using gsnav_tools::MapContent;
+using gsnav_tools::Shot;
 
-std::vector<std::uint8_t> bytes_of(std::span<const float> rgb) {
-  std::vector<std::uint8_t> out(rgb.size());
-  gsnav::to_bytes(rgb, out);
-  return out;
-}
+constexpr std::size_t kMostShots = 64;  // kept in memory for the strip
 
 }  // namespace
 
@@ -54,7 +51,7 @@ gsnav::Status Recorder::add(const gsnav::World& world, const gsnav::Observations
     }
   }
   if (!save && !keep) return {};
-  Shot shot{bytes_of(obs["rgb"]), gsnav::io::colorize_depth(obs["depth"], kNear, kFar)};
+  Shot shot = gsnav_tools::shot_of(obs.time - world.episode().start_time, obs["rgb"], obs["depth"]);
   if (save) {
     char name[64];
     std::snprintf(name, sizeof name, "/frames/ep%03d_step%04zu", episode_, step);
@@ -96,17 +93,11 @@ void Recorder::end(const gsnav::World& world, const std::vector<gsnav::AvatarAct
 
 gsnav::Status Recorder::write_strip() const {
   const std::vector<Shot>& shots = best_.shots;
-  const int columns = static_cast<int>(std::min<std::size_t>(8, shots.size()));
-  const int w = options_.width, h = options_.height, gap = 4;
-  Canvas sheet(columns * (w + gap) + gap, 2 * (h + gap) + gap, {1, 1, 1});
-  for (int i = 0; i < columns; ++i) {
-    const std::size_t at = columns == 1 ? 0
-                                        : static_cast<std::size_t>(i) * (shots.size() - 1) /
-                                              static_cast<std::size_t>(columns - 1);
-    const int x = gap + i * (w + gap);
-    sheet.paste(shots[at].rgb.data(), w, h, x, gap);
-    sheet.paste(shots[at].depth.data(), w, h, x, h + 2 * gap);
-  }
+  const std::size_t columns = std::min<std::size_t>(8, shots.size());
+  std::vector<Shot> shown;
+  for (std::size_t i = 0; i < columns; ++i)
+    shown.push_back(shots[columns == 1 ? 0 : i * (shots.size() - 1) / (columns - 1)]);
+  const Canvas sheet = gsnav_tools::draw_strip(shown, options_.width, options_.height);
   return gsnav::io::save_png_rgb8(options_.out + "/strip.png", sheet.bytes(), sheet.width(),
                                   sheet.height());
 }

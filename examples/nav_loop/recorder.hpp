@@ -5,8 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/sim/basic_simulator.hpp"
-#include "map.hpp"
+#include "../../tools/common/map.hpp"
+#include "../../tools/common/strip.hpp"
+#include "gsnav/sim.hpp"
 #include "options.hpp"
 
 namespace nav_loop {
@@ -26,12 +27,9 @@ class Recorder {
   gsnav::Status finish(const gsnav::SimulatorScene& scene);
 
  private:
-  struct Shot {
-    std::vector<std::uint8_t> rgb, depth;
-  };
   struct Take {  // one episode
-    std::vector<Shot> shots;
-    MapContent map;
+    std::vector<gsnav_tools::Shot> shots;
+    gsnav_tools::MapContent map;
     double interest = -1.0;
   };
   gsnav::Status write_strip() const;

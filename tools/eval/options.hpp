@@ -5,12 +5,18 @@
 #include <string>
 #include <vector>
 
-#include "../../examples/nav_loop/options.hpp"
+#include "../common/scene_options.hpp"
 
 namespace gsnav_eval {
 
-/// What both programs are asked for; scene, people and seed as nav_loop has them.
-struct Options : nav_loop::Options {
+/// What both programs, and the viewer, are asked for.
+struct Options : gsnav_tools::SceneOptions {
+  int episodes = 10;
+  std::string out = "out";
+  int width = 256, height = 256;
+  double hfov = 90.0;
+  double eye_height = 1.5;
+  int max_steps = 500;
   std::string policy = "follower";  ///< follower, greedy, random
   std::string episode_file;         ///< empty: generated
   std::string preset = "avatar";    ///< v1, v2, avatar

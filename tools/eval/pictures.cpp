@@ -3,8 +3,9 @@
 
 #include <algorithm>
 
-#include "../../examples/nav_loop/canvas.hpp"
-#include "../../examples/nav_loop/map.hpp"
+#include "../common/canvas.hpp"
+#include "../common/map.hpp"
+#include "../common/strip.hpp"
 #include "gsnav/io/image_file.hpp"
 
 namespace gsnav_eval {
@@ -12,7 +13,6 @@ namespace {
 
 using gsnav::Result;
 using gsnav::Status;
-constexpr float kNear = 0.3f, kFar = 7.0f;  // range of depth colours, metres
 constexpr std::size_t kShots = 4;
 
 }  // namespace
@@ -25,9 +25,9 @@ Status draw(Simulator& sim, const Stage& stage, const Record& record, const std:
             const std::filesystem::path& map_file) {
   const gsnav::PointNavEpisode& episode = stage.episodes[record.episode];
   const gsnav::SensorSpec& sensor = stage.config.sensors.front();
-  const int h = sensor.resolution[0], w = sensor.resolution[1], gap = 4;
-  nav_loop::Canvas sheet(static_cast<int>(kShots) * (w + gap) + gap, 2 * (h + gap) + gap, {1, 1, 1});
-  nav_loop::MapContent map;
+  const int h = sensor.resolution[0], w = sensor.resolution[1];
+  std::vector<gsnav_tools::Shot> shots;
+  gsnav_tools::MapContent map;
   map.navmesh = stage.scene->navmesh.get();
   map.goal = episode.goal_position;
   map.agent_radius = stage.config.task.agent_radius;
@@ -57,18 +57,16 @@ Status draw(Simulator& sim, const Stage& stage, const Record& record, const std:
       const auto obs = s.observe();
       s.set_rendering(false);
       if (!obs) return obs.status();
-      std::vector<std::uint8_t> rgb((*obs)["rgb"].size());
-      gsnav::to_bytes((*obs)["rgb"], rgb);
-      const int x = gap + static_cast<int>(k) * (w + gap);
-      sheet.paste(rgb.data(), w, h, x, gap);
-      sheet.paste(gsnav::io::colorize_depth((*obs)["depth"], kNear, kFar).data(), w, h, x, h + 2 * gap);
+      shots.push_back(
+          gsnav_tools::shot_of(obs->time - episode.start_time, (*obs)["rgb"], (*obs)["depth"]));
     }
     return {};
   };
   if (Status s = replay(sim, episode, record, look); !s) return s;
+  const gsnav_tools::Canvas sheet = gsnav_tools::draw_strip(shots, w, h);
   if (Status s = gsnav::io::save_png_rgb8(strip, sheet.bytes(), sheet.width(), sheet.height()); !s)
     return s;
-  const nav_loop::Canvas picture = draw_map(map);
+  const gsnav_tools::Canvas picture = draw_map(map);
   return gsnav::io::save_png_rgb8(map_file, picture.bytes(), picture.width(), picture.height());
 }
 

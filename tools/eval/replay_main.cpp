@@ -14,6 +14,7 @@
 #include <system_error>
 #include <vector>
 
+#include "../common/overlay.hpp"
 #include "../common/parse_options.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/core/replace_file.hpp"
@@ -107,6 +108,18 @@ struct Track {
   }
 };
 
+/// A picture with the agent's body drawn into it.
+std::vector<std::uint8_t> with_agent(const std::vector<std::uint8_t>& rgb, const gsnav::Camera& camera,
+                                     const std::vector<float>& depth, const gsnav::World& world) {
+  gsnav_tools::Canvas canvas(camera.width, camera.height, {0, 0, 0});
+  canvas.paste(rgb.data(), camera.width, camera.height, 0, 0);
+  const double radius = world.config().agent_radius, height = world.config().agent_height;
+  const Vec3d at = world.agent().position;
+  const gsnav::Capsule<double> body{at + Vec3d{0, radius, 0}, at + Vec3d{0, height - radius, 0}, radius};
+  gsnav_tools::draw_capsule({canvas, camera, depth}, body, {0.05f, 0.30f, 0.85f}, 0.85f);
+  return canvas.bytes();
+}
+
 Status run(const Options& o, const ReplayOptions& r) {
   if (Status s = r.video.empty() ? Status() : gsnav::check_output_path(r.video); !s) return s;
   if (Status s = gsnav::make_output_folder(r.frames); !s) return s;
@@ -149,10 +162,11 @@ Status run(const Options& o, const ReplayOptions& r) {
       camera = gsnav::Camera::look_at(eye, target, steep ? Vec3d{0, 0, -1} : Vec3d{0, 1, 0}, o.width,
                                       o.height, o.hfov);
     }
-    const auto frame = s.render(camera);
+    const auto frame = s.render(camera, gsnav::kRgb | gsnav::kMedianDepth);
     if (!frame) return frame.status();
     std::vector<std::uint8_t> rgb((*frame)->rgb.size());
     gsnav::to_bytes((*frame)->rgb, rgb);
+    if (!r.eye.empty()) rgb = with_agent(rgb, camera, (*frame)->median_depth, s.world());
     if (video) return video->add(rgb);
     char name[32];
     std::snprintf(name, sizeof name, "%05zu.png", step);

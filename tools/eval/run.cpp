@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run.hpp"
 
+#include <cstdio>
 #include <optional>
 #include <utility>
 
-#include "../../examples/nav_loop/setup.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/sim.hpp"
@@ -20,20 +20,31 @@ Result<Stage> prepare(const Options& o) {
     return {gsnav::Errc::invalid_argument,
             "--storage packed: journals and maps read the floats; use full or compact"};
   }
-  auto setup = nav_loop::prepare(o);
-  if (!setup) return setup.status();
+  gsnav::OpenOptions how = gsnav_tools::open_options(o);
+  const std::vector<gsnav::SensorSpec> sensors =
+      gsnav::rgbd_sensors(o.height, o.width, o.hfov, {0, o.eye_height, 0});
+  how.eye = gsnav::sensor_camera(sensors[0], {}, {});
+  auto opened = gsnav_tools::open_scene(o, how, stderr);
+  if (!opened) return opened.status();
+  if (opened->scene->navmesh == nullptr) {
+    return {gsnav::Errc::invalid_argument, "--navmesh " + o.navmesh + ": agents need one; use auto"};
+  }
   Stage stage;
   stage.config.task = o.preset == "v2"       ? gsnav::TaskConfig::pointnav_v2()
                       : o.preset == "avatar" ? gsnav::TaskConfig::avatar_pointnav()
                                              : gsnav::TaskConfig{};
   stage.config.task.max_steps = o.max_steps;
   stage.config.render.quality = gsnav_tools::quality_of(o);
-  stage.config.lod = setup->detail.lod;
-  stage.config.visible_sets = setup->detail.visible_sets;
-  stage.config.sensors = gsnav::rgbd_sensors(o.height, o.width, o.hfov, {0, o.eye_height, 0});
+  const gsnav::DetailChoice detail = gsnav_tools::detail_of(o, *opened);
+  stage.config.lod = detail.lod;
+  stage.config.visible_sets = detail.visible_sets;
+  stage.config.sensors = sensors;
   if (o.episode_file.empty()) {
-    auto made = nav_loop::make_episodes(o, *setup->scene, stage.config.task);
+    auto made =
+        gsnav::generate_episodes(*opened->scene->navmesh, static_cast<std::size_t>(o.episodes), o.seed);
     if (!made) return made.status();
+    if (Status s = gsnav::draw_start_times(*made, *opened->scene, stage.config.task, o.seed); !s)
+      return s;
     stage.episodes = std::move(*made);
   } else {
     auto file = gsnav::io::load_episodes(o.episode_file);
@@ -42,7 +53,7 @@ Result<Stage> prepare(const Options& o) {
       std::fprintf(stderr, "%s\n", gsnav::printable(w).c_str());
     stage.episodes = std::move(file->episodes);
   }
-  stage.scene = setup->scene;
+  stage.scene = opened->scene;
   return stage;
 }
 

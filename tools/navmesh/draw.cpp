@@ -4,14 +4,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
+
+#include "../common/canvas.hpp"
 
 namespace gsnav_navmesh {
 namespace {
 
 using Rgb = std::array<std::uint8_t, 3>;
 
-constexpr std::size_t kMargin = 16;  // pixels
-constexpr Rgb kGround{250, 250, 248}, kBorder{40, 48, 58}, kBar{40, 48, 58};
+constexpr std::size_t kMargin = 16, kFoot = 24;  // pixels; the scale is in the foot
+constexpr Rgb kGround{250, 250, 248}, kBorder{40, 48, 58}, kInk{40, 48, 58};
 // Told apart by people who see colours differently (Okabe and Ito), lightened; the largest island is the
 // first.
 constexpr std::array<Rgb, 7> kIslands{{{160, 205, 235},
@@ -33,7 +36,7 @@ double bar_length(double width) {
 }
 
 MapPicture draw(const gsnav::TopDownMap& map, double bar) {
-  const std::size_t width = map.columns + 2 * kMargin, height = map.rows + 2 * kMargin + kMargin;
+  const std::size_t width = map.columns + 2 * kMargin, height = map.rows + 2 * kMargin + kFoot;
   MapPicture out{static_cast<int>(width), static_cast<int>(height), {}};
   out.rgb.resize(3 * width * height);
   const auto put = [&](std::size_t x, std::size_t y, const Rgb& c) {
@@ -56,8 +59,14 @@ MapPicture draw(const gsnav::TopDownMap& map, double bar) {
   }
   const auto pixels = static_cast<std::size_t>(bar / map.metres_per_cell + 0.5);
   for (std::size_t x = 0; x < std::min(std::max<std::size_t>(pixels, 1), map.columns); ++x) {
-    for (std::size_t y = 0; y < 3; ++y) put(kMargin + x, height - kMargin + y, kBar);
+    for (std::size_t y = 0; y < 3; ++y) put(kMargin + x, height - kFoot + y, kInk);
   }
+  char length[32];
+  std::snprintf(length, sizeof length, "%g m", bar);
+  gsnav_tools::Canvas canvas(out.width, out.height, {1, 1, 1});
+  canvas.paste(out.rgb.data(), out.width, out.height, 0, 0);
+  canvas.text(kMargin, out.height - static_cast<int>(kFoot) + 6, length, 2, {0.16f, 0.19f, 0.23f});
+  out.rgb = canvas.bytes();
   return out;
 }
 

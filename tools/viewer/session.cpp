@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "../common/overlay.hpp"
 #include "gsnav/io/image_file.hpp"
-#include "overlay.hpp"
 
 namespace gsnav_viewer {
 namespace {
@@ -96,17 +96,17 @@ Session::Session(const gsnav_eval::Options& options, gsnav_eval::Stage stage, co
       renderer_(std::move(renderer)),
       without_people_(std::move(without_people)),
       walkable_(walkable(*stage_.scene->navmesh)),
-      map_frame_(nav_loop::fit_map(*stage_.scene->navmesh, options.width, options.height)),
+      map_frame_(gsnav_tools::fit_map(*stage_.scene->navmesh, options.width, options.height)),
       ground_(options.width, options.height, {0.96f, 0.96f, 0.96f}) {
   controls_.paused = how.paused;
-  nav_loop::MapContent map;
+  gsnav_tools::MapContent map;
   map.navmesh = stage_.scene->navmesh.get();
   map.start = stage_.episodes.front().start_position;
   if (!stage_.scene->assets.empty()) {
     map.cloud = stage_.scene->assets.front().cloud.get();
     map.world_from_asset = stage_.scene->assets.front().world_from_asset;
   }
-  nav_loop::draw_ground(ground_, map_frame_, map);
+  gsnav_tools::draw_ground(ground_, map_frame_, map);
 }
 
 Status Session::begin_episode(std::size_t number) {
@@ -236,11 +236,11 @@ Status Session::draw_view(const Controls& c, const gsnav::CapsuleSet& bodies) {
   std::vector<std::uint8_t> rgb(frames_.rgb.size());
   gsnav::to_bytes(frames_.rgb, rgb);
   if (c.navmesh || c.capsules) {
-    nav_loop::Canvas canvas(camera.width, camera.height, {});
+    gsnav_tools::Canvas canvas(camera.width, camera.height, {});
     canvas.paste(rgb.data(), camera.width, camera.height, 0, 0);
-    const DrawnView view{canvas, camera, frames_.median_depth};
-    if (c.navmesh) draw_navmesh(view, walkable_);
-    if (c.capsules) draw_capsules(view, bodies.capsules());
+    const gsnav_tools::DrawnView view{canvas, camera, frames_.median_depth};
+    if (c.navmesh) gsnav_tools::draw_navmesh(view, walkable_);
+    if (c.capsules) gsnav_tools::draw_capsules(view, bodies.capsules());
     rgb = canvas.bytes();
   }
   if (Status s = publish(Panel::color, rgb); !s) return s;
@@ -250,13 +250,13 @@ Status Session::draw_view(const Controls& c, const gsnav::CapsuleSet& bodies) {
 }
 
 Status Session::draw_map(const Controls& c, const gsnav::CapsuleSet& bodies) {
-  constexpr nav_loop::Rgb kAgent{0.05f, 0.30f, 0.85f}, kGoal{0.86f, 0.10f, 0.16f},
+  constexpr gsnav_tools::Rgb kAgent{0.05f, 0.30f, 0.85f}, kGoal{0.86f, 0.10f, 0.16f},
       kShortest{0.15f, 0.15f, 0.17f};
-  nav_loop::Canvas canvas = ground_;
-  const nav_loop::MapFrame& f = map_frame_;
-  nav_loop::draw_polyline(canvas, f, shortest_, 0.8, kShortest, 0.6f);
-  nav_loop::draw_polyline(canvas, f, way_, 1.4, kAgent, 0.9f);
-  if (c.people) nav_loop::draw_bodies(canvas, f, bodies.capsules(), 0.6f);
+  gsnav_tools::Canvas canvas = ground_;
+  const gsnav_tools::MapFrame& f = map_frame_;
+  gsnav_tools::draw_polyline(canvas, f, shortest_, 0.8, kShortest, 0.6f);
+  gsnav_tools::draw_polyline(canvas, f, way_, 1.4, kAgent, 0.9f);
+  if (c.people) gsnav_tools::draw_bodies(canvas, f, bodies.capsules(), 0.6f);
   const Vec3d goal = world_.episode().goal_position;
   canvas.disc(f.x(goal), f.y(goal), 2.5, kGoal, 1.0f);
   canvas.ring(f.x(goal), f.y(goal), 6, 2, kGoal, 1.0f);

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "../../examples/nav_loop/map.hpp"
+#include "../common/map.hpp"
 #include "../eval/run.hpp"
 #include "controls.hpp"
 #include "gsnav/device/renderer.hpp"
@@ -72,8 +72,8 @@ class Session {
   gsnav::Frames<float> frames_;
   std::vector<std::array<gsnav::Vec3d, 3>>
       walkable_;  // triangles of the NavMesh's islands that are no table tops
-  nav_loop::MapFrame map_frame_;
-  nav_loop::Canvas ground_;
+  gsnav_tools::MapFrame map_frame_;
+  gsnav_tools::Canvas ground_;
   std::vector<gsnav::Vec3d> way_, shortest_;
   std::size_t episode_ = 0;
   double frame_seconds_ = 0.0, rate_ = 0.0;  // of the last frame; of the last ones

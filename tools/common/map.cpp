@@ -8,14 +8,12 @@
 #include "gsnav/demo.hpp"
 #include "gsnav/frame/sh.hpp"
 
-namespace nav_loop {
+namespace gsnav_tools {
 namespace {
 
 using gsnav::Vec3d;
 
-constexpr Rgb kNavMesh{0.36f, 0.66f, 0.86f}, kEdge{0.20f, 0.47f, 0.70f}, kShortest{0.15f, 0.15f, 0.17f};
-constexpr Rgb kAgent{0.05f, 0.30f, 0.85f}, kStart{0.10f, 0.60f, 0.25f}, kGoal{0.86f, 0.10f, 0.16f},
-    kInk{0.1f, 0.1f, 0.1f};
+constexpr Rgb kEdge{0.20f, 0.47f, 0.70f}, kInk{0.1f, 0.1f, 0.1f};
 constexpr double kMargin = 0.6;       // metres around the NavMesh
 constexpr double kLeastIsland = 1.5;  // metres: episodes use no smaller ones
 constexpr double kCutHeight = 1.95;   // metres above the floor: what hangs higher would hide the rooms
@@ -133,7 +131,7 @@ void draw_ground(Canvas& canvas, const MapFrame& f, const MapContent& m) {
     const auto on = m.navmesh->snap_point((t[0] + t[1] + t[2]) * (1.0 / 3.0), {{0.1, 0.5, 0.1}});
     if (!on || m.navmesh->island_radius(m.navmesh->island_of(on->poly)) < kLeastIsland)
       continue;  // a table top
-    canvas.triangle(p, kNavMesh, 0.32f);
+    canvas.triangle(p, kMapNavMesh, 0.32f);
     for (int i = 0; i < 3; ++i)
       canvas.stroke(p[i].x, p[i].y, p[(i + 1) % 3].x, p[(i + 1) % 3].y, 0.4, kEdge, 0.35f);
   }
@@ -151,19 +149,19 @@ Canvas draw_map(const MapContent& m) {
     draw_polyline(canvas, f, m.avatars[i], 1.6, avatar_color(i), 0.75f);
   for (std::size_t k = 0; k < m.snapshots.size(); ++k)
     draw_bodies(canvas, f, m.snapshots[k], k + 1 == m.snapshots.size() ? 0.55f : 0.13f);
-  dashed(canvas, f, m.shortest, 1.8, kShortest);
+  dashed(canvas, f, m.shortest, 1.8, kMapShortest);
   draw_polyline(canvas, f, m.agent, 3.2, {1, 1, 1}, 0.9f);
-  draw_polyline(canvas, f, m.agent, 2.2, kAgent, 1.0f);
+  draw_polyline(canvas, f, m.agent, 2.2, kMapAgent, 1.0f);
   if (!m.agent.empty()) {
     const Vec3d& end = m.agent.back();
-    canvas.disc(f.x(end), f.y(end), std::max(m.agent_radius * f.scale, 4.0), kAgent, 0.9f);
+    canvas.disc(f.x(end), f.y(end), std::max(m.agent_radius * f.scale, 4.0), kMapAgent, 0.9f);
   }
   canvas.disc(f.x(m.start), f.y(m.start), 8, {1, 1, 1}, 1.0f);
-  canvas.disc(f.x(m.start), f.y(m.start), 6, kStart, 1.0f);
-  canvas.disc(f.x(m.goal), f.y(m.goal), 4, kGoal, 1.0f);
-  canvas.ring(f.x(m.goal), f.y(m.goal), 10, 3, kGoal, 1.0f);
+  canvas.disc(f.x(m.start), f.y(m.start), 6, kMapStart, 1.0f);
+  canvas.disc(f.x(m.goal), f.y(m.goal), 4, kMapGoal, 1.0f);
+  canvas.ring(f.x(m.goal), f.y(m.goal), 10, 3, kMapGoal, 1.0f);
   scale_bar(canvas, f.scale);
   return canvas;
 }
 
-}  // namespace nav_loop
+}  // namespace gsnav_tools

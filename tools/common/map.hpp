@@ -9,7 +9,10 @@
 #include "gsnav/nav/navmesh.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
-namespace nav_loop {
+namespace gsnav_tools {
+
+inline constexpr Rgb kMapNavMesh{0.36f, 0.66f, 0.86f}, kMapShortest{0.15f, 0.15f, 0.17f},
+    kMapAgent{0.05f, 0.30f, 0.85f}, kMapStart{0.10f, 0.60f, 0.25f}, kMapGoal{0.86f, 0.10f, 0.16f};
 
 /// What the map of one episode shows. World frame, metres.
 struct MapContent {
@@ -49,4 +52,4 @@ Canvas draw_map(const MapContent& content);
 /// Colour of an avatar in maps.
 Rgb avatar_color(std::size_t index);
 
-}  // namespace nav_loop
+}  // namespace gsnav_tools

@@ -8,7 +8,7 @@
 
 #include "gsnav/math/vec.hpp"
 
-namespace nav_loop {
+namespace gsnav_tools {
 
 struct Rgb {
   float r = 0, g = 0, b = 0;
@@ -31,8 +31,10 @@ class Canvas {
   void ring(double x, double y, double radius, double width, Rgb color, float alpha);
   void triangle(const gsnav::Vec2<double> (&p)[3], Rgb color, float alpha);
   void rect(int x, int y, int w, int h, Rgb color, float alpha);
-  /// Digits, dot, space and m, three pixels by five times `scale`.
+  /// Digits, letters and . - / % , : + ( ), three pixels by five times `scale`; letters are capitals,
+  /// but for m, which stands for metres.
   void text(int x, int y, std::string_view s, int scale, Rgb color);
+  static int text_width(std::string_view s, int scale);
   /// Copies 8-bit pixels [h][w][3] to (x, y).
   void paste(const std::uint8_t* rgb, int w, int h, int x, int y);
 
@@ -43,4 +45,4 @@ class Canvas {
   std::vector<Rgb> pixels_;
 };
 
-}  // namespace nav_loop
+}  // namespace gsnav_tools

@@ -6,7 +6,7 @@
 
 #include "gsnav/math/functions.hpp"
 
-namespace nav_loop {
+namespace gsnav_tools {
 
 Canvas::Canvas(int width, int height, Rgb fill)
     : width_(width),
@@ -88,26 +88,48 @@ void Canvas::rect(int x, int y, int w, int h, Rgb color, float alpha) {
   }
 }
 
-void Canvas::text(int x, int y, std::string_view s, int scale, Rgb color) {
-  // Rows of bits, top first: three to a row, five for m.
+namespace {
+
+/// Five rows of three bits, top first.
+std::uint16_t glyph_of(char c) {
   static constexpr std::uint16_t kDigits[10] = {075557, 026227, 071747, 071717, 055711,
                                                 074717, 074757, 071111, 075757, 075717};
-  static constexpr std::uint16_t kDot = 000002;
-  static constexpr std::uint8_t kM[5] = {0, 0, 0b11110, 0b10101, 0b10101};
-  const auto pixel = [&](int col, int row) {
-    rect(x + col * scale, y + row * scale, scale, scale, color, 1.0f);
-  };
+  static constexpr std::uint16_t kLetters[26] = {025755, 065656, 034443, 065556, 074647, 074644, 034553,
+                                                 055755, 072227, 011152, 055655, 044447, 057755, 065555,
+                                                 025552, 065644, 025573, 065655, 034216, 072222, 055557,
+                                                 055552, 055775, 055255, 055222, 071247};
+  if (c >= '0' && c <= '9') return kDigits[c - '0'];
+  if (c >= 'A' && c <= 'Z') return kLetters[c - 'A'];
+  if (c >= 'a' && c <= 'z') return kLetters[c - 'a'];
+  constexpr std::string_view kSigns = ".-/%,:+()";
+  static constexpr std::uint16_t kOf[] = {000002, 000700, 011244, 051245, 000024,
+                                          002020, 002720, 012221, 042224};
+  const std::size_t at = kSigns.find(c);
+  return at == std::string_view::npos ? std::uint16_t{0} : kOf[at];
+}
+
+int glyph_width(char c) { return c == 'm' ? 5 : 3; }
+
+}  // namespace
+
+int Canvas::text_width(std::string_view s, int scale) {
+  int width = 0;
+  for (const char c : s) width += (glyph_width(c) + 1) * scale;
+  return width;
+}
+
+void Canvas::text(int x, int y, std::string_view s, int scale, Rgb color) {
+  static constexpr std::uint8_t kMetre[5] = {0, 0, 0b11110, 0b10101, 0b10101};
   for (const char c : s) {
-    const std::uint16_t glyph = c >= '0' && c <= '9' ? kDigits[c - '0'] : (c == '.' ? kDot : 0);
+    const int width = glyph_width(c);
     for (int row = 0; row < 5; ++row) {
-      for (int col = 0; col < 3; ++col) {
-        if (((glyph >> (3 * (4 - row) + (2 - col))) & 1) != 0) pixel(col, row);
-      }
-      for (int col = 0; c == 'm' && col < 5; ++col) {
-        if (((kM[row] >> (4 - col)) & 1) != 0) pixel(col, row);
+      const int bits = c == 'm' ? kMetre[row] : (glyph_of(c) >> (3 * (4 - row))) & 7;
+      for (int col = 0; col < width; ++col) {
+        if (((bits >> (width - 1 - col)) & 1) != 0)
+          rect(x + col * scale, y + row * scale, scale, scale, color, 1.0f);
       }
     }
-    x += (c == 'm' ? 6 : 4) * scale;
+    x += (width + 1) * scale;
   }
 }
 
@@ -131,4 +153,4 @@ std::vector<std::uint8_t> Canvas::bytes() const {
   return out;
 }
 
-}  // namespace nav_loop
+}  // namespace gsnav_tools

@@ -5,14 +5,14 @@
 #include <cmath>
 #include <optional>
 
-#include "../../examples/nav_loop/map.hpp"
+#include "map.hpp"
 
-namespace gsnav_viewer {
+namespace gsnav_tools {
 namespace {
 
 using gsnav::Vec3d;
 
-constexpr nav_loop::Rgb kEdge{0.25f, 0.75f, 1.0f};
+constexpr Rgb kEdge{0.25f, 0.75f, 1.0f};
 constexpr double kNear = 0.05;     // metres: nothing nearer is drawn
 constexpr double kSurface = 0.12;  // metres that a line on the floor may lie behind the scene's depth
 constexpr double kBody = 0.6;      // the same for a body's axis, which is inside of its surface
@@ -63,17 +63,18 @@ void draw_navmesh(const DrawnView& view, std::span<const std::array<Vec3d, 3>> t
   }
 }
 
-void draw_capsules(const DrawnView& view, std::span<const gsnav::DynamicCapsule> bodies) {
-  for (const gsnav::DynamicCapsule& body : bodies) {
-    const gsnav::Capsule<double>& c = body.motion.begin;
-    const auto a = project(view.camera, c.p0), b = project(view.camera, c.p1);
-    if (!a || !b) continue;
-    const Point middle{0.5 * (a->x + b->x), 0.5 * (a->y + b->y), 0.5 * (a->z + b->z)};
-    if (!visible(view, middle, kBody)) continue;
-    const double radius = view.camera.fx * c.radius / middle.z;
-    view.canvas.stroke(a->x, a->y, b->x, b->y, std::min(radius, 400.0),
-                       nav_loop::avatar_color(body.avatar), 0.35f);
-  }
+void draw_capsule(const DrawnView& view, const gsnav::Capsule<double>& c, Rgb color, float alpha) {
+  const auto a = project(view.camera, c.p0), b = project(view.camera, c.p1);
+  if (!a || !b) return;
+  const Point middle{0.5 * (a->x + b->x), 0.5 * (a->y + b->y), 0.5 * (a->z + b->z)};
+  if (!visible(view, middle, kBody)) return;
+  const double radius = view.camera.fx * c.radius / middle.z;
+  view.canvas.stroke(a->x, a->y, b->x, b->y, std::min(radius, 400.0), color, alpha);
 }
 
-}  // namespace gsnav_viewer
+void draw_capsules(const DrawnView& view, std::span<const gsnav::DynamicCapsule> bodies) {
+  for (const gsnav::DynamicCapsule& body : bodies)
+    draw_capsule(view, body.motion.begin, avatar_color(body.avatar), 0.35f);
+}
+
+}  // namespace gsnav_tools
