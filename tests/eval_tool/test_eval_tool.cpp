@@ -95,14 +95,14 @@ TEST_CASE("an evaluation that was broken off goes on, to the same journal and pa
   const auto episode = gsnav::io::load_episodes(folder / "out/episodes.json.gz")->episodes[0];
   CHECK(positions.values[0] == doctest::Approx(episode.start_position.x).epsilon(1e-6));
   CHECK(positions.values[2] == doctest::Approx(episode.start_position.z).epsilon(1e-6));
-  // The first frame of the strip is what the agent saw at the start.
+  // The first frame of the strip, below the line of times, is what the agent saw at the start.
   const auto frame = gsnav::io::load_png(folder / "own/00000.png").value();
   const auto strip = gsnav::io::load_png(folder / "out/episodes/0_strip.png").value();
   bool same = true;
   for (std::size_t y = 0; y < 24; ++y) {
     for (std::size_t x = 0; x < 96; ++x) {
       same = same && frame.samples[y * 96 + x] ==
-                         strip.samples[(y + 4) * 3 * static_cast<std::size_t>(strip.width) + 12 + x];
+                         strip.samples[(y + 18) * 3 * static_cast<std::size_t>(strip.width) + 12 + x];
     }
   }
   CHECK(same);
