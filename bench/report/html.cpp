@@ -49,6 +49,17 @@ const std::array<Section, 10> kSections{{
      kernel_section},
 }};
 
+constexpr const char* kHowToRead =
+    "<section id=\"reading\">\n<h2>How to read this</h2>\n<p class=\"note\">A row is one view, drawn by "
+    "one "
+    "setting: a profile (exact, fast, lod) or exact with one knob turned. Its time is a median, its "
+    "error "
+    "is that of its image against an oracle, which computes the same image in float64. PSNR: above 60 "
+    "dB "
+    "nobody sees a difference, above 100 dB it is rounding. LSB: a step of 8 bits. Depth errors are in "
+    "millimetres, over pixels where both have a depth. Compare settings within a scene, a size and a "
+    "backend; times of two machines do not compare.</p>\n</section>\n";
+
 std::string fact(const char* name, const std::string& value) {
   return value.empty() ? std::string()
                        : "<span>" + std::string(name) + " <b>" + escape(value) + "</b></span>\n";
@@ -56,7 +67,10 @@ std::string fact(const char* name, const std::string& value) {
 
 }  // namespace
 
-std::string html_page(const Table& table) {
+std::string html_page(const Table& table, bool acceptance) {
+  const auto shown = [acceptance](const Section& s) {
+    return acceptance || (s.make != budget_section && s.make != target_section);
+  };
   std::string out =
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
@@ -68,10 +82,13 @@ std::string html_page(const Table& table) {
          fact("backends", table.distinct("backend")) + fact("scenes", table.distinct("scene")) +
          "</div>\n<nav>\n";
   for (const Section& s : kSections) {
+    if (!shown(s)) continue;
     out += "<a href=\"#" + std::string(s.id) + "\">" + s.title + "</a>\n";
   }
   out += "</nav>\n</div></header>\n<main>\n";
+  out += kHowToRead;
   for (const Section& s : kSections) {
+    if (!shown(s)) continue;
     const std::string body = s.make(table);
     out += "<section id=\"" + std::string(s.id) + "\">\n<h2>" + s.title + "</h2>\n";
     if (body.empty()) {
@@ -90,8 +107,8 @@ std::string html_page(const Table& table) {
          "</body>\n</html>\n";
 }
 
-Status write_html(const Table& table, const std::filesystem::path& path) {
-  return gsnav::replace_file(path, html_page(table));
+Status write_html(const Table& table, const std::filesystem::path& path, bool acceptance) {
+  return gsnav::replace_file(path, html_page(table, acceptance));
 }
 
 }  // namespace gsnav_report

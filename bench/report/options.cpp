@@ -114,6 +114,8 @@ void add_run(CLI::App& app, Options& o) {
   app.add_option("--machine", o.machine, "What they were measured on; default: the processor's name");
   app.add_flag("--resume", o.resume,
                "Keeps the rows of OUT/report.csv and makes those that are missing");
+  app.add_flag("--acceptance", o.acceptance,
+               "Also judge by gsnav's own budgets and targets, which are of its benchmark scenes");
   app.add_flag("--no-html", o.no_html, "No page, the CSV only");
 }
 
@@ -135,9 +137,26 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   add_scenes(app, o, sizes, knob_size);
   add_kinds_of_rows(app, o, oracles);
   add_run(app, o);
+  bool quick = false;
+  app.add_flag(
+      "--quick", quick,
+      "A first look in under a minute: two views of 256x256, RGB-D by OpenMP, profiles exact and "
+      "fast, the contract's oracle, three timed runs, nothing else; options given beside it hold");
   if (const auto status = gsnav_tools::parse_options(app, argc, argv)) {
     exit_code = *status;
     return std::nullopt;
+  }
+  if (quick) {
+    const auto not_given = [&app](const char* name) { return app.get_option(name)->count() == 0; };
+    if (not_given("--views")) o.views = 2;
+    if (not_given("--sizes")) sizes = {"256x256"};
+    if (not_given("--kinds")) o.kinds = {"render"};
+    if (not_given("--sensors")) o.sensors = {"rgbd"};
+    if (not_given("--profiles")) o.profiles = {"exact", "fast"};
+    if (not_given("--backends")) o.backends = {"openmp"};
+    if (not_given("--knobs")) o.knobs = {"none"};
+    if (not_given("--oracles")) oracles = {"contract"};
+    if (not_given("--runs")) o.runs = 3;
   }
   const auto fail = [&](const std::string& message) {
     std::fprintf(stderr, "gsnav-report: %s\n", gsnav::printable(message).c_str());

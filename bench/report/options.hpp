@@ -28,6 +28,7 @@ struct Options {
   double max_seconds = 3;  ///< of timing one setting
   std::string out = "report", cache, docs, benchmarks, commit, machine;
   bool resume = false, no_html = false;
+  bool acceptance = false;  ///< judge by the project's own budgets and targets
 
   bool wants(const std::string& kind) const;
 };

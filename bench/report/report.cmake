@@ -4,7 +4,7 @@ execute_process(COMMAND git -C "${SOURCE}" describe --always --dirty
                 OUTPUT_VARIABLE commit OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
 # Cores may be shared: threads that wait do not spin.
 set(ENV{OMP_WAIT_POLICY} passive)
-set(options ${SCENES} --out "${OUT}" --docs "${OUT}/approximations.md")
+set(options ${SCENES} --acceptance --out "${OUT}" --docs "${OUT}/approximations.md")
 if(commit)
   list(APPEND options --commit "${commit}")
 endif()

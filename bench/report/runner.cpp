@@ -161,12 +161,12 @@ Status run_report(const Options& o) {
   const Result<Table> table = Table::read(path);
   if (!table) return table.status();
   if (!o.no_html) {
-    if (Status s = write_html(*table, out / "report.html"); !s) return s;
+    if (Status s = write_html(*table, out / "report.html", o.acceptance); !s) return s;
   }
   if (!o.docs.empty()) {
     if (Status s = write_docs(*table, o.docs); !s) return s;
   }
-  std::fputs(targets_text(check_targets(*table)).c_str(), stdout);
+  if (o.acceptance) std::fputs(targets_text(check_targets(*table)).c_str(), stdout);
   std::printf("%zu rows in %s\n", csv->rows().size(), gsnav::printable(path.string()).c_str());
   return {};
 }

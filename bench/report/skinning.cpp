@@ -14,6 +14,7 @@
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/rng.hpp"
+#include "gsnav/demo.hpp"
 #include "skinning_modes.hpp"
 #include "skinning_timing.hpp"
 #include "skinning_truth.hpp"

@@ -42,7 +42,7 @@ TEST_CASE("html: a full report is one well-formed page with every section") {
   const std::string page = html_page(Table(gsnav_test::synthetic_rows(), {}));
   CHECK(nesting_error(page) == "");
   CHECK(page.find("Nothing was measured") == std::string::npos);
-  CHECK(count(page, "<section") == 10);
+  CHECK(count(page, "<section") == 11);
   CHECK(page.find("<script") == std::string::npos);
   CHECK(page.find("src=\"http") == std::string::npos);
   CHECK(page.find("href=\"http") == std::string::npos);
@@ -112,4 +112,17 @@ TEST_CASE("html: images are embedded; one that is none is named") {
   CHECK(page.find("b.png is no PNG") != std::string::npos);
   CHECK(page.find("absent.png is no PNG") != std::string::npos);
   CHECK(write_html(table, folder / "no/such/page.html").code() == gsnav::Errc::file_not_found);
+}
+
+TEST_CASE("html: a user's scene is judged by no target of the project's") {
+  std::vector<Row> rows;
+  Row r;
+  rows.push_back(
+      r.set("kind", "render").set("profile", "exact").set("scene", "s").set("rgb_psnr", "20"));
+  const Table table(rows, {});
+  CHECK(html_page(table, true).find("Budgets") != std::string::npos);
+  const std::string page = html_page(table, false);
+  CHECK(page.find("Budgets") == std::string::npos);
+  CHECK(page.find("Targets") == std::string::npos);
+  CHECK(page.find("How to read this") != std::string::npos);
 }
