@@ -3,6 +3,13 @@
 
 #include "gsnav/version.hpp"
 
+#if __cplusplus < 202002L
+#error "gsnav needs C++20: compile with -std=c++20 or later"
+// A header that does not exist: compilers stop here, before the errors that would follow from it.
+#define GSNAV_STOP <gsnav needs -std=c++20 or later>
+#include GSNAV_STOP
+#endif
+
 /// GSNAV_HD marks a function that runs on the host and, under nvcc, on the device.
 /// On the host it is always inlined: objects compiled for different instruction sets may be linked
 /// together, and an out-of-line copy of a shared inline function would be picked from any of them.

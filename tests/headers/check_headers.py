@@ -28,7 +28,8 @@ NEEDS = {"gsnav/interop/eigen.hpp": "eigen", "gsnav/interop/glm.hpp": "glm",
          "gsnav/interop/dlpack.hpp": "dlpack"}
 DEVICE_LAYERS = ("math", "core", "image", "frame", "skin", "sweep", "mesh", "lanes", "render")
 HOST_ONLY = ("gsnav/detail/math/pack", "gsnav/detail/lanes/")  # lanes are host vectors
-WARNINGS = ["-Wall", "-Wextra", "-Wconversion", "-Wshadow"]
+WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow"]
+DEFINES = ["-DGSNAV_OPENMP_HEADER_ONLY"]
 
 
 def layer(header):
@@ -106,7 +107,7 @@ def compile_headers(checked, args, scratch):
         command = [args.compiler, "-std=c++20", "-Werror", "all-warnings", "-diag-suppress", "2810",
                    "-Xcompiler", "-Wall,-Wextra", *include, "-c", str(source), "-o", str(scratch / (name + ".o"))]
     else:
-        command = [args.compiler, "-std=c++20", "-fsyntax-only", "-Werror", *WARNINGS, *include]
+        command = [args.compiler, "-std=c++20", "-fsyntax-only", "-Werror", *WARNINGS, *DEFINES, *include]
         if strict(checked[0]):
             command += ["-fno-exceptions", "-fno-rtti"]
         command.append(str(source))

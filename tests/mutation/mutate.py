@@ -29,8 +29,8 @@ sys.path.insert(0, str(HERE))
 import faults as fault_lists  # noqa: E402
 from sources import Sources  # noqa: E402
 
-FLAGS = ["-std=c++20", "-O1", "-ffp-contract=off", "-fopenmp", "-w", "-Iinclude", "-Ibackends/serial",
-         "-Ibackends/openmp", "-Itests", "-Isrc/io", '-DGSNAV_DATA_DIR="/nonexistent"']
+FLAGS = ["-std=c++20", "-O1", "-ffp-contract=off", "-fopenmp", "-DGSNAV_OPENMP_HEADER_ONLY", "-w", "-Iinclude",
+         "-Ibackends/serial", "-Ibackends/openmp", "-Itests", "-Isrc/io", '-DGSNAV_DATA_DIR="/nonexistent"']
 FOLDERS = ("include", "backends", "src", "tests")
 CASE_TIMEOUT_S = 600
 

@@ -5,6 +5,8 @@
 #include <string>
 #include <string_view>
 
+#include "gsnav/config.hpp"
+
 namespace gsnav {
 
 /// Text for a terminal: what could steer it is written as \xNN, that is control characters but tab and

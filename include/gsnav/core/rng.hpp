@@ -26,7 +26,8 @@ class Rng {
   double uniform(double low, double high) noexcept { return low + (high - low) * uniform(); }
   /// Uniform integer in [0, n); n > 0.
   std::uint64_t below(std::uint64_t n) noexcept {
-    return static_cast<std::uint64_t>((static_cast<unsigned __int128>(next()) * n) >> 64);
+    __extension__ using Wide = unsigned __int128;
+    return static_cast<std::uint64_t>((static_cast<Wide>(next()) * n) >> 64);
   }
   /// Standard normal (Box-Muller, one value a call).
   double normal() noexcept {

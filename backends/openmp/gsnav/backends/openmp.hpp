@@ -1,6 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// The compiled component gsnav::openmp has the lane kernels for SSE2, AVX2 and AVX-512 and chooses at
+// run time. CMake's target sets GSNAV_OPENMP_COMPILED. Header-only use is possible, but must be asked
+// for: every translation unit then compiles the kernels itself (about a minute and 1 GB), for the one
+// instruction set of its own flags (-march=...), and without optimisation they are many times slower.
+#if defined(GSNAV_OPENMP_HEADER_ONLY)
+#undef GSNAV_OPENMP_COMPILED
+#elif !defined(GSNAV_OPENMP_COMPILED)
+#error "gsnav::OpenMPBackend: link the CMake target gsnav::openmp, or define GSNAV_OPENMP_HEADER_ONLY"
+#endif
+
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -29,6 +39,12 @@
 #endif
 
 namespace gsnav {
+
+#if !defined(GSNAV_OPENMP_COMPILED)
+// Names of its own for each instruction set: a program may link units that were compiled for several of
+// them, and others that use the component.
+inline namespace GSNAV_LANES_TAG {
+#endif
 
 /// The lane kernels of one instruction set, in the order in which a frame calls them.
 /// lanes::kernel_table fills it.
@@ -189,7 +205,9 @@ class OpenMPBackend : public HostMemory {
 
 static_assert(Backend<OpenMPBackend>);
 
-#if defined(GSNAV_OPENMP_COMPILED)
+#if !defined(GSNAV_OPENMP_COMPILED)
+}  // namespace GSNAV_LANES_TAG
+#else
 // Compiled in gsnav::openmp: whoever renders or skins need not.
 extern template Status render_camera<float, OpenMPBackend>(OpenMPBackend&,
                                                            RenderWorkspace<float, OpenMPBackend>&,

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "gsnav/config.hpp"
+
 #if __has_include(<unistd.h>)
 #include <unistd.h>
 #endif

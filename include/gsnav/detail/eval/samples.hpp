@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "gsnav/config.hpp"
+
 namespace gsnav::eval {
 
 /// Values of an image in either precision, read as double. Owns nothing: what it was made from must
