@@ -90,7 +90,8 @@ TEST_CASE(
       CHECK(got.rgb == want.rgb);
       // A colour is off by at most 4.3 times a coefficient's error, and an image by no more than its
       // colours.
-      const auto before = render<float>(backend, {GaussianArrays<B>(backend, full).set()}, kCamera);
+      const GaussianArrays<B> arrays(backend, full);
+      const auto before = render<float>(backend, {arrays.set()}, kCamera);
       for (std::size_t i = 0; i < got.rgb.size(); ++i) {
         REQUIRE(std::fabs(static_cast<double>(got.rgb[i] - before.rgb[i])) <= 4.3 * error + 1e-6);
       }

@@ -224,8 +224,9 @@ TEST_CASE("packed clouds: far places, large and needle-like Gaussians, a last ch
   }
   on_backends([&](auto& backend) {
     using B = std::decay_t<decltype(backend)>;
-    const auto got = render<float>(backend, {GaussianArrays<B>(backend, packed).set()}, kCamera);
-    const auto want = render<float>(backend, {GaussianArrays<B>(backend, floats).set()}, kCamera);
+    const GaussianArrays<B> packed_arrays(backend, packed), float_arrays(backend, floats);
+    const auto got = render<float>(backend, {packed_arrays.set()}, kCamera);
+    const auto want = render<float>(backend, {float_arrays.set()}, kCamera);
     CHECK(got.stats[0].visible > 20);
     CHECK(got.rgb == want.rgb);
   });

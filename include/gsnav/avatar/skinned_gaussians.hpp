@@ -52,10 +52,12 @@ class AvatarArrays {
   }
 
   const std::shared_ptr<const AvatarAsset>& asset() const noexcept { return asset_; }
-  /// The canonical Gaussians.
-  const GaussianSet& set() const noexcept { return set_; }
+  /// The canonical Gaussians; valid while this lives.
+  const GaussianSet& set() const& noexcept { return set_; }
+  const GaussianSet& set() const&& = delete;
   /// Without joints and outputs.
-  const SkinningArgs<float>& skinning() const noexcept { return args_; }
+  const SkinningArgs<float>& skinning() const& noexcept { return args_; }
+  const SkinningArgs<float>& skinning() const&& = delete;
 
  private:
   std::shared_ptr<const AvatarAsset> asset_;
@@ -132,12 +134,14 @@ class SkinnedGaussians {
   }
   Status skin_prepared() { return visible_ ? skin() : Status(); }
 
-  /// The posed Gaussians where the actor stands; empty before the first `pose`. Valid until the next.
-  GaussianSet set() const noexcept {
+  /// The posed Gaussians where the actor stands; empty before the first `pose`. Valid until the next,
+  /// while this lives.
+  GaussianSet set() const& noexcept {
     GaussianSet s = set_;
     if (!visible_) s.gaussians = {};
     return s;
   }
+  GaussianSet set() const&& = delete;
 
   const std::shared_ptr<const AvatarAsset>& asset() const noexcept { return arrays_->asset(); }
 

@@ -28,8 +28,11 @@ namespace gsnav {
 /// Flushing denormals to zero changes none.
 ///
 ///     gsnav::SerialBackend backend;
-///     gsnav::BasicRenderer<float, gsnav::SerialBackend> renderer(backend);
-///     auto frames = renderer.render({{cloud.set()}}, {{camera}}).value();   // frames.rgb, ...
+///     gsnav::BasicRenderer renderer(backend);   // BasicRenderer<float, gsnav::SerialBackend>
+///     auto frames = renderer.render(cloud.set(), camera).value();   // frames.rgb, ...
+///
+/// It keeps a pointer to the backend and views of the meshes; sets and cameras are read during a call
+/// only (docs/ownership.md).
 template <class S, Backend B>
 class BasicRenderer {
  public:
@@ -254,5 +257,8 @@ class BasicRenderer {
   Buffer<S, B> device_images_;
   [[no_unique_address]] typename ThreadFramesOf<B>::type thread_frames_;
 };
+
+template <Backend B>
+explicit BasicRenderer(B&, const RenderConfig& = {}) -> BasicRenderer<float, B>;
 
 }  // namespace gsnav

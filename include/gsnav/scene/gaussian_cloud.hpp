@@ -72,8 +72,8 @@ struct GaussianCloud {
            sizeof(ChunkBounds) * (chunk_bounds.size() + part_bounds.size());
   }
 
-  /// What kernels read; valid while the cloud lives and does not grow.
-  GaussianRows view() const noexcept {
+  /// What kernels read; valid while the cloud lives and does not grow. A temporary has no view.
+  GaussianRows view() const& noexcept {
     GaussianRows v;
     v.shape.size = size();
     v.shape.means = planes_of(means);
@@ -92,10 +92,13 @@ struct GaussianCloud {
     return v;
   }
 
-  /// The cloud placed in the world.
-  GaussianSet set(const Similarity& world_from_asset = {}) const noexcept {
+  GaussianRows view() const&& = delete;
+
+  /// The cloud placed in the world. It views the cloud's arrays, as view().
+  GaussianSet set(const Similarity& world_from_asset = {}) const& noexcept {
     return {view(), world_from_asset, filter, eps2d, color_space};
   }
+  GaussianSet set(const Similarity& world_from_asset = {}) const&& = delete;
 };
 
 /// Spacing of the lattice that positions are stored relative to, metres.

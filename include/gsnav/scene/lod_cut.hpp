@@ -62,9 +62,12 @@ inline RenderConfig lod_config(RenderConfig config, const LodStats& stats = {}) 
 /// chose, for hysteresis, and else depends on the camera only: the same calls give the same cuts.
 class LodCut {
  public:
-  /// The tree, and the cloud that it was built of, must stay.
+  /// The tree, and the cloud that it was built of, must outlive this.
   LodCut(const LodTree& tree, const GaussianCloud& cloud)
       : tree_(&tree), cloud_(&cloud), refined_(tree.nodes.size()) {}
+  LodCut(const LodTree&& tree, const GaussianCloud& cloud) = delete;
+  LodCut(const LodTree& tree, const GaussianCloud&& cloud) = delete;
+  LodCut(const LodTree&& tree, const GaussianCloud&& cloud) = delete;
 
   /// Chooses for a camera; the cloud stands in the world by `world_from_asset`. What to draw then:
   /// chunks of the cloud, and merged ones, as the pixels of O_photo(choice.photo) see them. Valid until
@@ -117,6 +120,8 @@ class LodCut {
     s.filter = Filter::mip;
     return s;
   }
+  static GaussianSet photo_set(const GaussianCloud&& cloud, const LodChoice& choice,
+                               const Similarity& world_from_asset = {}) = delete;
 
  private:
   void add(const GaussianCloud& cloud, const std::vector<std::uint32_t>& chunks, const LodChoice& choice,

@@ -56,9 +56,11 @@ class MeshTexture {
     }
     return t;
   }
-  TextureView view() const noexcept {
+  /// Valid while the texture lives.
+  TextureView view() const& noexcept {
     return {view_of(texels_), {decode_.data(), decode_.size()}, width_, height_, levels_};
   }
+  TextureView view() const&& = delete;
 
  private:
   /// Appends the level below one of w x h pixels at `from`. Of an odd side the last two or three share a
@@ -111,7 +113,7 @@ struct SurfaceMesh {
   std::vector<float> alphas;  ///< one a vertex, in [0, 1]; empty: 1
 };
 
-/// Meshes and where they stand. Moving an instance is setting its transform.
+/// Meshes, which it owns, and their places: an instance is a view of a mesh with a transform.
 class MeshScene {
  public:
   /// Returns the mesh's number. Errors: invalid_argument naming what does not fit (indices beyond the
@@ -148,10 +150,11 @@ class MeshScene {
     return meshes_.size() - 1;
   }
   std::size_t size() const noexcept { return meshes_.size(); }
-  const SurfaceMesh& mesh(std::size_t i) const noexcept { return meshes_[i].surface; }
+  const SurfaceMesh& mesh(std::size_t i) const& noexcept { return meshes_[i].surface; }
+  const SurfaceMesh& mesh(std::size_t i) const&& = delete;
 
-  /// The arrays of mesh i; good while the scene is, and no mesh is added.
-  MeshView view(std::size_t i) const noexcept {
+  /// The arrays of mesh i; valid while the scene lives and no mesh is added.
+  MeshView view(std::size_t i) const& noexcept {
     const Held& held = meshes_[i];
     const SurfaceMesh& m = held.surface;
     MeshView v;
@@ -173,11 +176,14 @@ class MeshScene {
     v.alphas = view_of(m.alphas);
     return v;
   }
-  /// Mesh i standing in the world.
+  MeshView view(std::size_t i) const&& = delete;
+  /// Mesh i standing in the world; valid as view(i) is.
   MeshInstance instance(std::size_t i, const Similarity& world_from_mesh = {},
-                        std::uint32_t id = 0) const noexcept {
+                        std::uint32_t id = 0) const& noexcept {
     return {view(i), world_from_mesh, id};
   }
+  MeshInstance instance(std::size_t i, const Similarity& world_from_mesh = {},
+                        std::uint32_t id = 0) const&& = delete;
 
  private:
   struct Held {
@@ -218,9 +224,11 @@ class MeshArrays {
       to_device(backend, mesh_.alphas, floats_);
     }
   }
-  MeshInstance instance(const Similarity& world_from_mesh = {}, std::uint32_t id = 0) const noexcept {
+  /// The mesh placed in the world; valid while this lives.
+  MeshInstance instance(const Similarity& world_from_mesh = {}, std::uint32_t id = 0) const& noexcept {
     return {mesh_, world_from_mesh, id};
   }
+  MeshInstance instance(const Similarity& world_from_mesh = {}, std::uint32_t id = 0) const&& = delete;
 
  private:
   template <class T>

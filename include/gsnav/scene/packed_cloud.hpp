@@ -47,7 +47,8 @@ struct PackedCloud {
            sizeof(PackedChunk) * chunks.size() + rest.bytes() +
            sizeof(float) * (rest.means[0].empty() ? 0 : 3 * count);
   }
-  GaussianRows view() const noexcept {
+  /// As GaussianCloud::view and set: they view this cloud's arrays, and a temporary has none.
+  GaussianRows view() const& noexcept {
     GaussianRows v = rest.view();
     v.shape.size = count;
     v.shape.codes = view_of(codes);
@@ -56,9 +57,11 @@ struct PackedCloud {
     v.shape.chunks = v.color.chunks = view_of(chunks);
     return v;
   }
-  GaussianSet set(const Similarity& world_from_asset = {}) const noexcept {
+  GaussianRows view() const&& = delete;
+  GaussianSet set(const Similarity& world_from_asset = {}) const& noexcept {
     return {view(), world_from_asset, rest.filter, rest.eps2d, rest.color_space};
   }
+  GaussianSet set(const Similarity& world_from_asset = {}) const&& = delete;
 };
 
 namespace detail {

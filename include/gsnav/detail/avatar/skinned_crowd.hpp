@@ -85,7 +85,8 @@ class SkinnedCrowd {
 
   std::size_t size() const noexcept { return actors_.size(); }
   /// The posed Gaussians at a place; valid until the next pose().
-  GaussianSet set(std::size_t place) const noexcept { return actors_[place].set(); }
+  GaussianSet set(std::size_t place) const& noexcept { return actors_[place].set(); }
+  GaussianSet set(std::size_t place) const&& = delete;
 
  private:
   template <class ActorAt>

@@ -15,8 +15,10 @@
 
 namespace gsnav {
 
-/// A cloud's arrays in a backend's own memory. On host backends nothing is copied: the cloud must
-/// outlive it. Packed clouds become floats elsewhere.
+/// A cloud's arrays in a backend's own memory. On host backends nothing is copied: the cloud, and the
+/// bands where they are given, must outlive it. Other backends get a copy, and packed clouds become
+/// floats there. The same code is right on each: a cloud or bands that are temporaries do not compile on
+/// any (docs/ownership.md). The backend must outlive it.
 template <Backend B>
 class GaussianArrays {
  public:
@@ -25,7 +27,7 @@ class GaussianArrays {
   }
   /// Without the SH bands that no chunk needs (detail/scene/scene_bands.hpp):
   /// elsewhere than on host backends those that none does take no memory, those that a chunk does not
-  /// are not read. On host backends `bands` must outlive it too.
+  /// are not read.
   GaussianArrays(B& backend, const GaussianCloud& cloud, const SceneBands& bands)
       : set_(bands.applied_to(cloud.set())) {
     if constexpr (!is_host_backend<B>) {
@@ -49,11 +51,20 @@ class GaussianArrays {
       detail::move_to(backend, set_.gaussians.color.chunk_degrees, bytes_);
     }
   }
-  GaussianSet set(const Similarity& world_from_asset = {}) const noexcept {
+  GaussianArrays(B& backend, const GaussianCloud&& cloud) = delete;
+  GaussianArrays(B& backend, const GaussianCloud&& cloud, const SceneBands& bands) = delete;
+  GaussianArrays(B& backend, const GaussianCloud& cloud, const SceneBands&& bands) = delete;
+  GaussianArrays(B& backend, const PackedCloud&& cloud) = delete;
+  GaussianArrays(B& backend, const PackedCloud&& cloud, const SceneBands& bands) = delete;
+  GaussianArrays(B& backend, const PackedCloud& cloud, const SceneBands&& bands) = delete;
+
+  /// The arrays placed in the world; valid while this lives.
+  GaussianSet set(const Similarity& world_from_asset = {}) const& noexcept {
     GaussianSet s = set_;
     s.world_from_asset = world_from_asset;
     return s;
   }
+  GaussianSet set(const Similarity& world_from_asset = {}) const&& = delete;
 
  private:
   void upload(B& backend, const GaussianCloud& cloud) {

@@ -44,10 +44,11 @@ struct SceneBands {
 
   /// The set, of arrays in host memory, without the bands that were found to say nothing. This must
   /// outlive it. For other backends: GaussianArrays.
-  GaussianSet applied_to(GaussianSet set) const noexcept {
+  GaussianSet applied_to(GaussianSet set) const& noexcept {
     set.gaussians.color.chunk_degrees = {chunk_sh_degrees.data(), chunk_sh_degrees.size()};
     return set;
   }
+  GaussianSet applied_to(GaussianSet set) const&& = delete;
 };
 
 }  // namespace gsnav

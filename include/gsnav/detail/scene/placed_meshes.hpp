@@ -20,9 +20,9 @@ struct PlacedMeshes {
   std::vector<std::string> warnings;  ///< what is drawn otherwise than asked for
 
   /// All of it in the world, for BasicRenderer::set_meshes on host backends; ids count from `first_id`.
-  /// Good while this is.
+  /// Valid while this lives and no mesh is added.
   std::vector<MeshInstance> in_world(const Similarity& world_from_scene = {},
-                                     std::uint32_t first_id = 0) const {
+                                     std::uint32_t first_id = 0) const& {
     std::vector<MeshInstance> all;
     for (const TexturedScene::Instance& i : instances) {
       all.push_back(meshes.instance(i.part, world_from_scene * i.world_from_part,
@@ -30,6 +30,8 @@ struct PlacedMeshes {
     }
     return all;
   }
+  std::vector<MeshInstance> in_world(const Similarity& world_from_scene = {},
+                                     std::uint32_t first_id = 0) const&& = delete;
 };
 
 /// Takes a surface as files give it (io::load_textured_scene). Parts share their textures' mip chains.

@@ -26,7 +26,7 @@ struct TemporalCloud {
     return cloud.bytes() + sizeof(float) * values;
   }
   /// What kernels read; valid while this lives and does not grow.
-  TemporalView view() const noexcept {
+  TemporalView view() const& noexcept {
     TemporalView v;
     v.base = cloud.view();
     v.times = view_of(times);
@@ -34,6 +34,7 @@ struct TemporalCloud {
     for (std::size_t k = 0; k < kMotionPlanes; ++k) v.motion[k] = view_of(motion[k]);
     return v;
   }
+  TemporalView view() const&& = delete;
 };
 
 }  // namespace gsnav

@@ -11,7 +11,8 @@
 namespace gsnav {
 
 /// A moving scene in a backend's memory, taken to one time after the other. On host backends the scene's
-/// arrays are used as they are: it must outlive this, as must the backend.
+/// arrays are used as they are: it must outlive this, as must the backend. A scene that is a temporary
+/// does not compile, on any backend.
 template <Backend B>
 class TemporalGaussians {
  public:
@@ -24,15 +25,17 @@ class TemporalGaussians {
       for (auto& plane : view_.motion) detail::move_to(backend, plane, held_);
     }
   }
+  TemporalGaussians(B& backend, const TemporalCloud&& scene) = delete;
 
   /// Errors: those of gaussians_at.
   Status set_time(double t) { return gaussians_at<float>(backend_, view_, t, moment_); }
   /// The scene as it is since the last set_time, which must have come first.
-  GaussianSet set(const Similarity& world_from_asset = {}) const noexcept {
+  GaussianSet set(const Similarity& world_from_asset = {}) const& noexcept {
     GaussianSet s = arrays_.set(world_from_asset);
     s.gaussians = moment_.gaussians;
     return s;
   }
+  GaussianSet set(const Similarity& world_from_asset = {}) const&& = delete;
 
  private:
   B& backend_;

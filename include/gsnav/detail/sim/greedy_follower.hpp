@@ -28,6 +28,9 @@ class GreedyGeodesicFollower {
   static Result<GreedyGeodesicFollower> make(const NavMesh& mesh, const Vec3d& goal,
                                              const TaskConfig& task = {},
                                              const GreedyFollowerOptions& options = {});
+  static Result<GreedyGeodesicFollower> make(const NavMesh&& mesh, const Vec3d& goal,
+                                             const TaskConfig& task = {},
+                                             const GreedyFollowerOptions& options = {}) = delete;
 
   /// The next action; stop within the goal's radius. Errors: nothing_navigable where the agent is off
   /// the mesh or the goal cannot be reached from it.
