@@ -23,7 +23,7 @@ int main(int argc, char** argv) {
   for (int i = 0; i < 60; ++i) {
     std::vector<gsnav::Action> actions;
     for (std::size_t e = 0; e < 16; ++e) actions.push_back(policy.next(sim.world(e)));
-    out = sim.step(actions).value();  // out.images[0].data: [16][64][64][3], out.rewards[e]
+    out = sim.step(actions).value();  // out["rgb"].data: [16][64][64][3], out.rewards[e]
     ended.insert(ended.end(), out.final_metrics.begin(), out.final_metrics.end());
   }
   std::printf("%zu episodes, SR %.2f\n", ended.size(), gsnav::summarize(ended).success_rate);

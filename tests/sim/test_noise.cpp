@@ -112,6 +112,7 @@ TEST_CASE("noise follows the seed, the episode and the action, not who looked be
 TEST_CASE("sensors of a rig have noise of their own: none is another's, moved on") {
   SerialBackend backend;
   SimulatorConfig c;
+  c.sensors.clear();
   SensorSpec s;
   s.resolution = {48, 64};
   s.position = {0, 1.5, 0};

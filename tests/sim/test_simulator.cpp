@@ -29,7 +29,9 @@ TEST_CASE("RGB and depth at one place share one render") {
   CHECK(obs.images.size() == 2);
   CHECK(obs["rgb"].size() == 48 * 64 * 3);
   CHECK(obs["depth"].size() == 48 * 64);
-  CHECK(obs["nothing"].empty());
+  CHECK(obs.find("depth")->data.data() == obs["depth"].data());
+  CHECK(obs.find("rbg") == nullptr);
+  CHECK_THROWS_WITH_AS(obs["rbg"], "no image of a sensor \"rbg\": the sensors are rgb, depth", Error);
   CHECK(obs.images[0].height == 48);
   CHECK(obs.images[0].width == 64);
   CHECK(obs.images[0].channels == 3);

@@ -21,7 +21,9 @@ namespace gsnav {
 
 struct SimulatorConfig {
   TaskConfig task{};
-  std::vector<SensorSpec> sensors;  ///< none: nothing is rendered
+  /// An RGB and a depth sensor ("rgb", "depth") of 256 x 256 pixels and 90 degrees, 1.5 m above the
+  /// ground, unless others are given. Empty: nothing is rendered.
+  std::vector<SensorSpec> sensors = rgbd_sensors();
   /// How sensors draw. They choose `outputs`, and the scene's first asset chooses `sort_order`: a value
   /// that is neither the default nor theirs is an error.
   RenderConfig render{};
@@ -73,6 +75,31 @@ enum class ImageMemory : std::uint8_t {
   backend,  ///< in the backend's own, a GPU's say; on host backends the same
 };
 
+namespace detail {
+
+/// The image with this uuid, or null.
+template <class Image>
+const Image* find_image(std::span<const Image> images, std::string_view uuid) noexcept {
+  for (const Image& i : images) {
+    if (i.uuid == uuid) return &i;
+  }
+  return nullptr;
+}
+/// The same; throws gsnav::Error naming the images that there are.
+template <class Image>
+const Image& image_named(std::span<const Image> images, std::string_view uuid) {
+  if (const Image* const found = find_image(images, uuid)) return *found;
+  std::string there;
+  for (const Image& i : images) there.append(there.empty() ? "" : ", ").append(i.uuid);
+  fail(
+      Errc::invalid_argument,
+      "no image of a sensor \"" + printable(uuid) + "\": " +
+          (there.empty() ? "nothing was rendered (SimulatorConfig.sensors is empty, or rendering is off)"
+                         : "the sensors are " + printable(there)));
+}
+
+}  // namespace detail
+
 struct BatchConfig : SimulatorConfig {
   AutoReset auto_reset = AutoReset::next_step;
   /// Times of a scene for which its avatars are held posed at once; more are drawn one after the other.
@@ -97,12 +124,14 @@ struct Observations : StepInfo {
   PointGoal point_goal{};
   double time = 0.0;  ///< seconds on the scene's clock
 
-  /// The image of sensor `uuid`; empty where there is none.
-  std::span<const float> operator[](std::string_view uuid) const noexcept {
-    for (const Observation& o : images) {
-      if (o.uuid == uuid) return o.data;
-    }
-    return {};
+  /// The image of sensor `uuid`, [H][W][channels]. Throws gsnav::Error (aborts under -fno-exceptions)
+  /// where there is no image of that name: it lists the sensors, or says that nothing was rendered.
+  std::span<const float> operator[](std::string_view uuid) const {
+    return detail::image_named(images, uuid).data;
+  }
+  /// The same with its size, or null where there is no image of that name.
+  const Observation* find(std::string_view uuid) const noexcept {
+    return detail::find_image(images, uuid);
   }
 };
 
@@ -132,6 +161,14 @@ struct BatchStep : BatchInfo {
   /// The last images of episodes that ended in this step and whose environments were reset in it, a row
   /// for each of `finished`; only with AutoReset::same_step.
   std::span<const BatchObservation> final_images;
+
+  /// The images of sensor `uuid`. Throws and finds as Observations does.
+  const BatchObservation& operator[](std::string_view uuid) const {
+    return detail::image_named(images, uuid);
+  }
+  const BatchObservation* find(std::string_view uuid) const noexcept {
+    return detail::find_image(images, uuid);
+  }
 };
 
 }  // namespace gsnav
