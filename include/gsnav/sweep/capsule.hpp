@@ -248,7 +248,7 @@ GSNAV_HD SweepResult<L> sweep_steps(const MovingCapsule<L>& agent, const MovingC
 /// reports that.
 template <class L, class S = scalar_of<L>>
 GSNAV_HD SweepResult<L> sweep(const MovingCapsule<L>& agent, const MovingCapsule<L>& body,
-                              const SweepRules<S>& rules) noexcept {
+                              const SweepRules<S>& rules = {}) noexcept {
   mask_of<L> unfinished;
   return detail::sweep_steps(agent, body, rules, rules.max_iterations, unfinished);
 }
