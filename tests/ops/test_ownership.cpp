@@ -21,33 +21,56 @@ using namespace gsnav_test;
 namespace {
 
 template <class T>
-concept HasSet = requires(T&& t) { std::forward<T>(t).set(); };
+concept HasSet = requires(T&& t) {
+  std::forward<T>(t).set();
+};
 template <class T>
-concept HasView = requires(T&& t) { std::forward<T>(t).view(); };
+concept HasView = requires(T&& t) {
+  std::forward<T>(t).view();
+};
 template <class T>
-concept HasViewOf = requires(T&& t) { std::forward<T>(t).view(std::size_t{}); };
+concept HasViewOf = requires(T&& t) {
+  std::forward<T>(t).view(std::size_t{});
+};
 template <class T>
-concept HasInstance = requires(T&& t) { std::forward<T>(t).instance(); };
+concept HasInstance = requires(T&& t) {
+  std::forward<T>(t).instance();
+};
 template <class T>
-concept HasInstanceOf = requires(T&& t) { std::forward<T>(t).instance(std::size_t{}); };
+concept HasInstanceOf = requires(T&& t) {
+  std::forward<T>(t).instance(std::size_t{});
+};
 template <class T>
-concept HasMeshOf = requires(T&& t) { std::forward<T>(t).mesh(std::size_t{}); };
+concept HasMeshOf = requires(T&& t) {
+  std::forward<T>(t).mesh(std::size_t{});
+};
 template <class T>
-concept IsInWorld = requires(T&& t) { std::forward<T>(t).in_world(); };
+concept IsInWorld = requires(T&& t) {
+  std::forward<T>(t).in_world();
+};
 template <class T>
-concept HasSetAt = requires(T&& t) { std::forward<T>(t).set(std::size_t{}); };
+concept HasSetAt = requires(T&& t) {
+  std::forward<T>(t).set(std::size_t{});
+};
 template <class T>
-concept HasSkinning = requires(T&& t) { std::forward<T>(t).skinning(); };
+concept HasSkinning = requires(T&& t) {
+  std::forward<T>(t).skinning();
+};
 template <class T>
-concept AppliesBands = requires(T&& t) { std::forward<T>(t).applied_to(GaussianSet{}); };
+concept AppliesBands = requires(T&& t) {
+  std::forward<T>(t).applied_to(GaussianSet{});
+};
 template <class T>
-concept IsPhotographed = requires(T&& t) { LodCut::photo_set(std::forward<T>(t), LodChoice{}); };
+concept IsPhotographed = requires(T&& t) {
+  LodCut::photo_set(std::forward<T>(t), LodChoice{});
+};
 template <class T>
-concept IsFollowedOn =
-    requires(T&& t) { GreedyGeodesicFollower::make(std::forward<T>(t), Vec3d{}); };
+concept IsFollowedOn = requires(T&& t) {
+  GreedyGeodesicFollower::make(std::forward<T>(t), Vec3d{});
+};
 
 /// Holds of an object that has a name, and of no temporary.
-#define ONLY_NAMED(Concept, ...)                                                                  \
+#define ONLY_NAMED(Concept, ...)                                                                 \
   static_assert(Concept<__VA_ARGS__&> && Concept<const __VA_ARGS__&> && !Concept<__VA_ARGS__> && \
                 !Concept<const __VA_ARGS__>)
 

@@ -69,8 +69,8 @@ TEST_CASE("a batch has the bits of single simulators over 1,000 random steps amo
   };
   std::size_t wrong = 0, ended = 0, contacts = 0;
   const auto compare = [&](std::size_t e, const Observations& obs, const BatchStep& out) {
-    wrong += same_bits(obs["rgb"], out.images[0].of(e)) ? 0 : 1;
-    wrong += same_bits(obs["depth"], out.images[1].of(e)) ? 0 : 1;
+    wrong += same_bits(obs["rgb"], out["rgb"].of(e)) ? 0 : 1;
+    wrong += same_bits(obs["depth"], out.find("depth")->of(e)) ? 0 : 1;
     wrong += same_info(obs, out.infos[e]) ? 0 : 1;
     wrong += obs.time == out.times[e] && obs.point_goal.angle == out.point_goals[e].angle &&
                      obs.point_goal.distance == out.point_goals[e].distance

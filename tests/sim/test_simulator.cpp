@@ -51,6 +51,26 @@ TEST_CASE("RGB and depth at one place share one render") {
   CHECK(*std::min_element(obs["low"].begin(), obs["low"].end()) > 0.9f);
 }
 
+TEST_CASE("a simulator has an RGB and a depth sensor unless told otherwise") {
+  SerialBackend backend;
+  auto sim = make_simulator(backend, flat_scene(), {}).value();
+  const auto obs = sim.reset(to_kitchen()).value();
+  CHECK(obs["rgb"].size() == 256 * 256 * 3);
+  CHECK(obs["depth"].size() == 256 * 256);
+
+  SimulatorConfig blind;
+  blind.sensors.clear();
+  auto dark = make_simulator(backend, flat_scene(), blind).value();
+  const auto nothing = dark.reset(to_kitchen()).value();
+  CHECK(nothing.images.empty());
+  CHECK(nothing.find("rgb") == nullptr);
+  CHECK_THROWS_WITH_AS(nothing["rgb"],
+                       "no image of a sensor \"rgb\": nothing was rendered (SimulatorConfig.sensors is "
+                       "empty, or rendering is off)",
+                       Error);
+  CHECK(dark.render_count() == 0);
+}
+
 TEST_CASE("images are used again: a steady episode keeps its buffers") {
   SerialBackend backend;
   auto sim = make_simulator(backend, flat_scene(), small_config()).value();

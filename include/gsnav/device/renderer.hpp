@@ -28,18 +28,20 @@ struct RenderOptions {
 /// Renders a scene on any device: Gaussians, meshes and avatars in one image. It holds the scene in the
 /// device's memory and keeps its scratch between calls. Images have the bits of BasicRenderer<float, B>,
 /// where B is the device's backend. It may be moved; one that was moved from answers with
-/// invalid_argument. Calls of one renderer must not overlap.
+/// invalid_argument. Calls of one renderer must not overlap. Nothing that it is given must outlive a
+/// call (docs/ownership.md).
 ///
 ///     auto device = gsnav::Device::parse("best").value();
 ///     auto renderer = gsnav::Renderer::create(device, cloud).value();
 ///     auto frames = renderer.render(camera).value();   // frames.rgb, frames.median_depth, ...
 class Renderer {
  public:
-  /// The scene needs no NavMesh. Errors: invalid_argument naming the part or the field; unsupported
-  /// where the device is not there; out_of_memory; backend_failure.
+  /// Shares the scene, which needs no NavMesh. Errors: invalid_argument naming the part or the field;
+  /// unsupported where the device is not there; out_of_memory; backend_failure.
   static Result<Renderer> create(const Device& device, std::shared_ptr<const SimulatorScene> scene,
                                  RenderOptions options = {});
-  /// Of one cloud, placed at the world's origin.
+  /// Owns a cloud, placed at the world's origin: pass std::move(cloud) to save the copy. Errors: the
+  /// same as above.
   static Result<Renderer> create(const Device& device, GaussianCloud cloud, RenderOptions options = {});
   Renderer(Renderer&&) noexcept;
   Renderer& operator=(Renderer&&) noexcept;

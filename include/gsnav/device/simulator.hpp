@@ -35,11 +35,12 @@ class SimulatorEngine;
 ///     auto metrics = sim.metrics();
 class Simulator {
  public:
-  /// Errors: invalid_argument naming the field, sensor or asset; unsupported where the device is not
-  /// there; out_of_memory; backend_failure. `others` adds bodies to the scene's avatars, numbered behind
-  /// them.
+  /// Shares the scene (docs/ownership.md). Errors: invalid_argument naming the field, sensor or asset;
+  /// unsupported where the device is not there; out_of_memory; backend_failure. `others` adds bodies to
+  /// the scene's avatars, numbered behind them.
   static Result<Simulator> create(const Device& device, std::shared_ptr<const SimulatorScene> scene,
                                   SimulatorConfig config, World::BodySource others = {});
+  /// Owns the scene. Errors: the same as above.
   static Result<Simulator> create(const Device& device, SimulatorScene scene, SimulatorConfig config);
   Simulator(Simulator&&) noexcept;
   Simulator& operator=(Simulator&&) noexcept;
@@ -99,9 +100,9 @@ class Simulator {
 ///     while (running) out = sim.step(policy(out)).value();
 class BatchSimulator {
  public:
-  /// `next_episode` is asked for each episode of each environment; see EpisodeSource. Errors:
-  /// invalid_argument naming the field, sensor or scene; unsupported where the device is not there, or
-  /// naming a sensor whose images cannot stay where BatchConfig::images says; out_of_memory;
+  /// Shares the scenes. `next_episode` is asked for each episode of each environment; see EpisodeSource.
+  /// Errors: invalid_argument naming the field, sensor or scene; unsupported where the device is not
+  /// there, or naming a sensor whose images cannot stay where BatchConfig::images says; out_of_memory;
   /// backend_failure.
   static Result<BatchSimulator> create(const Device& device,
                                        std::vector<std::shared_ptr<const SimulatorScene>> scenes,

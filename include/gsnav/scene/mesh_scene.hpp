@@ -208,7 +208,7 @@ class MeshScene {
 };
 
 /// A mesh's arrays in a backend's own memory. On host backends nothing is copied: what `mesh` views must
-/// outlive it.
+/// outlive it (docs/ownership.md).
 template <Backend B>
 class MeshArrays {
  public:

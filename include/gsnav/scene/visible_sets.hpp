@@ -148,7 +148,7 @@ struct VisibleSettings {
     near_sigma = camera.near_sigma;
   }
   /// Told the share of the work that is done, in [0, 1], for each viewpoint, by the calling thread.
-  std::function<void(double)> progress;
+  std::function<void(double)> progress{};
 };
 
 /// Names the field that cannot be, or ok.

@@ -19,7 +19,7 @@ struct MeshAvatarOptions {
   double opacity = 0.99;    ///< (0, 1)
   double shade =
       0.0;  ///< share of the light that surfaces lose which look down in the bind pose, [0, 1]
-  WeightOptions weights;  ///< its poses should be those of the motions it will make
+  WeightOptions weights{};  ///< its poses should be those of the motions it will make
 };
 
 struct MeshAvatar {

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// A backend of your own: six members. Its images have the bits of the serial one.
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <thread>
+#include <vector>
+
+#include "gsnav/backends/serial.hpp"
+#include "gsnav/demo.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
+
+/// Four threads, started anew for each region.
+struct MyBackend {
+  using memory_space = gsnav::HostSpace;
+  void* allocate(std::size_t bytes, std::size_t align) {
+    return std::aligned_alloc(align, (bytes + align - 1) / align * align);
+  }
+  void deallocate(void* p, std::size_t) noexcept { std::free(p); }
+  void copy(void* to, const void* from, std::size_t n, gsnav::CopyKind) { std::memcpy(to, from, n); }
+  void fill(void* p, unsigned char byte, std::size_t bytes) { std::memset(p, byte, bytes); }
+  template <class F>
+  void parallel_for(std::size_t n, const F& f) {
+    std::vector<std::jthread> threads;
+    const auto share = [&f, n](std::size_t t) {
+      for (std::size_t i = t; i < n; i += 4) f(i);
+    };
+    for (std::size_t t = 0; t < 4; ++t) threads.emplace_back(share, t);
+  }
+  gsnav::Status synchronize() { return {}; }
+};
+static_assert(gsnav::Backend<MyBackend>);
+
+int main() {
+  const auto scene = gsnav::make_default_scene(0.1).value();
+  const auto view = gsnav::default_scene_views()[0];
+  const auto camera = gsnav::Camera::look_at(view.eye, view.target, {0, 1, 0}, 160, 120, 90);
+  MyBackend mine;
+  gsnav::SerialBackend serial;
+  gsnav::BasicRenderer renderer(mine);
+  gsnav::BasicRenderer reference(serial);
+  const bool same = renderer.render(scene.cloud.set(), camera).value().rgb ==
+                    reference.render(scene.cloud.set(), camera).value().rgb;
+  std::puts(same ? "the same bits" : "other bits");
+  return same ? 0 : 1;
+}

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// Images that a GPU draws and keeps. usage: on_gpu [device]
+#include <cstdio>
+#include <memory>
+
+#include "gsnav/demo.hpp"
+#include "gsnav/device/simulator.hpp"
+
+int main(int argc, char** argv) {
+  auto device = gsnav::Device::parse(argc > 1 ? argv[1] : "cuda");
+  if (!device) {  // names the devices of this build on this machine
+    std::printf("skipped: %s\n", device.message().c_str());
+    return 77;
+  }
+  auto scene =
+      std::make_shared<const gsnav::SimulatorScene>(gsnav::default_simulator_scene(3, 1, 0.2).value());
+  auto episodes = gsnav::generate_episodes(*scene->navmesh, 64, 1).value();
+  gsnav::BatchConfig config;
+  config.sensors = gsnav::rgbd_sensors(64, 64);
+  config.images = gsnav::ImageMemory::backend;
+  auto episode_of = [&](std::size_t e, std::size_t) { return gsnav::BatchEpisode{0, episodes[e]}; };
+  auto sim = gsnav::BatchSimulator::create(*device, {scene}, config, 64, episode_of).value();
+  auto out = sim.reset().value();
+  for (int i = 0; i < 20; ++i) {
+    std::vector<gsnav::Action> actions(sim.environments(), gsnav::Action::turn_left);
+    out = sim.step(actions).value();
+  }
+  // [64][64][64][3] floats: in GPU memory, for a learner on the same GPU; or, of a CPU, in `data`.
+  const gsnav::BatchObservation& rgb = out["rgb"];
+  std::printf("%s: %zu images, %s\n", device->description().c_str(), rgb.environments,
+              rgb.on_backend != nullptr ? "in the device's memory" : "in host memory");
+  return (rgb.on_backend != nullptr) == (device->kind() == gsnav::DeviceKind::cuda) ? 0 : 1;
+}

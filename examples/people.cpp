@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// People who walk through the flat, seen from a corner. usage: people [device]; writes people_0.png, ...
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "gsnav/demo.hpp"
+#include "gsnav/device/renderer.hpp"
+#include "gsnav/io.hpp"
+
+int main(int argc, char** argv) {
+  auto device = gsnav::Device::parse(argc > 1 ? argv[1] : "best").value();
+  auto scene =
+      std::make_shared<const gsnav::SimulatorScene>(gsnav::default_simulator_scene(5, 1, 0.2).value());
+  auto view = gsnav::default_scene_views()[0];
+  auto camera = gsnav::Camera::look_at(view.eye, view.target, {0, 1, 0}, 320, 240, 90);
+  auto renderer = gsnav::Renderer::create(device, scene).value();
+  gsnav::Frames<float> frames;  // its memory is used again
+  for (int k = 0; k < 8; ++k) {
+    const double time = 0.5 * k;  // seconds on the scene's clock
+    renderer.render({&camera, 1}, frames, time).throw_if_error();
+    auto name = "people_" + std::to_string(k) + ".png";
+    gsnav::io::save_png_rgb(name, frames.rgb, 320, 240).throw_if_error();
+    for (const gsnav::AvatarActor& person : scene->avatars) {
+      gsnav::Vec3d at = person.placement(time).translation;
+      std::printf("%s: (%.2f, %.2f) ", name.c_str(), at.x, at.z);
+    }
+    std::printf("\n");
+  }
+}
