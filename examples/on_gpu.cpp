@@ -14,18 +14,18 @@ int main(int argc, char** argv) {
   }
   auto scene =
       std::make_shared<const gsnav::SimulatorScene>(gsnav::default_simulator_scene(3, 1, 0.2).value());
-  auto episodes = gsnav::generate_episodes(*scene->navmesh, 64, 1).value();
+  auto episodes = gsnav::generate_episodes(*scene->navmesh, 16, 1).value();
   gsnav::BatchConfig config;
   config.sensors = gsnav::rgbd_sensors(64, 64);
   config.images = gsnav::ImageMemory::backend;
   auto episode_of = [&](std::size_t e, std::size_t) { return gsnav::BatchEpisode{0, episodes[e]}; };
-  auto sim = gsnav::BatchSimulator::create(*device, {scene}, config, 64, episode_of).value();
+  auto sim = gsnav::BatchSimulator::create(*device, {scene}, config, 16, episode_of).value();
   auto out = sim.reset().value();
-  for (int i = 0; i < 20; ++i) {
+  for (int i = 0; i < 10; ++i) {
     std::vector<gsnav::Action> actions(sim.environments(), gsnav::Action::turn_left);
     out = sim.step(actions).value();
   }
-  // [64][64][64][3] floats: in GPU memory, for a learner on the same GPU; or, of a CPU, in `data`.
+  // [16][64][64][3] floats: in GPU memory, for a learner on the same GPU; those of a CPU in rgb.data.
   const gsnav::BatchObservation& rgb = out["rgb"];
   std::printf("%s: %zu images, %s\n", device->description().c_str(), rgb.environments,
               rgb.on_backend != nullptr ? "in the device's memory" : "in host memory");

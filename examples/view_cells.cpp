@@ -11,9 +11,9 @@
 
 int main(int argc, char** argv) {
   auto device = gsnav::Device::parse(argc > 1 ? argv[1] : "best").value();
-  auto flat = gsnav::default_simulator_scene(0, 1, 0.2).value();
+  auto flat = gsnav::default_simulator_scene(0, 1, 0.1).value();
   auto view = gsnav::default_scene_views()[0];
-  auto camera = gsnav::Camera::look_at(view.eye, view.target, {0, 1, 0}, 128, 128, 90);
+  auto camera = gsnav::Camera::look_at(view.eye, view.target, {0, 1, 0}, 96, 96, 90);
 
   // Once a scene: look around from everywhere at the camera's height. gsnav-navmesh does it for files.
   gsnav::VisibleSettings settings{.cell = 1.0, .margin = 0.5};

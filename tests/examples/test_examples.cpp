@@ -44,8 +44,7 @@ TestGltf column() {
   for (int ring = 0; ring < kRings; ++ring) {
     const float y = 0.3f * static_cast<float>(ring), upper = y > 0.9f ? 1.0f : 0.0f;
     for (int k = 0; k < 4; ++k) {
-      positions.insert(positions.end(),
-                       {k == 1 || k == 2 ? 0.15f : -0.15f, y, k >= 2 ? 0.15f : -0.15f});
+      positions.insert(positions.end(), {k == 1 || k == 2 ? 0.15f : -0.15f, y, k >= 2 ? 0.15f : -0.15f});
       weights.insert(weights.end(), {1 - upper, upper, 0, 0});
       joints.insert(joints.end(), {0, 1, 0, 0});
       const int n = (k + 1) % 4, at = 4 * ring;
@@ -60,10 +59,9 @@ TestGltf column() {
   g.doc["meshes"].push_back(
       {{"primitives",
         json::array({{{"attributes", attributes}, {"indices", g.add(triangles, "SCALAR", 5123)}}})}});
-  const std::size_t binds =
-      g.add(std::vector<float>{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0,     0, 1,
-                               1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.9f, 0, 1},
-            "MAT4", 5126);
+  const std::size_t binds = g.add(std::vector<float>{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0,     0, 1,
+                                                     1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.9f, 0, 1},
+                                  "MAT4", 5126);
   g.doc["skins"].push_back({{"joints", {0, 1}}, {"inverseBindMatrices", binds}});
   g.doc["nodes"] = json::array({{{"name", "foot"}, {"children", {1}}},
                                 {{"name", "back"}, {"translation", {0, 0.9, 0}}},
@@ -151,7 +149,8 @@ TEST_CASE("people: a sequence in which somebody moves") {
   REQUIRE(made.ok);
   for (int k = 0; k < 8; ++k)
     check_picture(folder / ("people_" + std::to_string(k) + ".png"), 320, 240, 0.9);
-  CHECK(io::load_png(folder / "people_0.png")->samples != io::load_png(folder / "people_7.png")->samples);
+  CHECK(io::load_png(folder / "people_0.png")->samples !=
+        io::load_png(folder / "people_7.png")->samples);
 }
 
 TEST_CASE("avatar_from_gltf: a rigged mesh becomes an avatar that moves") {
@@ -180,11 +179,11 @@ TEST_CASE("on_gpu: images stay where they are drawn") {
     MESSAGE("no GPU here: " << gpu.text);
   } else {
     CHECK(gpu.ok);
-    CHECK(gpu.says("64 images, in the device's memory"));
+    CHECK(gpu.says("16 images, in the device's memory"));
   }
   const Outcome cpu = run_command(EXAMPLE_ON_GPU, "cpu", folder.path());
   CHECK(cpu.ok);
-  CHECK(cpu.says("64 images, in host memory"));
+  CHECK(cpu.says("16 images, in host memory"));
 }
 
 TEST_CASE("view_cells: what is not seen is not drawn, and hardly missed") {
@@ -192,5 +191,13 @@ TEST_CASE("view_cells: what is not seen is not drawn, and hardly missed") {
   const Outcome made = run_command(EXAMPLE_VIEW_CELLS, "", folder.path());
   INFO(made.text);
   CHECK(made.ok);
-  CHECK(made.says("colours differ by 0.00"));
+  std::size_t places = 0, cells = 0, seen = 0, all = 0;
+  double difference = 1;
+  REQUIRE(std::sscanf(made.text.c_str(),
+                      "%zu viewpoints, %zu cells; from here %zu of %zu Gaussians are seen\ncolours "
+                      "differ by %lf",
+                      &places, &cells, &seen, &all, &difference) == 5);
+  CHECK(seen > 0);
+  CHECK(seen < 0.95 * static_cast<double>(all));
+  CHECK(difference < 0.002);
 }
