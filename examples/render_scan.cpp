@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// An image and a depth map of any scene. usage: render_scan [SCENE [DEVICE]]; writes rgb.png and depth.png
+// An image and a depth map of any scene. usage: render_scan [SCENE [DEVICE]]; writes rgb.png and
+// depth.png
 #include <cstdio>
 
 #include "gsnav/device/renderer.hpp"
