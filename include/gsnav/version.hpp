@@ -3,5 +3,5 @@
 
 /// The library's version; CMake reads these three lines.
 #define GSNAV_VERSION_MAJOR 0
-#define GSNAV_VERSION_MINOR 1
+#define GSNAV_VERSION_MINOR 2
 #define GSNAV_VERSION_PATCH 0
