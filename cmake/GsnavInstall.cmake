@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-# Headers, libraries, CMake package and pkg-config file. Each compiled component has an export of
+# Headers, libraries, CMake package and pkg-config files. Each compiled component has an export of
 # its own, so that a user needs the dependencies of the components asked for and no others.
 include(CMakePackageConfigHelpers)
+include(GsnavPkgConfig)
 
 set(_package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/gsnav")
 
@@ -16,6 +17,7 @@ endforeach()
 
 install(TARGETS gsnav EXPORT gsnavTargets)
 install(EXPORT gsnavTargets NAMESPACE gsnav:: DESTINATION "${_package_dir}")
+_gsnav_pc_headers()
 
 # ---- components. The arguments of find_package for each namespace that a component may link; a link
 # that is not in the table stops the configure, so no dependency can be forgotten.
@@ -37,6 +39,7 @@ foreach(_target IN LISTS _components)
   string(REGEX REPLACE "^gsnav_" "" _name "${_target}")
   set(_links)
   set(_packages)
+  set(_namespaces)
   get_target_property(_libraries ${_target} LINK_LIBRARIES)
   foreach(_library IN LISTS _libraries)
     string(REGEX REPLACE "::.*" "" _namespace "${_library}")
@@ -46,6 +49,7 @@ foreach(_target IN LISTS _components)
       endif()
     elseif(DEFINED _package_${_namespace})
       list(APPEND _packages "${_package_${_namespace}}")
+      list(APPEND _namespaces ${_namespace})
     elseif(NOT _library MATCHES "^(gsnav$|::@|\\$<BUILD_INTERFACE:)")
       message(FATAL_ERROR "${_target} links ${_library}: add its package to cmake/GsnavInstall.cmake")
     endif()
@@ -57,6 +61,7 @@ foreach(_target IN LISTS _components)
     endif()
   endforeach()
   list(APPEND GSNAV_COMPONENT_NAMES ${_name})
+  _gsnav_pc_component(${_target} ${_name} "${_links}" "${_namespaces}")
   list(TRANSFORM _packages REPLACE "(.+)" "\"\\1\"")
   list(JOIN _packages " " _packages)
   list(JOIN _links " " _links)
@@ -82,21 +87,5 @@ write_basic_package_version_file("${PROJECT_BINARY_DIR}/cmake/gsnavConfigVersion
 file(GLOB _find_modules "${PROJECT_SOURCE_DIR}/cmake/Find*.cmake")
 install(FILES "${PROJECT_BINARY_DIR}/cmake/gsnavConfig.cmake"
   "${PROJECT_BINARY_DIR}/cmake/gsnavConfigVersion.cmake" ${_find_modules} DESTINATION "${_package_dir}")
-
-# ---- pkg-config, header-only part; relative to the file, so that the tree can be moved
-set(_pc_dir "${CMAKE_INSTALL_DATAROOTDIR}/pkgconfig")
-file(RELATIVE_PATH _up "/prefix/${_pc_dir}" "/prefix")
-if(IS_ABSOLUTE "${_pc_dir}")
-  set(GSNAV_PC_PREFIX "${CMAKE_INSTALL_PREFIX}")
-else()
-  string(REGEX REPLACE "/$" "" GSNAV_PC_PREFIX "\${pcfiledir}/${_up}")
-endif()
-if(IS_ABSOLUTE "${CMAKE_INSTALL_INCLUDEDIR}")
-  set(GSNAV_PC_INCLUDEDIR "${CMAKE_INSTALL_INCLUDEDIR}")
-else()
-  set(GSNAV_PC_INCLUDEDIR "\${prefix}/${CMAKE_INSTALL_INCLUDEDIR}")
-endif()
-configure_file("${PROJECT_SOURCE_DIR}/cmake/gsnav.pc.in" "${PROJECT_BINARY_DIR}/cmake/gsnav.pc" @ONLY)
-install(FILES "${PROJECT_BINARY_DIR}/cmake/gsnav.pc" DESTINATION "${_pc_dir}")
 
 install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${CMAKE_INSTALL_DOCDIR}")
