@@ -71,6 +71,7 @@ class Gsnav(ConanFile):
     def generate(self):
         CMakeDeps(self).generate()
         toolchain = CMakeToolchain(self)
+        toolchain.user_presets_path = False  # nothing is written among the sources
         for component, option in (("IO", "io"), ("NAV", "sim"), ("SIM", "sim"), ("TOOLS", "tools"), ("CUDA", "cuda")):
             toolchain.cache_variables[f"GSNAV_{component}"] = bool(self.options.get_safe(option))
         toolchain.cache_variables["GSNAV_EXAMPLES"] = False

@@ -19,6 +19,7 @@ class GsnavTest(ConanFile):
     def generate(self):
         CMakeDeps(self).generate()
         toolchain = CMakeToolchain(self)
+        toolchain.user_presets_path = False  # nothing is written among the sources
         options = self.dependencies["gsnav"].options
         wanted = ["openmp", "avatar", "rigging", "demo", "eval"]
         wanted += ["io"] if options.io else []
