@@ -1,0 +1,42 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+#
+# usage: check_demo_script.sh PROGRAM SOURCE_FOLDER
+# The help that tools/run_demo.sh prints is that of the program, and what it can answer by itself it answers without
+# apt-get, cmake or a compiler.
+set -euo pipefail
+program=$1 source=$2
+
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+failed=0
+fail() { echo "FAILED: $*"; failed=1; }
+
+(exec -a nav_loop "$program" --help) > "$work/help.txt"
+if ! diff "$source/examples/nav_loop/help.txt" "$work/help.txt"; then
+  fail "examples/nav_loop/help.txt is not what nav_loop prints; write it anew:" \
+       "(exec -a nav_loop $program --help) > examples/nav_loop/help.txt"
+fi
+
+# In place of what installs and builds: programs that leave a trace. nvidia-smi finds no GPU.
+mkdir "$work/bin"
+for name in apt-get cmake ninja sudo; do
+  printf '#!/bin/sh\necho %s >> "%s/called"\nexit 1\n' $name "$work" > "$work/bin/$name"
+done
+printf '#!/bin/sh\nexit 9\n' > "$work/bin/nvidia-smi"
+chmod +x "$work"/bin/*
+demo() { status=0; PATH=$work/bin:$PATH "$source/tools/run_demo.sh" "$@" > "$work/out.txt" 2> "$work/err.txt" || status=$?; }
+
+for help in --help -h "--episodes 3 --help"; do
+  # shellcheck disable=SC2086
+  demo $help
+  [[ $status -eq 0 ]] && diff -q "$source/examples/nav_loop/help.txt" "$work/out.txt" || fail "run_demo.sh $help"
+done
+demo --episode 3
+[[ $status -eq 2 ]] && grep -q -- "no option --episode;" "$work/err.txt" || fail "run_demo.sh --episode: status $status"
+demo --out=folder --device=cuda:1
+[[ $status -eq 2 ]] && grep -q "no GPU" "$work/err.txt" || fail "run_demo.sh --device=cuda:1: status $status"
+demo --device cuda
+[[ $status -eq 2 ]] && grep -q "no GPU" "$work/err.txt" || fail "run_demo.sh --device cuda: status $status"
+[[ -e $work/called ]] && fail "to answer, it called $(sort -u "$work/called" | tr '\n' ' ')"
+exit $failed
