@@ -12,7 +12,7 @@ namespace {
 
 using gsnav::Vec3d;
 
-constexpr Rgb kEdge{0.25f, 0.75f, 1.0f};
+constexpr Rgb kNavMeshEdge{0.25f, 0.75f, 1.0f};
 constexpr double kNear = 0.05;     // metres: nothing nearer is drawn
 constexpr double kSurface = 0.12;  // metres that a line on the floor may lie behind the scene's depth
 constexpr double kBody = 0.6;      // the same for a body's axis, which is inside of its surface
@@ -45,7 +45,7 @@ void draw_line(const DrawnView& view, const Vec3d& a, const Vec3d& b) {
     if (from && to &&
         visible(view, {0.5 * (from->x + to->x), 0.5 * (from->y + to->y), 0.5 * (from->z + to->z)},
                 kSurface)) {
-      view.canvas.stroke(from->x, from->y, to->x, to->y, 0.7, kEdge, 0.7f);
+      view.canvas.stroke(from->x, from->y, to->x, to->y, 0.7, kNavMeshEdge, 0.7f);
     }
     from = to;
   }

@@ -9,7 +9,7 @@
 namespace gsnav_tools {
 namespace {
 
-constexpr Rgb kPaper{1, 1, 1}, kInk{0.1f, 0.1f, 0.1f};
+constexpr Rgb kPaper{1, 1, 1}, kLetters{0.1f, 0.1f, 0.1f};
 constexpr int kGap = 4, kText = 2, kBand = 5 * kText + 2 * kGap;
 
 /// A bar in the colours of depth between its ends' distances.
@@ -18,7 +18,7 @@ void draw_scale(Canvas& sheet, int x, int y) {
   char near[16], far[16];
   std::snprintf(near, sizeof near, "DEPTH %.1f m ", static_cast<double>(kDepthNear));
   std::snprintf(far, sizeof far, " %.0f m", static_cast<double>(kDepthFar));
-  sheet.text(x, y, near, kText, kInk);
+  sheet.text(x, y, near, kText, kLetters);
   x += Canvas::text_width(near, kText);
   std::vector<float> metres;
   for (int i = 0; i < kSteps; ++i)
@@ -29,7 +29,7 @@ void draw_scale(Canvas& sheet, int x, int y) {
     sheet.rect(x, y, kStep, 5 * kText, {part(0), part(1), part(2)}, 1.0f);
     x += kStep;
   }
-  sheet.text(x, y, far, kText, kInk);
+  sheet.text(x, y, far, kText, kLetters);
 }
 
 }  // namespace
@@ -48,7 +48,7 @@ Canvas draw_strip(std::span<const Shot> shots, int w, int h) {
   for (const Shot& shot : shots) {
     char seconds[24];
     std::snprintf(seconds, sizeof seconds, "%.1f S", shot.seconds);
-    sheet.text(x, kGap, seconds, kText, kInk);
+    sheet.text(x, kGap, seconds, kText, kLetters);
     sheet.paste(shot.rgb.data(), w, h, x, kBand);
     sheet.paste(shot.depth.data(), w, h, x, kBand + h + kGap);
     x += w + kGap;
