@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <numeric>
 #include <optional>
 #include <span>
 #include <string>
@@ -172,6 +171,51 @@ inline Status validate(const VisibleSettings& s) {
   return {};
 }
 
+namespace detail {
+
+/// Fills out.keys: the cells that a viewpoint is in or within 5 cm (world) of. Returns the viewpoints in
+/// the asset's frame. out.cell is set.
+inline Result<std::vector<Vec3d>> find_cells(VisibleSets& out, std::span<const Vec3d> viewpoints,
+                                             const Similarity& world_from_asset) {
+  constexpr double kBeside = 0.05;  // metres
+  std::vector<Vec3d> eyes;
+  for (std::size_t v = 0; v < viewpoints.size(); ++v) {
+    eyes.push_back(inverse(world_from_asset) * viewpoints[v]);
+    const auto key = VisibleSets::key_of(eyes.back(), out.cell);
+    if (!key) {
+      return Status(Errc::invalid_argument,
+                    "build_visible_sets: viewpoint " + std::to_string(v) + " is not finite or too far");
+    }
+    // Rounding, or a step in the floor, must not take a camera that is where a viewpoint is to a cell
+    // that has none.
+    for (int corner = 0; corner < 8; ++corner) {
+      Vec3d beside = eyes.back();
+      for (int k = 0; k < 3; ++k)
+        beside[k] += ((corner >> k & 1) != 0 ? 1 : -1) * kBeside / world_from_asset.scale;
+      out.keys.push_back(VisibleSets::key_of(beside, out.cell).value_or(*key));
+    }
+  }
+  std::sort(out.keys.begin(), out.keys.end());
+  out.keys.erase(std::unique(out.keys.begin(), out.keys.end()), out.keys.end());
+  return eyes;
+}
+
+/// Adds the chunks within `distance` of each cell, whole: a camera in the cell may be in front of such a
+/// chunk where no viewpoint is.
+template <Backend B>
+void add_near_chunks(B& backend, const VisibleSets& sets, const GaussianCloud& cloud, double distance,
+                     std::vector<SeenOfCell>& found) {
+  backend.parallel_for(sets.cells(), [&](std::size_t c) {
+    const CellCube cube(sets.keys[c], sets.cell);
+    for (std::size_t i = 0; i < sets.cloud_chunks; ++i) {
+      const ChunkBounds& b = cloud.chunk_bounds[i];
+      if (cube.distance(b.low, b.high) <= distance) found[c].add(i, all_rows(cloud.size(), i));
+    }
+  });
+}
+
+}  // namespace detail
+
 /// Finds what of a cloud is seen from each cell that has a viewpoint in it or within 5 cm (world,
 /// metres; navmesh_viewpoints makes them): the cloud stands in the world by `world_from_asset`, with
 /// bounds of its chunks (sort_spatially). Each viewpoint costs six frames of settings.face pixels a
@@ -198,82 +242,29 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
   out.min_weight = settings.min_weight;
   out.cloud_chunks = cloud.view().chunk_count();
   out.viewpoints = viewpoints.size();
-  constexpr double kBeside = 0.05;  // metres
-  std::vector<Vec3d> eyes;          // in the asset's frame
-  for (std::size_t v = 0; v < viewpoints.size(); ++v) {
-    eyes.push_back(inverse(world_from_asset) * viewpoints[v]);
-    const auto key = VisibleSets::key_of(eyes.back(), out.cell);
-    if (!key) {
-      return Status(Errc::invalid_argument,
-                    "build_visible_sets: viewpoint " + std::to_string(v) + " is not finite or too far");
-    }
-    // Rounding, or a step in the floor, must not take a camera that is where a viewpoint is to a cell
-    // that has none.
-    for (int corner = 0; corner < 8; ++corner) {
-      Vec3d beside = eyes.back();
-      for (int k = 0; k < 3; ++k)
-        beside[k] += ((corner >> k & 1) != 0 ? 1 : -1) * kBeside / world_from_asset.scale;
-      out.keys.push_back(VisibleSets::key_of(beside, out.cell).value_or(*key));
-    }
-  }
-  std::sort(out.keys.begin(), out.keys.end());
-  out.keys.erase(std::unique(out.keys.begin(), out.keys.end()), out.keys.end());
+  const auto eyes = detail::find_cells(out, viewpoints, world_from_asset);
+  if (!eyes) return eyes.status();
 
-  const auto box_of = [&out](const VisibleSets::Key& key, Vec3d& low, Vec3d& high) {
-    for (int k = 0; k < 3; ++k) {
-      low[k] = static_cast<double>(key[static_cast<std::size_t>(k)]) * out.cell;
-      high[k] = low[k] + out.cell;
-    }
-  };
   std::vector<detail::SeenOfCell> found(out.cells(), detail::SeenOfCell(out.cloud_chunks));
-  // What is so near that a camera in the cell may be in front of it and a viewpoint not.
-  const double near_distance = settings.near_plane / world_from_asset.scale;
-  backend.parallel_for(out.cells(), [&](std::size_t c) {
-    Vec3d low, high;
-    box_of(out.keys[c], low, high);
-    for (std::size_t i = 0; i < out.cloud_chunks; ++i) {
-      const ChunkBounds& b = cloud.chunk_bounds[i];
-      if (detail::box_distance(low, high, b.low, b.high) <= near_distance)
-        found[c].add(i, detail::all_rows(cloud.size(), i));
-    }
-  });
+  detail::add_near_chunks(backend, out, cloud, settings.near_plane / world_from_asset.scale, found);
   const double margin = settings.margin / world_from_asset.scale;
+  const auto counts_for = [&](std::size_t cell, std::size_t v) {
+    const Vec3d& eye = (*eyes)[v];
+    return detail::CellCube(out.keys[cell], out.cell).distance(eye, eye) <= margin;
+  };
+  const bool with_sample = settings.most_share < 1 && out.cells() >= detail::kLeastSampled;
+  const auto [sample, order, sampled] =
+      detail::order_viewpoints(out.cells(), viewpoints.size(), with_sample, counts_for);
+
   const GaussianSet set = cloud.set(world_from_asset);
   RowWeightsWorkspace<B> workspace(backend);
   std::vector<float> most(cloud.size());
   std::vector<detail::RowBits> rows(out.cloud_chunks);
-  const auto counts_for = [&](std::size_t cell, std::size_t v) {
-    Vec3d low, high;
-    box_of(out.keys[cell], low, high);
-    return detail::box_distance(low, high, eyes[v], eyes[v]) <= margin;
-  };
-  // Viewpoints of the sample come first. What is found does not depend on the order.
-  std::vector<std::size_t> sample, order(viewpoints.size());
-  if (settings.most_share < 1 && out.cells() >= detail::kLeastSampled) {
-    for (std::size_t k = 0; k < detail::kSampleCells; ++k)
-      sample.push_back((2 * k + 1) * out.cells() / (2 * detail::kSampleCells));
-  }
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  const auto rest = std::stable_partition(order.begin(), order.end(), [&](std::size_t v) {
-    return std::any_of(sample.begin(), sample.end(), [&](std::size_t c) { return counts_for(c, v); });
-  });
-  const auto sampled = static_cast<std::size_t>(rest - order.begin());
   for (std::size_t done = 0; done < order.size(); ++done) {
     const std::size_t v = order[done];
     if (done == sampled && !sample.empty()) {
-      double share = 0;
-      for (const std::size_t c : sample) share += static_cast<double>(found[c].count());
-      share /= static_cast<double>(sample.size()) *
-               static_cast<double>(std::max<std::size_t>(cloud.size(), 1));
-      if (share > settings.most_share) {
-        return Status(Errc::unsupported,
-                      "visible sets gain nothing here: " + std::to_string(sample.size()) + " of " +
-                          std::to_string(out.cells()) + " cells see " +
-                          std::to_string(std::lround(100 * share)) +
-                          " % of the Gaussians on average, more than most_share = " +
-                          std::to_string(std::lround(100 * settings.most_share)) +
-                          " %. Draw without them, or set most_share = 1");
-      }
+      if (Status s = detail::check_sample(found, sample, cloud.size(), settings.most_share); !s)
+        return s;
     }
     std::fill(most.begin(), most.end(), 0.0f);
     for (const Camera& camera : detail::cube_cameras(viewpoints[v], v, settings.face,

@@ -6,9 +6,12 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "gsnav/core/status.hpp"
 #include "gsnav/frame/gaussians.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/math/functions.hpp"
@@ -26,6 +29,21 @@ inline double box_distance(const Vec3d& low, const Vec3d& high, const Vec3d& oth
   for (int k = 0; k < 3; ++k) gap[k] = std::max({0.0, other_low[k] - high[k], low[k] - other_high[k]});
   return norm(gap);
 }
+
+/// The cube of a cell, in the asset's frame.
+struct CellCube {
+  CellCube(const std::array<std::int32_t, 3>& key, double side) noexcept {
+    for (int k = 0; k < 3; ++k) {
+      low[k] = static_cast<double>(key[static_cast<std::size_t>(k)]) * side;
+      high[k] = low[k] + side;
+    }
+  }
+  /// Distance to another box; 0 where they overlap.
+  double distance(const Vec3d& other_low, const Vec3d& other_high) const noexcept {
+    return box_distance(low, high, other_low, other_high);
+  }
+  Vec3d low, high;
+};
 
 /// A bit a row of a chunk.
 using RowBits = std::array<std::uint32_t, kSeenRowWords>;
@@ -107,6 +125,49 @@ class SeenOfCell {
 /// Cells that are looked at before it is said whether sets are worth their time, and the least number of
 /// cells for which it is asked.
 inline constexpr std::size_t kSampleCells = 16, kLeastSampled = 64;
+
+/// In which order viewpoints are looked from: those that the sampled cells need come first. The sets do
+/// not depend on it.
+struct ViewpointOrder {
+  std::vector<std::size_t> sample;  ///< cells, spread evenly; empty: none are sampled
+  std::vector<std::size_t> order;   ///< [viewpoints]
+  std::size_t sampled = 0;          ///< first in `order`: after these, the sampled cells are complete
+};
+
+/// `counts_for(cell, viewpoint)`: the cell sees what this viewpoint sees.
+template <class CountsFor>
+ViewpointOrder order_viewpoints(std::size_t cells, std::size_t viewpoints, bool with_sample,
+                                const CountsFor& counts_for) {
+  ViewpointOrder out;
+  if (with_sample) {
+    for (std::size_t k = 0; k < kSampleCells; ++k)
+      out.sample.push_back((2 * k + 1) * cells / (2 * kSampleCells));
+  }
+  out.order.resize(viewpoints);
+  std::iota(out.order.begin(), out.order.end(), std::size_t{0});
+  const auto rest = std::stable_partition(out.order.begin(), out.order.end(), [&](std::size_t v) {
+    return std::any_of(out.sample.begin(), out.sample.end(),
+                       [&](std::size_t c) { return counts_for(c, v); });
+  });
+  out.sampled = static_cast<std::size_t>(rest - out.order.begin());
+  return out;
+}
+
+/// VisibleSettings::most_share: unsupported where the sampled cells see more than that of `size`
+/// Gaussians on average.
+inline Status check_sample(const std::vector<SeenOfCell>& found, const std::vector<std::size_t>& sample,
+                           std::size_t size, double most_share) {
+  double share = 0;
+  for (const std::size_t c : sample) share += static_cast<double>(found[c].count());
+  share /= static_cast<double>(sample.size()) * static_cast<double>(std::max<std::size_t>(size, 1));
+  if (!(share > most_share)) return {};
+  return {Errc::unsupported, "visible sets gain nothing here: " + std::to_string(sample.size()) +
+                                 " of " + std::to_string(found.size()) + " cells see " +
+                                 std::to_string(std::lround(100 * share)) +
+                                 " % of the Gaussians on average, more than most_share = " +
+                                 std::to_string(std::lround(100 * most_share)) +
+                                 " %. Draw without them, or set most_share = 1"};
+}
 
 /// Cameras that look at the six faces of a cube, turned about the world's up (Y) by another angle for
 /// each viewpoint: in what order Gaussians are blended depends on where a camera looks, so that some are
