@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks that no include points up or sideways, and that examples and tools use public headers alone
-(docs/architecture.md, "Layers").
+"""Checks that no include points up or sideways, and that examples, tools and the report use public headers and names
+alone (docs/architecture.md, "Layers"): no header under detail/, src/ or a backend's src/, by whichever path, and no
+`detail::`.
 
 usage: check_layers.py [root]      check a source tree (default: this one)
        check_layers.py --self-test plant violations in a scratch tree and expect to find each
@@ -20,8 +21,10 @@ DATA_ONLY = {"scene/gaussian_cloud.hpp", "scene/load_report.hpp", "scene/surface
 PLATFORM_HEADERS = {"immintrin.h", "arm_neon.h", "fcntl.h", "sys/mman.h", "sys/stat.h", "unistd.h"}
 # headers that include what users need
 MODULES = {"render", "avatar", "rigging", "nav", "sim", "io", "eval", "demo", "open", "gsnav"}
-MOST_PUBLIC = 70
+# Public headers: of the library in include/, and those that backends add for who names a backend.
+MOST_PUBLIC, MOST_PUBLIC_OF_BACKENDS = 70, 8
 SOURCES = {".hpp", ".cpp", ".h", ".inl", ".cu", ".cuh"}
+NO_CODE = re.compile(r'//[^\n]*|/\*.*?\*/|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"', re.DOTALL)
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
 
 
@@ -45,6 +48,34 @@ def allowed(layer, target, target_path):
     if layer == "avatar" and target_path in DATA_ONLY:
         return True
     return RANK.get(target, 99) < RANK[layer]
+
+
+def private(root, file, name):
+    """Whether this include of a program leads to what is not for users."""
+    places = [root / top / name for top in ("include", "src")] + list(root.glob(f"backends/*/{name}"))
+    for place in (file.parent / name, *places):
+        if place.is_file():
+            parts = place.resolve().relative_to(root.resolve()).parts
+            return (parts[:3] == ("include", "gsnav", "detail") or parts[0] == "src" or
+                    (parts[0] == "backends" and parts[2:3] != ("gsnav",)))
+    return name.startswith("gsnav/detail/")
+
+
+def public_headers(root):
+    """Those of the library and those of backends."""
+    library = [p for p in (root / "include/gsnav").rglob("*.hpp")
+               if p.relative_to(root / "include/gsnav").parts[0] != "detail"]
+    return library, [p for p in root.glob("backends/*/gsnav/**/*") if p.suffix in SOURCES]
+
+
+def check_program(root, file):
+    """What an example or a tool uses that is not for users."""
+    text, path = file.read_text(encoding="utf-8"), file.relative_to(root)
+    wrong = [f"{path}: {name} is not for users; its module header is" for _, name in INCLUDE.findall(text)
+             if private(root, file, name)]
+    code = NO_CODE.sub(lambda m: "\n" * m.group().count("\n"), text)
+    return wrong + [f"{path}:{code.count(chr(10), 0, m.start()) + 1}: names in detail are not for users: {m.group()}"
+                    for m in re.finditer(r"\b(?:\w+::)*detail::\w+|\bnamespace\b[^;{]*\bdetail\b", code)]
 
 
 def check(root):
@@ -76,13 +107,12 @@ def check(root):
     for top in ("examples", "tools", "bench/report"):
         for file in sorted(p for p in (root / top).rglob("*") if p.suffix in SOURCES):
             files.append(file)
-            for _, name in INCLUDE.findall(file.read_text(encoding="utf-8")):
-                if name.startswith("gsnav/detail/"):
-                    wrong.append(f"{file.relative_to(root)}: {name} is not for users; its module header is")
-    public = [p for p in (root / "include/gsnav").rglob("*.hpp")
-              if p.relative_to(root / "include/gsnav").parts[0] != "detail"]
-    if len(public) > MOST_PUBLIC:
-        wrong.append(f"include/gsnav: {len(public)} public headers, more than {MOST_PUBLIC}")
+            wrong += check_program(root, file)
+    library, of_backends = public_headers(root)
+    if len(library) > MOST_PUBLIC:
+        wrong.append(f"include/gsnav: {len(library)} public headers, more than {MOST_PUBLIC}")
+    if len(of_backends) > MOST_PUBLIC_OF_BACKENDS:
+        wrong.append(f"backends: {len(of_backends)} public headers, more than {MOST_PUBLIC_OF_BACKENDS}")
     return files, wrong
 
 
@@ -90,7 +120,10 @@ def self_test():
     good = {"include/gsnav/config.hpp": "", "include/gsnav/core/view.hpp": '"gsnav/math/vec.hpp"',
             "include/gsnav/avatar/asset.hpp": '"gsnav/scene/gaussian_cloud.hpp"',
             "include/gsnav/interop/eigen.hpp": "<Eigen/Core>", "src/io/a.cpp": "<png.h>",
-            "backends/x/gsnav/backends/x.hpp": '"gsnav/render/render.hpp"'}
+            "backends/x/gsnav/backends/x.hpp": '"gsnav/render/render.hpp"', "include/gsnav/detail/io/ply.hpp": "",
+            "tools/t/own.hpp": '"gsnav/core/view.hpp"', "tools/t/own.cpp": '"../t/own.hpp"',
+            "examples/e/says.cpp": "// see gsnav::detail::f and namespace detail\nconst char* a = \"detail::f\";",
+            "tools/t/backend.cpp": '"gsnav/backends/x.hpp"'}
     bad = {"include/gsnav/core/up.hpp": '"gsnav/frame/sh.hpp"',
            "include/gsnav/scene/sideways.hpp": '"gsnav/nav/navmesh.hpp"',
            "include/gsnav/avatar/not_data.hpp": '"gsnav/scene/basic_renderer.hpp"',
@@ -99,15 +132,27 @@ def self_test():
            "src/sim/makes.cpp": '"gsnav/detail/rigging/retarget.hpp"',
            "src/sim/reads.cpp": '#  include "../io/private.hpp"', "src/io/private.hpp": "",
            "backends/y/gsnav/backends/y.hpp": '"gsnav/backends/x.hpp"',
+           "tools/t/relative.cpp": '"../../include/gsnav/detail/io/ply.hpp"',
+           "examples/e/source.cpp": '"../../src/io/private.hpp"', "tools/t/source.cpp": '"io/private.hpp"',
+           "tools/t/of_backend.cpp": '"../../backends/z/src/z.cpp"',
+           "tools/t/calls.cpp": "int a = gsnav::detail::f();", "examples/e/calls.cpp": "int a = detail::f();",
+           "bench/report/opens.cpp": "using namespace gsnav::io::detail;",
            "backends/z/src/z.cpp": '"gsnav/scene/basic_renderer.hpp"', "src/other/o.cpp": ""}
     with tempfile.TemporaryDirectory() as scratch:
         root = pathlib.Path(scratch)
         for name, include in {**good, **bad}.items():
             (root / name).parent.mkdir(parents=True, exist_ok=True)
-            line = include if include.startswith("#") or not include else f"#include {include}"
+            line = f"#include {include}" if include.startswith(('"', "<")) else include
             (root / name).write_text(line + "\n", encoding="utf-8")
         found = {line.split(":")[0] for line in check(root)[1]}
-    expected = set(bad) - {"src/io/private.hpp"}
+        expected = set(bad) - {"src/io/private.hpp"}
+        # The number of public headers has a limit.
+        for folder, most in (("include/gsnav/core", MOST_PUBLIC), ("backends/x/gsnav/x", MOST_PUBLIC_OF_BACKENDS)):
+            (root / folder).mkdir(parents=True, exist_ok=True)
+            for k in range(most + 1):
+                (root / folder / f"header{k}.hpp").write_text("\n", encoding="utf-8")
+        found |= {line.split(":")[0] for line in check(root)[1]}
+    expected |= {"include/gsnav", "backends"}
     if found != expected:
         sys.exit(f"missed: {sorted(expected - found)}\nwrongly found: {sorted(found - expected)}")
     print(f"{len(expected)} planted violations found")
@@ -119,5 +164,7 @@ if __name__ == "__main__":
     else:
         tree = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else pathlib.Path(__file__).parents[1]
         checked, violations = check(tree)
-        print("\n".join(violations) or f"{len(checked)} files keep to their layers")
+        library, of_backends = map(len, public_headers(tree))
+        print("\n".join(violations) or f"{len(checked)} files keep to their layers; public headers: "
+              f"{library} of the library, {of_backends} of backends")
         sys.exit(1 if violations or not checked else 0)

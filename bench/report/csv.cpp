@@ -158,7 +158,7 @@ Result<CsvFile> CsvFile::open(const std::filesystem::path& path, bool resume) {
 }
 
 Status CsvFile::add(Row row) {
-  if (Status s = gsnav::detail::append_line(path_, row.line()); !s) return s;
+  if (Status s = gsnav::append_line(path_, row.line()); !s) return s;
   keys_.insert(row.get("key"));
   rows_.push_back(std::move(row));
   return {};

@@ -282,10 +282,10 @@ TEST_CASE("replace_file: a new name is on the disk, as the bytes are") {
 
 TEST_CASE("append_line: on the disk when it returns; a full disk leaves whole lines") {
   const TempFolder folder("append");
-  CHECK(detail::append_line(folder / "none", "x").code() == Errc::file_not_found);
+  CHECK(append_line(folder / "none", "x").code() == Errc::file_not_found);
   write_file(folder / "a", "head\n");
   files_synced = 0;
-  CHECK(detail::append_line(folder / "a", "one").ok());
+  CHECK(append_line(folder / "a", "one").ok());
   CHECK(files_synced == 1);
   CHECK(read_file(folder / "a") == "head\none\n");
   fs::create_directories(folder / "disk");
@@ -295,7 +295,7 @@ TEST_CASE("append_line: on the disk when it returns; a full disk leaves whole li
   std::string expected = "head\n";
   const std::string line(10000, 'x');
   Status s;
-  while ((s = detail::append_line(folder / "disk/a", line))) expected += line + "\n";
+  while ((s = append_line(folder / "disk/a", line))) expected += line + "\n";
   CHECK(s.code() == Errc::write_failed);
   CHECK(read_file(folder / "disk/a") == expected);
 }

@@ -131,7 +131,7 @@ Status Journal::read(const fs::path& path, const Options& options, const Stage& 
                      " has no end, as after a kill: " + std::to_string(text.size() - whole) +
                      " bytes are dropped");
     if (own && ::truncate(path.c_str(), static_cast<::off_t>(whole)) != 0) {
-      return gsnav::detail::unwritable(path, errno);
+      return gsnav::unwritable(path, errno);
     }
   }
   return {};
@@ -210,7 +210,7 @@ Status Journal::lock() {
 }
 
 Status Journal::add(Record record) {
-  if (Status s = gsnav::detail::append_line(path_, line_of(record)); !s) return s;
+  if (Status s = gsnav::append_line(path_, line_of(record)); !s) return s;
   records_.insert_or_assign(record.episode, std::move(record));
   return {};
 }

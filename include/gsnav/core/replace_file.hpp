@@ -18,7 +18,6 @@
 #include "gsnav/core/status.hpp"
 
 namespace gsnav {
-namespace detail {
 
 /// Error of an output path: "PATH: cannot be written: WHY".
 inline Status unwritable(const std::filesystem::path& path, const std::string& why,
@@ -29,6 +28,8 @@ inline Status unwritable(const std::filesystem::path& path, int error,
                          Errc code = Errc::file_not_found) {
   return unwritable(path, std::generic_category().message(error), code);
 }
+
+namespace detail {
 
 /// Follows the symbolic links of a path, also where the last one leads to nothing yet.
 inline std::filesystem::path link_target(std::filesystem::path path) {
@@ -57,6 +58,8 @@ inline int sync_folder(const std::filesystem::path& folder) {
   return error;
 }
 
+}  // namespace detail
+
 /// Appends a line to a file that exists. It is on the disk when this returns (fdatasync); a failure
 /// leaves the file as it was. A process that is killed can leave part of the line, without its end.
 inline Status append_line(const std::filesystem::path& path, std::string line) {
@@ -78,8 +81,6 @@ inline Status append_line(const std::filesystem::path& path, std::string line) {
   return error == 0 ? Status() : unwritable(path, error, Errc::write_failed);
 }
 
-}  // namespace detail
-
 /// Checks that a file of this name can be written: the folder exists and may be written to, and what has
 /// the name is no folder and not write-protected. Writes nothing. Call it before long work whose result
 /// goes to `path`.
@@ -88,19 +89,19 @@ inline Status check_output_path(const std::filesystem::path& path) {
   struct ::stat found {};
   if (path.empty()) return {Errc::file_not_found, "the name of the file to write is empty"};
   if (::stat(path.c_str(), &found) == 0) {
-    if (S_ISDIR(found.st_mode)) return detail::unwritable(path, "it is a folder; name a file in it");
-    if (::access(path.c_str(), W_OK) != 0) return detail::unwritable(path, errno);
+    if (S_ISDIR(found.st_mode)) return unwritable(path, "it is a folder; name a file in it");
+    if (::access(path.c_str(), W_OK) != 0) return unwritable(path, errno);
     if (!S_ISREG(found.st_mode)) return {};  // a device or a pipe: written in place
   } else if (errno != ENOENT && errno != ENOTDIR) {
-    return detail::unwritable(path, errno);
+    return unwritable(path, errno);
   }
   const std::filesystem::path folder = detail::folder_of(detail::link_target(path));
   if (::stat(folder.c_str(), &found) != 0 || !S_ISDIR(found.st_mode)) {
-    return detail::unwritable(path, "the folder " + folder.string() + " does not exist; make it first");
+    return unwritable(path, "the folder " + folder.string() + " does not exist; make it first");
   }
-  if (path.filename().empty()) return detail::unwritable(path, "it ends in a slash; name a file");
+  if (path.filename().empty()) return unwritable(path, "it ends in a slash; name a file");
   if (::access(folder.c_str(), W_OK | X_OK) != 0) {
-    return detail::unwritable(
+    return unwritable(
         path, "in the folder " + folder.string() + ": " + std::generic_category().message(errno));
   }
   return {};
@@ -115,7 +116,7 @@ inline Status make_output_folder(const std::filesystem::path& folder) {
   if (error) {
     return {Errc::file_not_found, folder.string() + ": the folder cannot be made: " + error.message()};
   }
-  return ::access(folder.c_str(), W_OK | X_OK) == 0 ? Status() : detail::unwritable(folder, errno);
+  return ::access(folder.c_str(), W_OK | X_OK) == 0 ? Status() : unwritable(folder, errno);
 }
 
 /// A file being written, which takes its name only when it is whole.
@@ -150,7 +151,7 @@ class OutputFile {
       target_ = detail::link_target(path);
       fd = open_aside();
     }
-    if (fd < 0) return detail::unwritable(path, errno);
+    if (fd < 0) return unwritable(path, errno);
     if (exists && !in_place_) {  // as far as we may
       [[maybe_unused]] const int owner = ::fchown(fd, old.st_uid, old.st_gid);
       [[maybe_unused]] const int mode = ::fchmod(fd, old.st_mode & 0777);
@@ -160,7 +161,7 @@ class OutputFile {
       const int error = errno;
       ::close(fd);
       remove_aside();
-      return detail::unwritable(path, error);
+      return unwritable(path, error);
     }
     return {};
   }
@@ -192,7 +193,7 @@ class OutputFile {
       if (error_ == 0) return {};
     }
     remove_aside();
-    return detail::unwritable(path_, error_, Errc::write_failed);
+    return unwritable(path_, error_, Errc::write_failed);
   }
 
   /// Gives up: nothing is left of what was written. Does nothing where no file is open.
