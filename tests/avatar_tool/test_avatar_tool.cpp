@@ -42,14 +42,8 @@ void write_floor(const std::filesystem::path& path) {
   save_navmesh(NavMesh::build(settings, v, t).value(), path).throw_if_error();
 }
 
-}  // namespace
-
-TEST_CASE("avatar tool: somebody walks around a wall") {
-  const TempFolder folder("avatar_tool_walk");
-  write_floor(folder / "floor.navmesh");
-  const AvatarAsset person = make_humanoid({.gaussians = 4000});
-  io::save_avatar(folder / "person.npz", person).throw_if_error();
-  // A clip of its own walk, two cycles, as a driver.
+/// A clip of a person's own walk, two cycles, as a driver.
+void write_own_walk(const std::filesystem::path& path, const AvatarAsset& person) {
   const WalkMotion gait = WalkMotion::create(person.skeleton).value();
   io::DriverFrames clip;
   clip.frame_rate = 60;
@@ -61,7 +55,29 @@ TEST_CASE("avatar tool: somebody walks around a wall") {
     forward_kinematics(person.skeleton, pose, joints);
     clip.matrices.insert(clip.matrices.end(), joints.begin(), joints.end());
   }
-  io::save_driver(folder / "clip.npz", clip).throw_if_error();
+  io::save_driver(path, clip).throw_if_error();
+}
+
+/// Pixels of a picture in a strip of three, each 64 x 48 pixels, that show somebody.
+int lit_pixels(const io::PngImage& strip, int picture) {
+  int count = 0;
+  for (int y = 0; y < 48; ++y) {
+    for (int x = 64 * picture; x < 64 * (picture + 1); ++x) {
+      const std::size_t at = 3 * static_cast<std::size_t>(y * 3 * 64 + x);
+      count += strip.samples[at] + strip.samples[at + 1] + strip.samples[at + 2] > 60 ? 1 : 0;
+    }
+  }
+  return count;
+}
+
+}  // namespace
+
+TEST_CASE("avatar tool: somebody walks around a wall") {
+  const TempFolder folder("avatar_tool_walk");
+  write_floor(folder / "floor.navmesh");
+  const AvatarAsset person = make_humanoid({.gaussians = 4000});
+  io::save_avatar(folder / "person.npz", person).throw_if_error();
+  write_own_walk(folder / "clip.npz", person);
   const std::string common = "walk --avatar " + quoted(folder / "person.npz") + " --navmesh " +
                              quoted(folder / "floor.navmesh") + " --clip " +
                              quoted(folder / "clip.npz") + " --out " + quoted(folder / "walk.npz");
@@ -69,6 +85,8 @@ TEST_CASE("avatar tool: somebody walks around a wall") {
   INFO(made.text);
   REQUIRE(made.ok);
   CHECK(made.says("feet slide"));
+  LocalPose pose;
+  std::vector<Affine3<double>> joints;
   const auto driver = io::load_driver(folder / "walk.npz", person.skeleton);
   REQUIRE(driver.ok());
   const MotionClip& walk = driver->clip;
@@ -126,18 +144,8 @@ TEST_CASE("avatar tool: somebody walks around a wall") {
   REQUIRE(picture.ok());
   CHECK(picture->width == 3 * 64);
   CHECK(picture->height == 48);
-  const auto lit = [&](int part) {  // pixels of a picture that show somebody
-    int count = 0;
-    for (int y = 0; y < 48; ++y) {
-      for (int x = 64 * part; x < 64 * (part + 1); ++x) {
-        const std::size_t at = 3 * static_cast<std::size_t>(y * 3 * 64 + x);
-        count += picture->samples[at] + picture->samples[at + 1] + picture->samples[at + 2] > 60 ? 1 : 0;
-      }
-    }
-    return count;
-  };
-  CHECK(lit(0) > 20);
-  CHECK(lit(1) > 20);
+  CHECK(lit_pixels(*picture, 0) > 20);
+  CHECK(lit_pixels(*picture, 1) > 20);
   CHECK(run(folder, strip + " --frames 0").says("frames"));
   CHECK(run(folder, strip + " --flat --scene x.ply").says("--scene"));
 

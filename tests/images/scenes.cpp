@@ -104,15 +104,18 @@ Configure all_images_and(const Configure& more) {
   };
 }
 
-void add_flat(SceneList& list) {
-  const auto cloud = in_chunks(make_default_scene(0.05).value().cloud);
+/// Two people who walk in the flat.
+std::vector<AvatarActor> walkers() {
   const auto child =
       std::make_shared<const AvatarAsset>(make_humanoid({.gaussians = 2000, .sh_degree = 1}));
   const auto adult =
       std::make_shared<const AvatarAsset>(make_humanoid({.build = 1.1, .seed = 3, .gaussians = 2000}));
-  const std::vector<AvatarActor> people{
-      make_walker(child, {{3.4, 0, 3.7}, {5.4, 0, 3.0}}).value(),
-      make_walker(adult, {{5.3, 0, 1.6}, {3.6, 0, 2.9}, {4.6, 0, 4.0}}).value()};
+  return {make_walker(child, {{3.4, 0, 3.7}, {5.4, 0, 3.0}}).value(),
+          make_walker(adult, {{5.3, 0, 1.6}, {3.6, 0, 2.9}, {4.6, 0, 4.0}}).value()};
+}
+
+void add_flat(SceneList& list, const std::shared_ptr<const GaussianCloud>& cloud,
+              const std::vector<AvatarActor>& people) {
   MeshScene board, glass;
   board
       .add(rectangle({{{1.0f, 0.0f, 1.0f}, {3.4f, 0.0f, 2.4f}, {3.4f, 1.1f, 2.4f}, {1.0f, 1.1f, 1.0f}}},
@@ -166,17 +169,21 @@ void add_flat(SceneList& list) {
     c.outputs = kFirstHitDepth;
     c.first_hit_tau = 0.2;
   });
+}
 
-  // Levels of detail and view cells, of a tree and of a set that ships its levels.
+/// Levels of detail and visible sets, of a tree and of a set that ships its levels.
+void add_detailed_flat(SceneList& list, const std::shared_ptr<const GaussianCloud>& cloud,
+                       const std::vector<AvatarActor>& people) {
   SerialBackend backend;
+  const Camera camera = camera_in_flat(0, 50, 38);
   const auto detailed = [&](const std::string& name, std::shared_ptr<const GaussianCloud> of_cloud,
                             std::shared_ptr<const LodTree> tree) {
     SimulatorScene scene;
     scene.assets.push_back({std::move(of_cloud), {}, std::move(tree)});
     VisibleSettings cells;
-    cells.serve(flat.camera);
+    cells.serve(camera);
     cells.face = 64;
-    const Vec3d eye = flat.camera.position();
+    const Vec3d eye = camera.position();
     scene.assets[0].visible = std::make_shared<const VisibleSets>(
         build_visible_sets(backend, *scene.assets[0].cloud, std::array{eye, eye + Vec3d{0.3, 0, 0.2}},
                            cells)
@@ -190,7 +197,7 @@ void add_flat(SceneList& list) {
       ImageScene chosen;
       chosen.name = name + (which == 1 ? ", levels of detail" : which == 2 ? ", view cells" : ", both");
       chosen.detailed = there;
-      chosen.camera = flat.camera;
+      chosen.camera = camera;
       if ((which & 1) != 0) chosen.choice.lod = coarse;
       chosen.choice.visible_sets = (which & 2) != 0;
       list.add(chosen);
@@ -283,7 +290,10 @@ void add_storages(SceneList& list) {
 const std::vector<ImageScene>& image_scenes() {
   static const std::vector<ImageScene> scenes = [] {
     SceneList list;
-    add_flat(list);
+    const auto flat = in_chunks(make_default_scene(0.05).value().cloud);
+    const std::vector<AvatarActor> people = walkers();
+    add_flat(list, flat, people);
+    add_detailed_flat(list, flat, people);
     add_storages(list);
     return std::move(list.scenes);
   }();

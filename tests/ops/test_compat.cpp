@@ -17,18 +17,20 @@ struct Emulated {
   std::vector<double> rgb, alpha, accumulated, expected;
 };
 
-/// Degree-0 clouds at the origin of the world, camera at the origin looking along +z.
-Emulated emulate(const GaussianCloud& cloud, const Camera& camera, Compat compat) {
-  struct Splat {
-    float key;
-    double x, y, z, opacity, inverse[3], color[3];
-    int x0, x1, y0, y1;
-  };
-  std::vector<Splat> splats;
+struct EmulatedSplat {
+  float key;
+  double x, y, z, opacity, inverse[3], color[3];
+  int x0, x1, y0, y1;  // tiles of 16 pixels, ends excluded
+};
+
+/// The splats of a cloud, nearest first.
+std::vector<EmulatedSplat> emulated_splats(const GaussianCloud& cloud, const Camera& camera,
+                                           Compat compat) {
+  std::vector<EmulatedSplat> splats;
   const int w = camera.width, h = camera.height;
   const int columns = (w + 15) / 16, rows = (h + 15) / 16;
   for (std::size_t i = 0; i < cloud.size(); ++i) {
-    Splat s{};
+    EmulatedSplat s{};
     const Vec3d t = cloud.mean(i);
     s.z = t.z;
     s.key = static_cast<float>(t.z);
@@ -93,12 +95,17 @@ Emulated emulate(const GaussianCloud& cloud, const Camera& camera, Compat compat
     splats.push_back(s);
   }
   std::stable_sort(splats.begin(), splats.end(), [](auto& l, auto& r) { return l.key < r.key; });
+  return splats;
+}
 
+/// Degree-0 clouds at the origin of the world, camera at the origin looking along +z.
+Emulated emulate(const GaussianCloud& cloud, const Camera& camera, Compat compat) {
+  const std::vector<EmulatedSplat> splats = emulated_splats(cloud, camera, compat);
   Emulated out;
-  for (int y = 0; y < h; ++y) {
-    for (int x = 0; x < w; ++x) {
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
       double transmittance = 1, color[3] = {}, depth = 0;
-      for (const Splat& s : splats) {
+      for (const EmulatedSplat& s : splats) {
         if (x / 16 < s.x0 || x / 16 >= s.x1 || y / 16 < s.y0 || y / 16 >= s.y1) continue;
         const double dx = x + 0.5 - s.x, dy = y + 0.5 - s.y;
         const double power =
