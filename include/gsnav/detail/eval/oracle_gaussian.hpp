@@ -110,7 +110,7 @@ struct OracleSet {
   std::size_t first_row = 0;        ///< among the rows of all sets
   RealColumns camera_from_asset{};  ///< scale included
   Real3 origin_in_camera{};         ///< the asset's origin, camera axes, metres
-  Vec3d eye{};                      ///< camera position, asset frame
+  Real3 eye{};                      ///< camera position, asset frame
   double log2_alpha_min;
 
   OracleSet(const GaussianSet& s, const Camera& c, const RenderConfig& rules, std::size_t first)
@@ -131,7 +131,11 @@ struct OracleSet {
     for (std::size_t k = 0; k < 3; ++k) camera_from_asset[k] = Real(a.scale) * view(turn[k]);
     const Vec3d& t = c.viewmat.translation;
     origin_in_camera = view({a.translation.x, a.translation.y, a.translation.z}) + Real3{t.x, t.y, t.z};
-    eye = inverse(a) * c.position();
+    // Where camera axes are 0: camera_from_asset has orthogonal columns, of one length.
+    const auto along = [this](const Real3& column) {
+      return -inner(column, origin_in_camera) / inner(column, column);
+    };
+    eye = {along(camera_from_asset[0]), along(camera_from_asset[1]), along(camera_from_asset[2])};
   }
   /// Stable id: sets one after the other, each in the order it was read in, however its rows lie in
   /// memory.
@@ -188,7 +192,7 @@ struct OracleSet {
   /// Colour seen from the camera, SH to `degree`, in `blend_space`.
   Vec3d color(std::size_t row, int degree, ColorSpace blend_space) const noexcept {
     const ColorRows& gs = set.gaussians.color;
-    Real3 d = place(row) + Real3{-eye.x, -eye.y, -eye.z};
+    Real3 d = place(row) + Real(-1) * eye;
     const Real length = std::sqrt(inner(d, d));
     d = length > 1e-12L ? (1 / length) * d : Real3{0, 0, 1};
     if (!gs.rotations.empty()) {
