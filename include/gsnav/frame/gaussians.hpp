@@ -222,4 +222,8 @@ struct GaussianSet {
   }
 };
 
+// Larger than what functions of kernels take (docs/architecture.md, "Sizes of arguments").
+static_assert(sizeof(void*) != 8 || (sizeof(ShapeRows) <= 256 && sizeof(ColorRows) <= 256));
+static_assert(sizeof(void*) != 8 || (sizeof(GaussianRows) <= 480 && sizeof(GaussianSet) <= 592));
+
 }  // namespace gsnav

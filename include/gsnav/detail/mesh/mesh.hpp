@@ -62,6 +62,8 @@ struct MeshInstance {
   Similarity world_from_mesh{};
   std::uint32_t id = 0;  ///< what the instance image shows; below kNoInstance
 };
+// On the host alone (docs/architecture.md, "Sizes of arguments").
+static_assert(sizeof(void*) != 8 || (sizeof(MeshView) <= 256 && sizeof(MeshInstance) <= 280));
 inline constexpr std::uint32_t kNoInstance = 0xffffffffu;  ///< pixels without a mesh
 
 /// How meshes are lit; linear RGB.
