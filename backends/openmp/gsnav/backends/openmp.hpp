@@ -46,8 +46,8 @@ namespace gsnav {
 inline namespace GSNAV_LANES_TAG {
 #endif
 
-/// The lane kernels of one instruction set, in the order in which a frame calls them.
-/// lanes::kernel_table fills it.
+/// The lane kernels of one instruction set: Gaussians, meshes (which a frame draws first), skinning and
+/// capsules. lanes::kernel_table fills it.
 struct LaneKernels {
   const char* name;
   int width;

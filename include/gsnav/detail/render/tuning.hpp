@@ -11,7 +11,7 @@ namespace gsnav {
 struct Tuning {
   int tile_size = 0;     ///< side of a tile, pixels: 8, 16 or 32, or 0 to choose by the image's size
   int depth_slices = 0;  ///< in [1, 8], or 0 to choose: number of front-to-back passes. A pass skips
-                         ///< what the passes before it hide. OpenMPBackend only
+                         ///< what the passes before it hide. Backends that can slice only (OpenMP)
   bool operator==(const Tuning&) const = default;
 };
 
