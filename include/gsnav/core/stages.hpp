@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
 #include "gsnav/core/backend.hpp"
@@ -88,9 +89,10 @@ struct Each {
   }
 };
 
-/// Projects a set of Gaussians for one camera, all chunks or some of them
-/// (detail/frame/project_chunk.hpp). Where a host backend has the second form, frames may be drawn in
-/// slices of depth (detail/render/depth_slices.hpp).
+/// Projects a set of Gaussians for one camera (detail/frame/project_chunk.hpp). A host backend may have
+/// a second form, whose third argument lists the chunks to project (ProjectsChunks): what a mesh hides
+/// is then not projected. With a Blend of its own as well, frames may be drawn in slices of depth
+/// (detail/render/depth_slices.hpp).
 struct Project {
   template <Backend B, class S>
   static void generic(B& backend, const ViewedSet<S>& args, const ProjectOutputs<S>& out) {
@@ -116,7 +118,9 @@ struct ScatterTiles {
   }
 };
 
-/// Blends the pixels of a frame without meshes (detail/frame/blend.hpp).
+/// Blends the pixels of a frame without meshes (detail/frame/blend.hpp). The form of a backend that
+/// ProjectsChunks must obey args.progress: it begins with the states that the slice of depth before
+/// left, leaves its own to the next, and says which cells are open. The generic form draws one slice.
 struct Blend {
   template <Backend B, class S>
   static void generic(B& backend, const RasterArgs<S>& args) {
@@ -169,4 +173,10 @@ struct SweepCapsules {
 };
 
 }  // namespace stage
+
+/// Host backends that have the form of stage::Project for some chunks of a set.
+template <class B, class S>
+concept ProjectsChunks = is_host_backend<B> &&
+    RunsStage<B, stage::Project, ViewedSet<S>, ProjectOutputs<S>, View<const std::uint32_t>>;
+
 }  // namespace gsnav

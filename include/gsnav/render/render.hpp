@@ -286,7 +286,7 @@ Status render_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gauss
   if (!drawn) {
     for (std::size_t i = 0; i < sets.size(); ++i) {
       const ViewedSet<S>& args = ws.projections[i];
-      if constexpr (sizeof(S) == sizeof(float) && SlicingBackend<B, S>) {
+      if constexpr (sizeof(S) == sizeof(float) && ProjectsChunks<B, S>) {
         if (!mesh.empty()) {
           std::fill_n(ws.projected.counts.data + args.first_chunk, args.chunk_count(), 0u);
           detail::project_unhidden(backend, args, ws.projected, mesh.tile_far, ws.mesh.unhidden);

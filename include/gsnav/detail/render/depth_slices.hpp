@@ -18,10 +18,10 @@
 
 namespace gsnav {
 
-/// Backends that can draw a frame in slices of depth.
+/// Backends that can draw a frame in slices of depth: their Blend goes on where the slice before ended
+/// (RasterArgs::progress), which the generic one does not.
 template <class B, class S>
-concept SlicingBackend = Backend<B> && is_host_backend<B> &&
-    RunsStage<B, stage::Project, ViewedSet<S>, ProjectOutputs<S>, View<const std::uint32_t>>;
+concept SlicingBackend = ProjectsChunks<B, S> && RunsStage<B, stage::Blend, RasterArgs<S>>;
 
 /// A frame in slices of depth, front to back: what a slice leaves closed, the next need not project,
 /// colour, sort or bin. The image is that of one slice, bit for bit: a pixel meets the same splats in
