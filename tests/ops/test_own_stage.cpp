@@ -34,8 +34,9 @@ struct HostLoop : HostMemory {
 template <class Own>
 struct WithStage : HostLoop {
   template <class... Args>
-  void run(Own, const Args&... args) requires
-      requires(SerialBackend& serial) { Own::generic(serial, args...); }
+  void run(Own, const Args&... args) requires requires(SerialBackend& serial) {
+    Own::generic(serial, args...);
+  }
   {
     SerialBackend serial;
     ++calls;

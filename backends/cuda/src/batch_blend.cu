@@ -55,7 +55,7 @@ __device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t n, int t
       const std::uint32_t slot = slot_of(i);
       const SplatRecord r = a.records[slot];
       s.splat(i) = staged(r, slot);
-      const bool hidden = Mesh && is_hidden(a, slot, far);
+      const bool hidden = Mesh && behind(a.depths[slot], far);
       const ReachedBlocks blocks(bounds_of(r.x, r.y), tile_x, tile_y);
       wide = a.elliptic && !hidden && blocks.wide();
       if (!wide) s.masks[i] = static_cast<std::uint16_t>(hidden ? 0 : blocks.of_bounds());

@@ -196,12 +196,6 @@ __device__ inline float load_mesh(const BlendArgs& b, const std::size_t (&pixel)
   return __uint_as_float(far);
 }
 
-/// Whether a mesh hides a splat at every pixel of a tile whose farthest is `far`.
-__device__ inline bool is_hidden(const BatchArgs& a, std::uint32_t slot, float far) {
-  const SplatDepth<float>& depth = a.depths[slot];
-  return depth.z - depth.reach > far;
-}
-
 /// Calls launch.operator()<Color, DepthMode, Exp2, Form, Mesh>() with what the call asks for.
 template <class L>
 void dispatch_blending(const BlendArgs& b, const L& launch) {

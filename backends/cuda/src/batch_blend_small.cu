@@ -61,7 +61,7 @@ class Stager {
       unsigned mask = 0;
       if (i < n) {
         to.splats[i] = staged(record_[j], slot_[j]);
-        if (!Mesh || !is_hidden(a, slot_[j], far)) {
+        if (!Mesh || !behind(a.depths[slot_[j]], far)) {
           const ReachedBlocks blocks(bounds_of(record_[j].x, record_[j].y), tile_x, tile_y, kTile);
           mask = a.elliptic && blocks.many()
                      ? blocks.of_ellipse(geometry_of(record_[j]), a.log2_alpha_min)

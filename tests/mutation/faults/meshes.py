@@ -32,8 +32,7 @@ FAULTS = [
     fault("mesh_leaves_alpha", "blend_surface", "state.transmittance = select(state.transmittance < L(S(0)), -after, after);", "",
           CASES,
           "N49_mesh_between_layers"),
-    fault("mesh_cull_by_centre", "hides", "depths[splat].z - depths[splat].reach > tile_far[tile]",
-          "depths[splat].z > tile_far[tile]", CASES, "N53_tile_max_mesh_cull"),
+    fault("mesh_cull_by_centre", "behind", "d.z - d.reach > depth", "d.z > depth", CASES, "N53_tile_max_mesh_cull"),
     fault("mesh_chunk_without_reach", "nearest", "* (1 - 1e-6) - reach * (1 + 1e-5);",
           "+ reach;", CASES, "N53_tile_max_mesh_cull of chunks, before they are projected"),
 ]

@@ -17,7 +17,7 @@ namespace gsnav {
 /// rounded.
 template <class L, class S>
 GSNAV_HD L alpha_before_mesh(L alpha, const SplatDepth<S>& depth, L mesh, L px, L py) noexcept {
-  const auto unsure = L(depth.z + depth.reach) > mesh;
+  const auto unsure = may_reach_behind(L(farthest_depth(depth)), mesh);
   if (!any(unsure)) return alpha;
   return select(unsure && (ray_depth(depth, px, py) > mesh), L(S(0)), alpha);
 }
@@ -122,7 +122,7 @@ struct FragmentPixel {
   GSNAV_HD void blend_within(BlendState<S, D>& state, const SplatRecords<S>& splat, S near, S far, S px,
                              S py) const noexcept {
     const SplatDepth<S>& depth = *splat.depth;
-    if (depth.z - depth.reach > far || depth.z + depth.reach <= near) return;
+    if (behind(depth, far) || !may_reach_behind(farthest_depth(depth), near)) return;
     blend_splat<Color, D, Exp2::degree5, General>(state, args.rules, splat, px, py,
                                                   [&](S alpha) GSNAV_INLINED {
                                                     const S z = ray_depth(depth, px, py);

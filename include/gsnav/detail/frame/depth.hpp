@@ -31,4 +31,23 @@ GSNAV_HD L ray_depth(const SplatDepth<S>& d, L px, L py) noexcept {
   return L(d.z) + clamp(defined, -reach, reach);
 }
 
+/// No ray_depth of a splat is beyond, metres; also when rounded.
+template <class S>
+GSNAV_HD S farthest_depth(const SplatDepth<S>& d) noexcept {
+  return d.z + d.reach;
+}
+
+/// Whether a splat lies behind `depth`, metres, at every pixel.
+template <class S>
+GSNAV_HD bool behind(const SplatDepth<S>& d, S depth) noexcept {
+  return d.z - d.reach > depth;
+}
+
+/// Whether a splat of this farthest_depth may lie behind `depth` at some pixel; else it is before it at
+/// all.
+template <class L>
+GSNAV_HD mask_of<L> may_reach_behind(const L& farthest, const L& depth) noexcept {
+  return farthest > depth;
+}
+
 }  // namespace gsnav

@@ -6,6 +6,7 @@
 
 #include "gsnav/core/view.hpp"
 #include "gsnav/detail/core/parallel.hpp"
+#include "gsnav/detail/frame/depth.hpp"
 #include "gsnav/detail/frame/footprint.hpp"
 #include "gsnav/detail/frame/splat.hpp"
 #include "gsnav/math/functions.hpp"
@@ -159,7 +160,7 @@ struct MeshCull {
 
   /// Whether every pixel of a tile would skip the splat.
   GSNAV_HD bool hides(std::size_t tile, std::uint32_t splat) const noexcept {
-    return depths[splat].z - depths[splat].reach > tile_far[tile];
+    return behind(depths[splat], tile_far[tile]);
   }
 };
 

@@ -97,7 +97,7 @@ class TileBlender {
       rows_[j].b = g.b;
       if constexpr (Color) rows_[j].color = args_.colors[ids[j]];
       if constexpr (kNeedsId) ids_[j] = ids[j];
-      if constexpr (Mesh) rows_[j].far = args_.depths[ids[j]].z + args_.depths[ids[j]].reach;
+      if constexpr (Mesh) rows_[j].far = farthest_depth(args_.depths[ids[j]]);
     }
     if constexpr (kNeedsId) ids_[kNothing] = ids[0];  // any depth will do
     if (General && !args_.perspectives.empty()) {     // footprints are no ellipses: every open block
@@ -141,7 +141,7 @@ class TileBlender {
     const int n = lists_.counts[block];
     const auto blend = [&](int j, F alpha) {
       if constexpr (Mesh) {
-        if (any((F(rows[j].far) > pixels_.mesh[block]) && (alpha > F(0.0f)))) {
+        if (any(may_reach_behind(F(rows[j].far), pixels_.mesh[block]) && (alpha > F(0.0f)))) {
           alpha = alpha_before_mesh(alpha, args_.depths[ids_[j]], pixels_.mesh[block], px, py);
         }
       }
