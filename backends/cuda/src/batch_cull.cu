@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "batch_lists.cuh"
+#include "search.cuh"
 
 // Culling of a batch: which parts of chunks which instances may see.
 
@@ -65,16 +66,8 @@ __global__ void __launch_bounds__(kThreads) cull_kernel(const BatchArgs a) {
   const unsigned lane = threadIdx.x % 32;
   const std::uint64_t stride = std::uint64_t{gridDim.x} * kWarps;
   for (std::uint64_t unit = blockIdx.x * kWarps + threadIdx.x / 32; unit < a.units; unit += stride) {
-    std::uint32_t low = 0, high = a.set_count;
-    while (high - low > 1) {
-      const std::uint32_t mid = (low + high) / 2;
-      if (a.sets[mid].first_unit <= unit) {
-        low = mid;
-      } else {
-        high = mid;
-      }
-    }
-    const BatchSet set = a.sets[low];
+    const BatchSet set = a.sets[last_start(
+        0u, a.set_count, [&](std::uint32_t i) { return a.sets[i].first_unit <= unit; })];
     const std::uint32_t at = static_cast<std::uint32_t>(unit - set.first_unit);
     const BatchInstance* instances = a.instances + set.first_instance;
     std::uint32_t first = set.first_instance, chunk, part, mask;  // the lane's item, if mask is not 0

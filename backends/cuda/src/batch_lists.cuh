@@ -52,8 +52,7 @@ class WarpPairs {
 
 /// Whether a splat lies in more than 2 x 2 tiles.
 __device__ inline bool is_wide(const BatchArgs& a, const SplatBounds& b) {
-  const int shift = a.grid.tile_shift();
-  return ((b.x1 - 1) >> shift) - (b.x0 >> shift) > 1 || ((b.y1 - 1) >> shift) - (b.y0 >> shift) > 1;
+  return a.grid.tiles_of(b).exceeds(2);
 }
 
 /// The pairs of the lanes' splats that are not wide: of all tiles that bounds reach.
@@ -61,12 +60,11 @@ class NearPairs {
  public:
   /// Nobody waits for what is asked until `put`.
   __device__ void ask(const BatchArgs& a, std::uint32_t camera, bool wanted, const SplatBounds& b) {
-    const int shift = a.grid.tile_shift();
-    const int tx = b.x0 >> shift, ty = b.y0 >> shift;
+    const TileRange<int> tiles = a.grid.tiles_of(b);
     columns_ = static_cast<std::uint32_t>(a.grid.columns);
-    tile_ = first_tile(a, camera) + static_cast<std::uint32_t>(ty) * columns_ +
-            static_cast<std::uint32_t>(tx);
-    const bool right = (b.x1 - 1) >> shift != tx, below = (b.y1 - 1) >> shift != ty;
+    tile_ = first_tile(a, camera) + static_cast<std::uint32_t>(tiles.y0) * columns_ +
+            static_cast<std::uint32_t>(tiles.x0);
+    const bool right = tiles.x1 != tiles.x0, below = tiles.y1 != tiles.y0;
     pairs_[0].ask(a, wanted, tile_of(0));
     pairs_[1].ask(a, wanted && right, tile_of(1));
     pairs_[2].ask(a, wanted && below, tile_of(2));
@@ -90,9 +88,9 @@ struct LargeRows {
 };
 
 __device__ inline LargeRows large_rows(const BatchArgs& a, const SplatBounds& b) {
-  const int shift = a.grid.tile_shift();
-  const std::uint32_t first = static_cast<std::uint32_t>(b.y0 >> shift);
-  return {first, static_cast<std::uint32_t>((b.y1 - 1) >> shift) + 1 - first};
+  const TileRange<int> tiles = a.grid.tiles_of(b);
+  const std::uint32_t first = static_cast<std::uint32_t>(tiles.y0);
+  return {first, static_cast<std::uint32_t>(tiles.y1) + 1 - first};
 }
 
 __device__ inline void queue_large_row(const BatchArgs& a, unsigned long long place,

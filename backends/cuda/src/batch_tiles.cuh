@@ -33,17 +33,14 @@ __device__ inline std::uint32_t first_tile(const BatchArgs& a, std::uint32_t cam
 
 /// Of bounds; with the one tile where they lie in one, else without: still to be found.
 __device__ inline TileWindow window_of(const BatchArgs& a, const SplatBounds& b) {
-  const int shift = a.grid.tile_shift();
-  const int tx = b.x0 >> shift, ty = b.y0 >> shift;
-  const bool single = (b.x1 - 1) >> shift == tx && (b.y1 - 1) >> shift == ty;
-  return {static_cast<std::uint32_t>(tx) | static_cast<std::uint32_t>(ty) << 16, single ? 1u : 0u};
+  const TileRange<int> tiles = a.grid.tiles_of(b);
+  return {static_cast<std::uint32_t>(tiles.x0) | static_cast<std::uint32_t>(tiles.y0) << 16,
+          tiles.single() ? 1u : 0u};
 }
 
 /// Whether bounds reach beyond a window.
 __device__ inline bool is_large(const BatchArgs& a, const SplatBounds& b) {
-  const int shift = a.grid.tile_shift();
-  return ((b.x1 - 1) >> shift) - (b.x0 >> shift) >= TileWindow::kSide ||
-         ((b.y1 - 1) >> shift) - (b.y0 >> shift) >= TileWindow::kSide;
+  return a.grid.tiles_of(b).exceeds(TileWindow::kSide);
 }
 
 /// The window's tile of bit `bit`, among those of all cameras.

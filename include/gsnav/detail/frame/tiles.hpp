@@ -13,6 +13,22 @@
 
 namespace gsnav {
 
+/// Columns and rows of tiles, the last ones included; of an `int`, or of whole numbers in a lane.
+template <class L>
+struct TileRange {
+  L x0, y0, x1, y1;
+
+  /// Those that a box of pixels [x0, x1) x [y0, y1), not empty, lies in. `tile_of`: the tile of a pixel.
+  template <class Box, class F>
+  GSNAV_HD static TileRange of(const Box& box, const F& tile_of) noexcept {
+    const L one(1);
+    return {tile_of(box.x0), tile_of(box.y0), tile_of(box.x1 - one), tile_of(box.y1 - one)};
+  }
+  GSNAV_HD mask_of<L> single() const noexcept { return x0 >= x1 && y0 >= y1; }
+  /// Whether it has more than `n` columns or rows.
+  GSNAV_HD bool exceeds(int n) const noexcept { return x1 - x0 >= n || y1 - y0 >= n; }
+};
+
 /// How an image is cut into square tiles.
 struct TileGrid {
   int width = 0, height = 0;  ///< image, pixels
@@ -32,6 +48,12 @@ struct TileGrid {
   GSNAV_HD std::size_t tile_of(int x, int y) const noexcept {
     return static_cast<std::size_t>(y / tile_size) * static_cast<std::size_t>(columns) +
            static_cast<std::size_t>(x / tile_size);
+  }
+  /// The tiles of a box of pixels that is not empty (SplatBounds, MeshTriangle).
+  template <class Box>
+  GSNAV_HD TileRange<int> tiles_of(const Box& box) const noexcept {
+    const int shift = tile_shift();
+    return TileRange<int>::of(box, [shift](int pixel) GSNAV_INLINED { return pixel >> shift; });
   }
   bool operator==(const TileGrid&) const = default;
 };
@@ -60,16 +82,15 @@ template <class S, class F>
 GSNAV_HD void for_each_tile_row(const TileGrid& grid, const SplatGeometry<S>& g, const SplatBounds& b,
                                 S log2_alpha_min, bool elliptic, const F& f) noexcept {
   const int shift = grid.tile_shift(), ts = grid.tile_size;
-  const int tx0 = b.x0 >> shift, tx1 = (b.x1 - 1) >> shift;
-  const int ty0 = b.y0 >> shift, ty1 = (b.y1 - 1) >> shift;
-  if (tx0 == tx1 && ty0 == ty1) {
-    f(ty0, tx0, tx0);
+  const TileRange<int> tiles = grid.tiles_of(b);
+  if (tiles.single()) {
+    f(tiles.y0, tiles.x0, tiles.x0);
     return;
   }
   const PixelBox<S> box = PixelBox<S>::of(b);
   const FootprintStrips<S> footprint(g, log2_alpha_min, box);
-  for (int ty = ty0; ty <= ty1; ++ty) {
-    int first = tx0, last = tx1;
+  for (int ty = tiles.y0; ty <= tiles.y1; ++ty) {
+    int first = tiles.x0, last = tiles.x1;
     if (elliptic) {
       const PixelColumns<S> columns = footprint.pixels(box, S(ty * ts), S((ty + 1) * ts));
       if (!columns.any) continue;

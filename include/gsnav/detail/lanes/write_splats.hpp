@@ -57,28 +57,27 @@ GSNAV_HD SpanWords find_tiles(const TileGrid& grid, const SplatGeometry<F>& g, f
   const F inverse(1.0f / static_cast<float>(grid.tile_size));  // a power of two: exact
   const auto tile_of = [inverse](F pixel) noexcept { return truncated(pixel * inverse); };
   const auto whole = [](F x) noexcept { return __builtin_convertvector(x.v, F::ints); };
-  const F tx0 = tile_of(box.x0), tx1 = tile_of(box.x1 - one), ty0 = tile_of(box.y0),
-          ty1 = tile_of(box.y1 - one);
-  const F rows = (ty1 - ty0) + one;
+  const TileRange<F> tiles = TileRange<F>::of(box, tile_of);
+  const F rows = (tiles.y1 - tiles.y0) + one;
   const auto large = (rows > F(static_cast<float>(TileSpans::kRows))) ||
-                     (tx1 - tx0 >= F(static_cast<float>(TileSpans::kColumns)));
-  const auto single = (ty0 >= ty1) && (tx0 >= tx1);
+                     (tiles.x1 - tiles.x0 >= F(static_cast<float>(TileSpans::kColumns)));
+  const auto single = tiles.single();
   const std::uint32_t wanted = lanes & ~lane_bits(large || single);
 
   SpanWords out;
-  out.word[0] = whole(ty0) * grid.columns + whole(tx0);
+  out.word[0] = whole(tiles.y0) * grid.columns + whole(tiles.x0);
   out.word[1] = whole(select(large, F(static_cast<float>(TileSpans::kLarge)), rows));
   F begin = zero, end = one;  // of a single tile
   if (wanted != 0) {
     const FootprintStrips<F> footprint(g, log2_alpha_min, box);
-    F top = ty0 * size;
+    F top = tiles.y0 * size;
     for (int r = 0; r < TileSpans::kRows; ++r) {
       if ((lane_bits(F(static_cast<float>(r)) < rows) & wanted) == 0) break;
       const F next = top + size;
       const PixelColumns<F> columns = footprint.pixels(box, top, next);
       const auto has_any = columns.any && (F(static_cast<float>(r)) < rows);
-      begin = select(has_any, tile_of(columns.first) - tx0, zero);
-      end = select(has_any, (tile_of(columns.end - one) - tx0) + one, zero);
+      begin = select(has_any, tile_of(columns.first) - tiles.x0, zero);
+      end = select(has_any, (tile_of(columns.end - one) - tiles.x0) + one, zero);
       if (r == 0) {
         begin = select(single, zero, begin);
         end = select(single, one, end);

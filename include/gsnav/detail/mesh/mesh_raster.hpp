@@ -69,13 +69,12 @@ namespace detail {
 /// Calls f(tile) for the tiles of which a triangle may own a pixel.
 template <class S, class F>
 GSNAV_HD void for_each_mesh_tile(const TileGrid& grid, const MeshTriangle<S>& t, const F& f) noexcept {
-  const int shift = grid.tile_shift(), ts = grid.tile_size;
-  const int tx0 = t.x0 >> shift, tx1 = (t.x1 - 1) >> shift, ty0 = t.y0 >> shift,
-            ty1 = (t.y1 - 1) >> shift;
-  const bool single = tx0 == tx1 && ty0 == ty1;
-  for (int ty = ty0; ty <= ty1; ++ty) {
+  const int ts = grid.tile_size;
+  const TileRange<int> tiles = grid.tiles_of(t);
+  const bool single = tiles.single();
+  for (int ty = tiles.y0; ty <= tiles.y1; ++ty) {
     const int y0 = max(ty * ts, int{t.y0}), y1 = min((ty + 1) * ts, int{t.y1});
-    for (int tx = tx0; tx <= tx1; ++tx) {
+    for (int tx = tiles.x0; tx <= tiles.x1; ++tx) {
       const int x0 = max(tx * ts, int{t.x0}), x1 = min((tx + 1) * ts, int{t.x1});
       if (!single && !MeshEdges::of(t, grid, x0, y0).reach(x1 - x0, y1 - y0)) continue;
       f(static_cast<std::size_t>(ty) * static_cast<std::size_t>(grid.columns) +
