@@ -247,8 +247,7 @@ __device__ inline const BatchInstance& instance_of(const BatchArgs& a, std::uint
 __device__ inline std::uint32_t rank_of(const BatchArgs& a, std::uint32_t camera, std::uint32_t slot) {
   const std::uint32_t source = a.sources[slot];
   const ViewedSet<float>& args = instance_of(a, camera, source).args;
-  const View<const std::uint32_t>& rows = args.gaussians.row_ids;
-  return rows.empty() ? source : args.first_rank + rows[source - args.first_rank];
+  return args.rank_of(source - args.first_rank);
 }
 
 // Launches, in the order of a frame. `blocks`: how many keep the device full.

@@ -35,6 +35,10 @@ struct ViewedSet {
   GSNAV_HD SeenRows seen_rows(std::size_t id) const noexcept {
     return selection.seen_rows(gaussians.chunk_count(), id);
   }
+  /// What decides between equal keys: the set's first Gaussian plus the row as it was read.
+  GSNAV_HD std::uint32_t rank_of(std::uint32_t row) const noexcept {
+    return first_rank + (gaussians.row_ids.empty() ? row : gaussians.row_ids[row]);
+  }
 };
 
 /// Of a set for a camera, but for `offsets` and the set's place in the frame. Host code.
@@ -206,10 +210,7 @@ GSNAV_HD void write_splat(const ViewedSet<S>& args, const ProjectOutputs<S>& out
   if (!out.depths.empty()) out.depths[slot] = row.splat.depth;
   if (!out.spans.empty()) out.spans[slot].rows = TileSpans::kLarge;
   out.keys[slot] = args.camera.key_code(row.key);
-  if (!out.ranks.empty()) {
-    out.ranks[slot] =
-        args.first_rank + (gs.row_ids.empty() ? static_cast<std::uint32_t>(i) : gs.row_ids[i]);
-  }
+  if (!out.ranks.empty()) out.ranks[slot] = args.rank_of(static_cast<std::uint32_t>(i));
   if (!out.colors.empty()) {
     out.colors[slot] = gaussian_color<S>(gs.color, gs.color.degree_of(i, args.sh_degree), i, row.delta);
   }

@@ -117,14 +117,11 @@ GSNAV_HD void store_bounds(const PixelBox<F>& box, const SpanWords& spans, float
   store_columns<8>(columns, to);
 }
 
-/// What decides between equal keys of kWidth rows.
-GSNAV_HD void ranks_of(const ViewedSet<float>& args, const std::uint32_t (&rows)[kWidth], bool wanted,
+/// The ranks of kWidth rows; those beyond the set's end have the last one's.
+GSNAV_HD void ranks_of(const ViewedSet<float>& args, const std::uint32_t (&rows)[kWidth],
                        std::uint32_t* ranks) noexcept {
-  const View<const std::uint32_t>& ids = args.gaussians.row_ids;
   const std::uint32_t last = static_cast<std::uint32_t>(args.gaussians.size() - 1);
-  for (int l = 0; l < kWidth; ++l) ranks[l] = args.first_rank + rows[l];
-  if (ids.empty() || !wanted) return;
-  for (int l = 0; l < kWidth; ++l) ranks[l] = args.first_rank + ids[rows[l] < last ? rows[l] : last];
+  for (int l = 0; l < kWidth; ++l) ranks[l] = args.rank_of(rows[l] < last ? rows[l] : last);
 }
 
 /// Leaves the lanes `kept` to color_survivors, behind the `count` that there are.
@@ -193,13 +190,12 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
     store_columns<8>(low, depths[0]);
     store_columns<8>(high, depths[1]);
   }
-  std::uint32_t rows[kWidth], keys[kWidth], ranks[kWidth];
+  std::uint32_t rows[kWidth], keys[kWidth];
   float key[kWidth];
   sort_key(args.camera64, pack.key).store(key);
   for (int l = 0; l < kWidth; ++l) keys[l] = camera.key_code(key[l]);
   const std::uint32_t first = static_cast<std::uint32_t>(pack.first);
   for (std::uint32_t l = 0; l < static_cast<std::uint32_t>(kWidth); ++l) rows[l] = first + l;
-  detail::ranks_of(args, rows, !out.ranks.empty(), ranks);
 
   std::uint32_t written = 0, kept = 0;
   for (std::uint32_t left = bits; left != 0; left &= left - 1) {
@@ -221,7 +217,11 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
     ++written;
   }
   store_lanes(kept, keys, out.keys.data + slot);
-  if (!out.ranks.empty()) store_lanes(kept, ranks, out.ranks.data + slot);
+  if (!out.ranks.empty()) {
+    std::uint32_t ranks[kWidth];
+    detail::ranks_of(args, rows, ranks);
+    store_lanes(kept, ranks, out.ranks.data + slot);
+  }
   if (color) detail::keep_survivors(kept, rows, pack.key.delta, count, survivors);
   return written;
 }
