@@ -162,7 +162,7 @@ class FrameStages {
     bin_.order = order_.view();
     bin_.geometry = geometry_.view();
     bin_.bounds = bounds_.view();
-    bin_.log2_alpha_min = static_cast<S>(std::log2(config_.quality.alpha_min));
+    bin_.log2_alpha_min = static_cast<S>(log2_alpha_min(config_.quality));
     bin_.blocks = gsnav::concurrency_of(*backend_);
     cursors_.resize_discard(bin_.blocks * bin_.grid.count());
     tile_offsets_.resize_discard(bin_.grid.count() + 1);

@@ -217,7 +217,7 @@ bool CudaBatchRenderer::State::plan_tiles(std::span<const BatchCamera> cameras,
   args.short_lists = !few && has_short_lists(args.grid.count(), multiprocessors);
   args.depth_bins =
       few ? depth_bins_of(cameras, config.quality.key_bits, args.tiles) : cuda::DepthBins{};
-  args.log2_alpha_min = static_cast<float>(std::log2(config.quality.alpha_min));
+  args.log2_alpha_min = static_cast<float>(log2_alpha_min(config.quality));
   args.elliptic = config.response == Response::ewa;
   using Slabs = cuda::policy::Project;
   args.slab = args.cameras < Slabs::kFewCameras ? Slabs::kSlabOfFew : Slabs::kSlab;

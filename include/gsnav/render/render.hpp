@@ -154,7 +154,7 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   bin.order = ws.visible.order.view();
   bin.geometry = ws.geometry.view();
   bin.bounds = ws.bounds.view();
-  bin.log2_alpha_min = static_cast<S>(std::log2(config.quality.alpha_min));
+  bin.log2_alpha_min = static_cast<S>(log2_alpha_min(config.quality));
   bin.elliptic = config.response == Response::ewa;
   bin.blocks = visible < 4096 ? 1 : concurrency_of(backend);
   ws.cursors.resize_discard(bin.blocks * bin.grid.count());

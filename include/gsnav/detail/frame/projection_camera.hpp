@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 #include "gsnav/frame/compat.hpp"
@@ -48,7 +49,7 @@ struct ProjectionRules {
   SortOrder sort_order = SortOrder::z_depth;
   Response response = Response::ewa;
   Compat compat = Compat::none;
-  double alpha_min = 1.0 / 255;
+  double log2_alpha_min = std::log2(1.0 / 255);
   int key_bits = 32;
 };
 
@@ -102,7 +103,7 @@ ProjectionCamera<S> make_projection_camera(const Camera& camera, const GaussianS
   p.near_sigma = habitat ? S(0) : static_cast<S>(camera.near_sigma);
   p.eps2d = static_cast<S>(set.eps2d);
   p.base_eps2d = static_cast<S>(set.base_eps2d);
-  p.log2_alpha_min = static_cast<S>(std::log2(rules.alpha_min));
+  p.log2_alpha_min = static_cast<S>(rules.log2_alpha_min);
   p.min_compensation = habitat ? S(0.005) : S(0);
   p.mip = set.filter == Filter::mip || habitat;
   p.sort_order = rules.sort_order;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -40,7 +39,7 @@ requires is_host_backend<B> CullCounts count_culled(B& backend, std::span<const 
                                                     const Camera& camera, const RenderConfig& config) {
   CullCounts out;
   const ProjectionRules rules = projection_rules(config);
-  const float log2_alpha_min = static_cast<float>(std::log2(config.quality.alpha_min));
+  const float exponent_min = static_cast<float>(log2_alpha_min(config.quality));
   for (const GaussianSet& set : sets) {
     const GaussianRows& gs = set.gaussians;
     ViewedSet<float> args = view_set<float>(camera, set, rules, 0);
@@ -65,7 +64,7 @@ requires is_host_backend<B> CullCounts count_culled(B& backend, std::span<const 
         RowSplat<float> row;
         if (!project_row(args, false, i, row)) continue;
         bool any = false;
-        for_each_tile(grid, row.splat.geometry, row.splat.bounds, log2_alpha_min,
+        for_each_tile(grid, row.splat.geometry, row.splat.bounds, exponent_min,
                       config.response == Response::ewa, [&any](std::size_t) { any = true; });
         counts[c].emitting += any ? 1 : 0;
       }

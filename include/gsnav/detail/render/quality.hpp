@@ -19,7 +19,8 @@ enum class Exponential {
 struct Quality {
   /// Frames with meshes use Exponential::exact whatever is set here.
   Exponential exponential = Exponential::exact;
-  double alpha_min = 1.0 / 255;      ///< in (0, 1): a Gaussian is not blended where its alpha is lower
+  /// In (0, 1): a Gaussian is not blended where its alpha is lower. Below 2^-126 it is 2^-126.
+  double alpha_min = 1.0 / 255;
   double max_alpha = 0.99;           ///< in (0, 1]: upper limit of a Gaussian's alpha
   double transmittance_min = 1e-4;   ///< in [0, 1): a pixel is closed once its transmittance is lower
   int max_sh_degree = kMaxShDegree;  ///< in [0, 3]: SH bands above it are left out

@@ -25,9 +25,15 @@ int tile_size_of(const RenderConfig& c, int width, int height) noexcept {
   return is_host_backend<B> && large && c.compat == Compat::none ? 32 : 16;
 }
 
+/// Exponent from which on a Gaussian is blended. What float's exp2 reaches, also in double: an alpha_min
+/// below 2^-126 is that.
+inline double log2_alpha_min(const Quality& q) noexcept {
+  return std::max(std::log2(q.alpha_min), -126.0);
+}
+
 /// The part that projection reads.
 inline ProjectionRules projection_rules(const RenderConfig& c) noexcept {
-  return {c.sort_order, c.response, c.compat, c.quality.alpha_min, c.quality.key_bits};
+  return {c.sort_order, c.response, c.compat, log2_alpha_min(c.quality), c.quality.key_bits};
 }
 
 inline Exp2 exp2_method(const Quality& q) noexcept {
@@ -54,8 +60,7 @@ BlendRules<S> blend_rules(const RenderConfig& c) noexcept {
   r.max_alpha = static_cast<S>(c.quality.max_alpha);
   r.transmittance_min = static_cast<S>(c.quality.transmittance_min);
   r.first_hit_tau = static_cast<S>(c.first_hit_tau);
-  // What float's exp2 reaches.
-  r.log2_alpha_min = static_cast<S>(std::max(std::log2(c.quality.alpha_min), -126.0));
+  r.log2_alpha_min = static_cast<S>(log2_alpha_min(c.quality));
   detail::follow(c.compat, r);
   return r;
 }
