@@ -4,9 +4,11 @@
 
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "gsnav/core/rng.hpp"
 #include "gsnav/detail/math/pack.hpp"
+#include "gsnav/detail/math/pack_double.hpp"
 #include "gsnav/detail/math/pack_layout.hpp"
 #include "gsnav/detail/math/packs.hpp"
 #include "gsnav/math/quat.hpp"
@@ -91,6 +93,84 @@ void check_memory() {
   for (int i = 0; i < listed; ++i) CHECK(indices[i] == 7 + 2 + i);
 }
 
+/// A power of two times 1 + k / 2^bits, either sign.
+float short_number(Rng& rng, double low, double high, int bits) {
+  const double k = std::floor(rng.uniform() * std::exp2(bits));
+  const double m = (1 + k * std::exp2(-bits)) * (rng.uniform() < 0.5 ? -1 : 1);
+  return static_cast<float>(std::ldexp(m, static_cast<int>(std::floor(rng.uniform(low, high)))));
+}
+
+/// fma against the C library's, where products end in the middle between two floats and what is added
+/// decides the side (below the last bit of a double too), and where results are below the normal floats.
+/// Returns how often rounding to double first would have been wrong.
+template <int N>
+int check_fma_at_middles() {
+  using P = Pack<float, N>;
+  Rng rng(10);
+  int wrong_twice = 0;
+  for (int round = 0; round < 40000; ++round) {
+    const bool small = round % 2 == 0;
+    float a[N], b[N], c[N];
+    for (int i = 0; i < N; ++i) {
+      a[i] = short_number(rng, small ? -76 : 0, small ? -64 : 1, 12);
+      b[i] = short_number(rng, small ? -76 : 0, small ? -64 : 1, 13);
+      c[i] = short_number(rng, small ? -149 : -100, small ? -126 : 1, 1 + round % 23);
+    }
+    const P fused = fma(P::load(a), P::load(b), P::load(c));
+    for (int i = 0; i < N; ++i) {
+      const float once = std::fma(a[i], b[i], c[i]);
+      REQUIRE(bits_of(fused[i]) == bits_of(once));
+      const double sum =
+          static_cast<double>(a[i]) * static_cast<double>(b[i]) + static_cast<double>(c[i]);
+      if (static_cast<float>(sum) != once) ++wrong_twice;
+    }
+  }
+  return wrong_twice;
+}
+
+/// Lanes of doubles are their doubles.
+template <int N>
+void check_doubles() {
+  using D = PackPair<N>;
+  Rng rng(11);
+  for (int round = 0; round < 5000; ++round) {
+    double a[N], b[N], c[N];
+    float f[N];
+    for (int i = 0; i < N; ++i) {
+      a[i] = rng.normal() * 100;
+      b[i] = rng.normal();
+      c[i] = round % 2 == 0 ? -a[i] * b[i] : rng.normal();
+      f[i] = static_cast<float>(rng.normal());
+    }
+    const D pa = D::load(a), pb = D::load(b), pc = D::load(c), wide(Pack<float, N>::load(f));
+    const D fused = fma(pa, pb, pc), root = sqrt(pb * pb), whole = truncated(pa),
+            clamped = clamp(pa, pb, pc);
+    const Pack<float, N> narrow(pa);
+    const auto lane = [](const D& d, int i) { return i < N / 2 ? d.low[i] : d.high[i - N / 2]; };
+    for (int i = 0; i < N; ++i) {
+      REQUIRE(lane(fused, i) == std::fma(a[i], b[i], c[i]));
+      REQUIRE(lane(root, i) == std::sqrt(b[i] * b[i]));
+      REQUIRE(lane(whole, i) == std::trunc(a[i]));
+      REQUIRE(lane(clamped, i) == gsnav::clamp(a[i], b[i], c[i]));
+      REQUIRE(lane(wide, i) == static_cast<double>(f[i]));
+      REQUIRE(narrow[i] == static_cast<float>(a[i]));
+    }
+  }
+}
+
+/// min and max give the second where either is NaN; no comparison with NaN holds.
+template <int N>
+void check_nan() {
+  using P = Pack<float, N>;
+  const P nan(std::numeric_limits<float>::quiet_NaN()), one(1.0f);
+  CHECK(min(nan, one)[N - 1] == 1.0f);
+  CHECK(max(nan, one)[N - 1] == 1.0f);
+  CHECK(std::isnan(min(one, nan)[0]));
+  CHECK(std::isnan(max(one, nan)[0]));
+  CHECK(!any(nan < one || nan <= one || nan > one || nan >= one || nan <= nan));
+  CHECK(lane_bits(one > P(0.0f)) == (1u << N) - 1u);
+}
+
 /// Packs side by side are the packs.
 template <Exp2 M>
 void check_side_by_side() {
@@ -120,6 +200,16 @@ void check_side_by_side() {
 
 TEST_CASE("packs of the natural width are their lanes") { check_lanes<GSNAV_PACK_WIDTH>(); }
 TEST_CASE("packs of four are their lanes") { check_lanes<4>(); }
+
+TEST_CASE("fma of a pack rounds once, where two roundings would show and below the normal floats") {
+  CHECK(check_fma_at_middles<4>() > 1000);
+  CHECK(check_fma_at_middles<GSNAV_PACK_WIDTH>() > 1000);
+}
+TEST_CASE("packs of doubles are their doubles") { check_doubles<GSNAV_PACK_WIDTH>(); }
+TEST_CASE("packs: min and max give the second of a NaN, and no comparison with one holds") {
+  check_nan<4>();
+  check_nan<GSNAV_PACK_WIDTH>();
+}
 
 TEST_CASE("packs go through memory in order") {
   check_memory<4>();
