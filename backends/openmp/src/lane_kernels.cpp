@@ -7,7 +7,11 @@
 namespace gsnav {
 
 namespace lanes {
+#if defined(__aarch64__)
+namespace neon {
+#else
 namespace baseline {
+#endif
 extern const LaneKernels kKernels;
 }
 #if defined(GSNAV_ISA_DISPATCH)
@@ -42,7 +46,11 @@ const LaneKernels& choose() noexcept {
     return lanes::avx2::kKernels;
   }
 #endif
+#if defined(__aarch64__)
+  return lanes::neon::kKernels;
+#else
   return lanes::baseline::kKernels;
+#endif
 }
 
 }  // namespace

@@ -15,6 +15,8 @@
 #define GSNAV_LANES_TAG GSNAV_LANES_NAMESPACE(avx512)
 #elif defined(__AVX2__)
 #define GSNAV_LANES_TAG GSNAV_LANES_NAMESPACE(avx2)
+#elif defined(__aarch64__)
+#define GSNAV_LANES_TAG GSNAV_LANES_NAMESPACE(neon)
 #else
 #define GSNAV_LANES_TAG GSNAV_LANES_NAMESPACE(baseline)
 #endif

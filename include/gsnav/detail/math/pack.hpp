@@ -10,6 +10,8 @@
 
 #if defined(__SSE2__)
 #include <immintrin.h>
+#elif defined(__aarch64__)
+#include <arm_neon.h>
 #endif
 
 #include "gsnav/detail/math/pack_fma.hpp"
@@ -165,6 +167,11 @@ GSNAV_HD std::uint32_t lane_bits(Mask<N> m) noexcept {
       if constexpr (N == 4) {
     return static_cast<std::uint32_t>(_mm_movemask_ps(reinterpret_cast<__m128>(m.v)));
   } else
+#elif defined(__aarch64__)
+  if constexpr (N == 4) {
+    constexpr typename detail::PackTypes<4>::u kBit{1, 2, 4, 8};
+    return vaddvq_u32(reinterpret_cast<uint32x4_t>(m.v & reinterpret_cast<decltype(m.v)>(kBit)));
+  } else
 #endif
   {
     std::uint32_t r = 0;
@@ -177,6 +184,11 @@ GSNAV_HD bool any(Mask<N> m) noexcept {
 #if defined(__AVX512DQ__)
   if constexpr (N == 16) {
     return _kortestz_mask16_u8(m.v, m.v) == 0;
+  } else
+#endif
+#if defined(__aarch64__)
+      if constexpr (N == 4) {
+    return vmaxvq_u32(reinterpret_cast<uint32x4_t>(m.v)) != 0;
   } else
 #endif
   {
@@ -208,6 +220,11 @@ GSNAV_HD Pack<float, N> sqrt(Pack<float, N> a) noexcept {
     return Pack<float, N>(
         reinterpret_cast<typename Pack<float, N>::vector>(_mm_sqrt_ps(reinterpret_cast<__m128>(a.v))));
   }
+#elif defined(__aarch64__)
+  if constexpr (N == 4) {
+    return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(
+        vsqrtq_f32(reinterpret_cast<float32x4_t>(a.v))));
+  }
 #endif
   Pack<float, N> r;
   for (int i = 0; i < N; ++i) r.v[i] = __builtin_sqrtf(a.v[i]);
@@ -216,6 +233,7 @@ GSNAV_HD Pack<float, N> sqrt(Pack<float, N> a) noexcept {
 
 template <int N>
 GSNAV_HD Pack<float, N> sqrt_above(Pack<float, N> a) noexcept {
+#if defined(__SSE2__)
   using V = typename Pack<float, N>::vector;
   const Pack<float, N> positive = max(a, Pack<float, N>(1e-30f));
 #if defined(__AVX512F__)
@@ -232,7 +250,6 @@ GSNAV_HD Pack<float, N> sqrt_above(Pack<float, N> a) noexcept {
             Pack<float, N>(1.0004f));
   }
 #endif
-#if defined(__SSE2__)
   if constexpr (N == 4) {
     return positive *
            (Pack<float, N>(reinterpret_cast<V>(_mm_rsqrt_ps(reinterpret_cast<__m128>(positive.v)))) *
@@ -265,6 +282,13 @@ GSNAV_HD Pack<float, N> fma(Pack<float, N> a, Pack<float, N> b, Pack<float, N> c
   if constexpr (N == 4) {
     return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(detail::fma_by_double(
         reinterpret_cast<__m128>(a.v), reinterpret_cast<__m128>(b.v), reinterpret_cast<__m128>(c.v))));
+  }
+#endif
+#if defined(__aarch64__)
+  if constexpr (N == 4) {
+    return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(
+        vfmaq_f32(reinterpret_cast<float32x4_t>(c.v), reinterpret_cast<float32x4_t>(a.v),
+                  reinterpret_cast<float32x4_t>(b.v))));
   }
 #endif
   Pack<float, N> r;

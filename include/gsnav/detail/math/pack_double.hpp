@@ -98,6 +98,12 @@ GSNAV_HD Pack<double, N> truncated(Pack<double, N> a) noexcept {
 
 template <int N>
 GSNAV_HD Pack<double, N> sqrt(Pack<double, N> a) noexcept {
+#if defined(__aarch64__)
+  if constexpr (N == 2) {
+    return Pack<double, N>(reinterpret_cast<typename Pack<double, N>::vector>(
+        vsqrtq_f64(reinterpret_cast<float64x2_t>(a.v))));
+  }
+#endif
   Pack<double, N> r;
   for (int i = 0; i < N; ++i) r.v[i] = __builtin_sqrt(a.v[i]);
   return r;
@@ -149,6 +155,13 @@ GSNAV_HD Pack<double, N> fma(Pack<double, N> a, Pack<double, N> b, Pack<double, 
     return P(reinterpret_cast<typename P::vector>(_mm256_fmadd_pd(reinterpret_cast<__m256d>(a.v),
                                                                   reinterpret_cast<__m256d>(b.v),
                                                                   reinterpret_cast<__m256d>(c.v))));
+  }
+#endif
+#if defined(__aarch64__)
+  if constexpr (N == 2) {
+    return P(reinterpret_cast<typename P::vector>(vfmaq_f64(reinterpret_cast<float64x2_t>(c.v),
+                                                            reinterpret_cast<float64x2_t>(a.v),
+                                                            reinterpret_cast<float64x2_t>(b.v))));
   }
 #endif
   P r;
