@@ -166,18 +166,31 @@ std::array<DefaultView, 4> default_scene_views() noexcept {
            {"study", {5.2, 1.5, 5.1}, {8.6, 0.95, 7.2}}}};
 }
 
-Result<DefaultScene> make_default_scene(double density) {
-  if (!(density >= 0.05 && density <= 20.0)) {
-    return {Errc::invalid_argument, "density = " + std::to_string(density) + ": must be in [0.05, 20]"};
+Status validate(const SceneSampling& s) {
+  if (!(s.density >= 0.05 && s.density <= 20.0)) {
+    return {Errc::invalid_argument,
+            "density = " + std::to_string(s.density) + ": must be in [0.05, 20]"};
   }
-  flat::Painter painter(density);
+  if (s.gaussians > kMostSceneGaussians) {
+    return {Errc::invalid_argument, "gaussians = " + std::to_string(s.gaussians) + ": must be at most " +
+                                        std::to_string(kMostSceneGaussians)};
+  }
+  return {};
+}
+
+Result<DefaultScene> make_default_scene(const SceneSampling& sampling) {
+  flat::Painter painter;
   flat::living_room(painter);
   flat::kitchen_room(painter);
   flat::bedroom(painter);
   flat::study(painter);
-  DefaultScene scene;
-  painter.finish(scene);
-  return scene;
+  return painter.finish(sampling);
+}
+
+Result<DefaultScene> make_default_scene(double density) {
+  SceneSampling sampling;
+  sampling.density = density;
+  return make_default_scene(sampling);
 }
 
 }  // namespace gsnav

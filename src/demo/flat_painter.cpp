@@ -5,16 +5,10 @@
 #include <cmath>
 #include <utility>
 
-#include "gsnav/detail/scene/spatial_order.hpp"
-#include "gsnav/frame/sh.hpp"
-
 namespace gsnav::flat {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kSigmaPerSpacing = 0.70;  // neighbours overlap until about 1 % shines through
-constexpr double kThickness = 0.0012;      // metres, one sigma
-constexpr double kOpacityLogit = 6.0;
 
 }  // namespace
 
@@ -45,7 +39,7 @@ double noise(double x, double y, int seed) noexcept {
   return low * (1 - v) + high * v;
 }
 
-Painter::Painter(double density) : stretch_(1.07 / std::sqrt(density)) {
+Painter::Painter() {
   // Cosine-weighted directions about +Z on a spiral: the same for every point, so that neighbours
   // differ by what they see and not by chance.
   constexpr int kRays = 56;
@@ -172,159 +166,6 @@ void Painter::ellipsoid(const Vec3d& center, const Vec3d& radii, const Field& co
                               radii.z * std::cos(b) * std::sin(a)};
       },
       color, spacing, 12, 6, glows);
-}
-
-namespace {
-
-struct Tangents {
-  Vec3d ds, dt, normal;
-};
-
-/// Central differences, kept inside the patch; poles borrow the neighbouring direction.
-Tangents tangents(const Field& position, double s, double t) {
-  constexpr double h = 1e-3;
-  const auto difference = [&](double s0, double t0, double s1, double t1) {
-    return position(s1, t1) - position(s0, t0);
-  };
-  const double s0 = std::max(s - h, 0.0), s1 = std::min(s + h, 1.0);
-  const double t0 = std::max(t - h, 0.0), t1 = std::min(t + h, 1.0);
-  Tangents out{
-      difference(s0, t, s1, t) * (1.0 / (s1 - s0)), difference(s, t0, s, t1) * (1.0 / (t1 - t0)), {}};
-  out.normal = normalized(cross(out.ds, out.dt));
-  return out;
-}
-
-double row_length(const Field& position, double t, bool flat) {
-  const int pieces = flat ? 1 : 16;
-  double sum = 0;
-  Vec3d last = position(0, t);
-  for (int i = 1; i <= pieces; ++i) {
-    const Vec3d p = position(static_cast<double>(i) / pieces, t);
-    sum += norm(p - last);
-    last = p;
-  }
-  return sum;
-}
-
-double column_length(const Field& position, double s, bool flat) {
-  return row_length([&](double a, double) { return position(s, a); }, 0, flat);
-}
-
-int count_for(double length, double spacing) {
-  return std::max(1, static_cast<int>(std::lround(length / spacing)));
-}
-
-bool inside(const Box& b, const Vec3d& p) noexcept {
-  return p.x >= b.low.x && p.x <= b.high.x && p.y >= b.low.y && p.y <= b.high.y && p.z >= b.low.z &&
-         p.z <= b.high.z;
-}
-
-/// Filmic shoulder, then sRGB encoding.
-double display(double x) noexcept {
-  const double c = 1.0 - std::exp(-x);
-  return c <= 0.0031308 ? 12.92 * c : 1.055 * std::pow(c, 1.0 / 2.4) - 0.055;
-}
-
-}  // namespace
-
-void Painter::emit_gaussians(const Patch& patch, GaussianCloudBuilder& builder) const {
-  const Room& where = rooms_[patch.room];
-  const double length_t = column_length(patch.position, 0.5, patch.flat);
-  const int rows = count_for(length_t, patch.spacing.v * stretch_);
-  const double widest = std::max({row_length(patch.position, 0.5, patch.flat),
-                                  row_length(patch.position, 0.02, patch.flat),
-                                  row_length(patch.position, 0.98, patch.flat)});
-
-  // Light varies slowly: it is computed on a coarse grid and interpolated.
-  const double cell = patch.flat && length_t * widest > 3.0 ? 0.20 : 0.12;
-  const auto light_cells = [cell](double length) { return length < 0.08 ? 0 : count_for(length, cell); };
-  const int light_s = light_cells(widest), light_t = light_cells(length_t);
-  // The grid stands a little inside, clear of what touches the patch's border.
-  const auto grid = [](int i, int n) { return n == 0 ? 0.5 : 0.02 + 0.96 * i / n; };
-  std::vector<Vec3d> light;
-  if (!patch.glows) {
-    for (int j = 0; j <= light_t; ++j) {
-      for (int i = 0; i <= light_s; ++i) {
-        const double s = grid(i, light_s), t = grid(j, light_t);
-        light.push_back(light_at(where, patch.position(s, t), tangents(patch.position, s, t).normal));
-      }
-    }
-  }
-  const auto light_between = [&](double s, double t) {
-    const double x = std::clamp((s - 0.02) / 0.96, 0.0, 1.0) * light_s;
-    const double y = std::clamp((t - 0.02) / 0.96, 0.0, 1.0) * light_t;
-    const int i = std::clamp(static_cast<int>(x), 0, std::max(light_s - 1, 0));
-    const int j = std::clamp(static_cast<int>(y), 0, std::max(light_t - 1, 0));
-    const Vec3d* row = light.data() + j * (light_s + 1) + i;
-    const Vec3d* next = row + (light_t > 0 ? light_s + 1 : 0);
-    const int right = light_s > 0 ? 1 : 0;
-    return lerp(lerp(row[0], row[right], x - i), lerp(next[0], next[right], x - i), y - j);
-  };
-
-  Tangents f = tangents(patch.position, 0.5, 0.5);
-  RawGaussian raw;
-  raw.opacity_logit = kOpacityLogit;
-  for (int j = 0; j < rows; ++j) {
-    const double t = (j + 0.5) / rows;
-    const double length_s = row_length(patch.position, t, patch.flat);
-    const int columns = count_for(length_s, patch.spacing.u * stretch_);
-    for (int i = 0; i < columns; ++i) {
-      const double s = (i + 0.5) / columns;
-      const Vec3d p = patch.position(s, t);
-      if (std::any_of(where.covered.begin(), where.covered.end(),
-                      [&](const Box& b) { return inside(b, p); })) {
-        continue;
-      }
-      if (!patch.flat) f = tangents(patch.position, s, t);
-      const Vec3d x = normalized(f.ds), y = cross(f.normal, x);
-      Mat3d axes;
-      for (int k = 0; k < 3; ++k) axes.row[k] = {x[k], y[k], f.normal[k]};
-      raw.mean = p;
-      raw.quat = quat_from_matrix(axes);
-      raw.log_scales = {std::log(kSigmaPerSpacing * norm(f.ds) / columns),
-                        std::log(kSigmaPerSpacing * norm(f.dt) / rows), std::log(kThickness)};
-      Vec3d color = patch.color(s, t);
-      if (!patch.glows) {
-        Vec3d incoming = light_between(s, t);
-        if (sun_at(where, p, f.normal)) incoming += Vec3d{2.3, 2.0, 1.5} * 0.8;
-        color = {color.x * incoming.x, color.y * incoming.y, color.z * incoming.z};
-      }
-      for (int k = 0; k < 3; ++k) {
-        raw.sh0[static_cast<std::size_t>(k)] = static_cast<float>((display(color[k]) - 0.5) / kSh0);
-      }
-      builder.add(raw);
-    }
-  }
-}
-
-void Painter::emit_triangles(const Patch& patch, DefaultScene& scene) {
-  const auto first = static_cast<std::uint32_t>(scene.vertices.size());
-  const int ns = patch.cells_s, nt = patch.cells_t;
-  for (int j = 0; j <= nt; ++j) {
-    for (int i = 0; i <= ns; ++i) {
-      scene.vertices.push_back(patch.position(static_cast<double>(i) / ns, static_cast<double>(j) / nt));
-    }
-  }
-  for (int j = 0; j < nt; ++j) {
-    for (int i = 0; i < ns; ++i) {
-      const std::uint32_t a = first + static_cast<std::uint32_t>(j * (ns + 1) + i);
-      const std::uint32_t b = a + static_cast<std::uint32_t>(ns + 1);
-      scene.triangles.push_back({a, a + 1, b + 1});
-      scene.triangles.push_back({a, b + 1, b});
-    }
-  }
-}
-
-void Painter::finish(DefaultScene& scene) {
-  GaussianCloudBuilder builder(0, "default scene");
-  builder.reserve(static_cast<std::size_t>(400000 / (stretch_ * stretch_)));
-  for (const Patch& p : patches_) {
-    emit_gaussians(p, builder);
-    emit_triangles(p, scene);
-  }
-  scene.bounds = builder.report().bounds;
-  scene.cloud = std::move(builder.cloud());
-  sort_spatially(scene.cloud);
 }
 
 }  // namespace gsnav::flat

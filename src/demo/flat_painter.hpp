@@ -4,6 +4,7 @@
 #include <functional>
 #include <vector>
 
+#include "gsnav/detail/core/thread_pool.hpp"
 #include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/math/quat.hpp"
 
@@ -58,7 +59,7 @@ struct Spacing {
 /// metres; primitives are given in a local frame (`place`) of the current room (`room`).
 class Painter {
  public:
-  explicit Painter(double density);
+  Painter();
 
   Room& add_room(const Box& inside, const Vec3d& bounce);
   Room& room() { return rooms_.back(); }
@@ -88,11 +89,10 @@ class Painter {
   /// whatever lies a few millimetres in front of them.
   void cover(const Vec3d& low, const Vec3d& high);
 
-  /// Bakes and writes everything.
-  void finish(DefaultScene& scene);
+  /// Bakes the light and makes the scene. Errors: invalid_argument (sampling), out_of_memory.
+  Result<DefaultScene> finish(const SceneSampling& sampling) const;
 
  private:
-  Box world_box(const Vec3d& low, const Vec3d& high) const noexcept;
   struct Patch {
     Field position, color;
     Spacing spacing;
@@ -100,12 +100,39 @@ class Painter {
     bool glows, flat;
     std::size_t room;
   };
+  /// Gaussians of a patch, and rows of it that nothing covers.
+  struct Counted {
+    std::size_t gaussians = 0, open_rows = 0;
+  };
+  /// How patches are cut into Gaussians.
+  struct Cut {
+    double stretch = 1;         ///< of all spacings
+    std::size_t gaussians = 0;  ///< altogether
+    std::size_t rows = 0;       ///< open rows, numbered through all patches
+    std::size_t missing = 0;    ///< Gaussians that open rows get beyond what `stretch` gives
+    std::vector<Counted> patches;
+
+    /// Of `missing` that of one open row: shared out evenly.
+    int extra(std::size_t row) const noexcept {
+      return static_cast<int>((row + 1) * missing / rows - row * missing / rows);
+    }
+  };
+  class PatchLight;
+
+  Box world_box(const Vec3d& low, const Vec3d& high) const noexcept;
   Vec3d light_at(const Room& room, const Vec3d& p, const Vec3d& n) const;
   bool sun_at(const Room& room, const Vec3d& p, const Vec3d& n) const;
-  void emit_gaussians(const Patch& patch, GaussianCloudBuilder& builder) const;
+  std::vector<Box> covers_of(const Patch& patch) const;
+  Counted count(const Patch& patch, double stretch) const;
+  Result<Cut> cut_at(double stretch, ThreadPool& pool) const;
+  /// The cut that gives exactly so many.
+  Result<Cut> cut_into(std::size_t gaussians, ThreadPool& pool) const;
+  void emit_gaussians(const Patch& patch, const Cut& cut, std::size_t first_row,
+                      std::vector<RawGaussian>& out) const;
+  Status emit(const Cut& cut, const std::function<void(double)>& progress, ThreadPool& pool,
+              GaussianCloudBuilder& builder) const;
   static void emit_triangles(const Patch& patch, DefaultScene& scene);
 
-  double stretch_;
   std::vector<Room> rooms_;
   std::vector<Patch> patches_;
   std::vector<Vec3d> hemisphere_;

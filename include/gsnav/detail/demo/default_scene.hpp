@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "gsnav/core/status.hpp"
@@ -31,9 +33,29 @@ struct DefaultView {
 /// Eye-level viewpoints, one a room, the living room first.
 std::array<DefaultView, 4> default_scene_views() noexcept;
 
-/// Makes the flat; the same arguments give the same bits. `density` scales the number of Gaussians
-/// (1: about 390,000) and widens them to match, so that surfaces stay closed; the mesh does not
-/// depend on it. Errors: invalid_argument where density is not in [0.05, 20].
+/// Most Gaussians that SceneSampling::gaussians may ask for. They take 5 GB while they are made.
+inline constexpr std::size_t kMostSceneGaussians = 50'000'000;
+
+/// How finely the surfaces of a generated scene are covered with Gaussians. Gaussians are as wide as
+/// their distance asks for, so surfaces stay closed; the mesh does not depend on it. Images look alike
+/// from a density of 0.3 on; below, edges blur.
+struct SceneSampling {
+  /// Number of Gaussians, at most kMostSceneGaussians; 0: as many as `density` gives. A scene needs at
+  /// least one for each of its surfaces, some ten thousand: the error says how many.
+  std::size_t gaussians = 0;
+  double density = 1.0;  ///< scales the number of Gaussians, [0.05, 20]; 1: about 390,000 for the flat
+  int threads = 0;       ///< 0: one a core, at most 16. Does not change the scene.
+  std::function<void(double)> progress;  ///< called with the share that is done, (0, 1], by one thread
+};
+
+/// Errors: invalid_argument naming the member.
+Status validate(const SceneSampling& sampling);
+
+/// Makes the flat; the same arguments give the same bits. Errors: invalid_argument (`sampling`),
+/// out_of_memory.
+Result<DefaultScene> make_default_scene(const SceneSampling& sampling);
+
+/// The same with so dense a sampling.
 Result<DefaultScene> make_default_scene(double density = 1.0);
 
 }  // namespace gsnav

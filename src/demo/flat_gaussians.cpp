@@ -1,0 +1,317 @@
+// SPDX-License-Identifier: Apache-2.0
+// From painted surfaces to Gaussians and triangles.
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "flat_painter.hpp"
+#include "gsnav/detail/core/run_guarded.hpp"
+#include "gsnav/detail/scene/spatial_order.hpp"
+#include "gsnav/frame/sh.hpp"
+
+namespace gsnav::flat {
+namespace {
+
+constexpr double kSigmaPerSpacing = 0.70;  // neighbours overlap until about 1 % shines through
+constexpr double kThickness = 0.0012;      // metres, one sigma
+constexpr double kOpacityLogit = 6.0;
+
+struct Tangents {
+  Vec3d ds, dt, normal;
+};
+
+/// Central differences, kept inside the patch; poles borrow the neighbouring direction.
+Tangents tangents(const Field& position, double s, double t) {
+  constexpr double h = 1e-3;
+  const auto difference = [&](double s0, double t0, double s1, double t1) {
+    return position(s1, t1) - position(s0, t0);
+  };
+  const double s0 = std::max(s - h, 0.0), s1 = std::min(s + h, 1.0);
+  const double t0 = std::max(t - h, 0.0), t1 = std::min(t + h, 1.0);
+  Tangents out{
+      difference(s0, t, s1, t) * (1.0 / (s1 - s0)), difference(s, t0, s, t1) * (1.0 / (t1 - t0)), {}};
+  out.normal = normalized(cross(out.ds, out.dt));
+  return out;
+}
+
+double row_length(const Field& position, double t, bool flat) {
+  const int pieces = flat ? 1 : 16;
+  double sum = 0;
+  Vec3d last = position(0, t);
+  for (int i = 1; i <= pieces; ++i) {
+    const Vec3d p = position(static_cast<double>(i) / pieces, t);
+    sum += norm(p - last);
+    last = p;
+  }
+  return sum;
+}
+
+double column_length(const Field& position, double s, bool flat) {
+  return row_length([&](double a, double) { return position(s, a); }, 0, flat);
+}
+
+int count_for(double length, double spacing) {
+  return std::max(1, static_cast<int>(std::lround(length / spacing)));
+}
+
+bool hidden(const std::vector<Box>& covers, const Vec3d& p) noexcept {
+  return std::any_of(covers.begin(), covers.end(), [&](const Box& b) {
+    return p.x >= b.low.x && p.x <= b.high.x && p.y >= b.low.y && p.y <= b.high.y && p.z >= b.low.z &&
+           p.z <= b.high.z;
+  });
+}
+
+/// Filmic shoulder, then sRGB encoding.
+double display(double x) noexcept {
+  const double c = 1.0 - std::exp(-x);
+  return c <= 0.0031308 ? 12.92 * c : 1.055 * std::pow(c, 1.0 / 2.4) - 0.055;
+}
+
+}  // namespace
+
+/// Light over a patch. It varies slowly: it is computed on a coarse grid and interpolated.
+class Painter::PatchLight {
+ public:
+  PatchLight(const Painter& painter, const Patch& patch, double length_s, double length_t) {
+    const double cell = patch.flat && length_t * length_s > 3.0 ? 0.20 : 0.12;
+    const auto cells = [cell](double length) { return length < 0.08 ? 0 : count_for(length, cell); };
+    cells_s_ = cells(length_s);
+    cells_t_ = cells(length_t);
+    // The grid stands a little inside, clear of what touches the patch's border.
+    const auto grid = [](int i, int n) { return n == 0 ? 0.5 : 0.02 + 0.96 * i / n; };
+    for (int j = 0; j <= cells_t_; ++j) {
+      for (int i = 0; i <= cells_s_; ++i) {
+        const double s = grid(i, cells_s_), t = grid(j, cells_t_);
+        light_.push_back(painter.light_at(painter.rooms_[patch.room], patch.position(s, t),
+                                          tangents(patch.position, s, t).normal));
+      }
+    }
+  }
+
+  Vec3d at(double s, double t) const {
+    const double x = std::clamp((s - 0.02) / 0.96, 0.0, 1.0) * cells_s_;
+    const double y = std::clamp((t - 0.02) / 0.96, 0.0, 1.0) * cells_t_;
+    const int i = std::clamp(static_cast<int>(x), 0, std::max(cells_s_ - 1, 0));
+    const int j = std::clamp(static_cast<int>(y), 0, std::max(cells_t_ - 1, 0));
+    const Vec3d* row = light_.data() + j * (cells_s_ + 1) + i;
+    const Vec3d* next = row + (cells_t_ > 0 ? cells_s_ + 1 : 0);
+    const int right = cells_s_ > 0 ? 1 : 0;
+    return lerp(lerp(row[0], row[right], x - i), lerp(next[0], next[right], x - i), y - j);
+  }
+
+ private:
+  int cells_s_ = 0, cells_t_ = 0;
+  std::vector<Vec3d> light_;
+};
+
+/// Boxes of the room that may hide points of the patch.
+std::vector<Box> Painter::covers_of(const Patch& patch) const {
+  std::vector<Box> covers = rooms_[patch.room].covered;
+  if (!patch.flat) return covers;
+  Box all;
+  for (int corner = 0; corner < 4; ++corner) all.add(patch.position(corner & 1, corner >> 1));
+  std::erase_if(covers, [&](const Box& b) {
+    bool apart = false;
+    for (int k = 0; k < 3; ++k) {
+      apart = apart || all.high[k] + 1e-6 < b.low[k] || b.high[k] + 1e-6 < all.low[k];
+    }
+    return apart;
+  });
+  return covers;
+}
+
+void Painter::emit_gaussians(const Patch& patch, const Cut& cut, std::size_t first_row,
+                             std::vector<RawGaussian>& out) const {
+  const std::vector<Box> covers = covers_of(patch);
+  const double length_t = column_length(patch.position, 0.5, patch.flat);
+  const int rows = count_for(length_t, patch.spacing.v * cut.stretch);
+  const double widest = std::max({row_length(patch.position, 0.5, patch.flat),
+                                  row_length(patch.position, 0.02, patch.flat),
+                                  row_length(patch.position, 0.98, patch.flat)});
+  std::optional<PatchLight> light;
+  if (!patch.glows) light.emplace(*this, patch, widest, length_t);
+
+  Tangents f = tangents(patch.position, 0.5, 0.5);
+  RawGaussian raw;
+  raw.opacity_logit = kOpacityLogit;
+  for (int j = 0; j < rows; ++j) {
+    const double t = (j + 0.5) / rows;
+    const double length_s = row_length(patch.position, t, patch.flat);
+    const int columns = count_for(length_s, patch.spacing.u * cut.stretch) +
+                        (covers.empty() ? cut.extra(first_row + static_cast<std::size_t>(j)) : 0);
+    for (int i = 0; i < columns; ++i) {
+      const double s = (i + 0.5) / columns;
+      const Vec3d p = patch.position(s, t);
+      if (hidden(covers, p)) continue;
+      if (!patch.flat) f = tangents(patch.position, s, t);
+      const Vec3d x = normalized(f.ds), y = cross(f.normal, x);
+      Mat3d axes;
+      for (int k = 0; k < 3; ++k) axes.row[k] = {x[k], y[k], f.normal[k]};
+      raw.mean = p;
+      raw.quat = quat_from_matrix(axes);
+      raw.log_scales = {std::log(kSigmaPerSpacing * norm(f.ds) / columns),
+                        std::log(kSigmaPerSpacing * norm(f.dt) / rows), std::log(kThickness)};
+      Vec3d color = patch.color(s, t);
+      if (!patch.glows) {
+        Vec3d incoming = light->at(s, t);
+        if (sun_at(rooms_[patch.room], p, f.normal)) incoming += Vec3d{2.3, 2.0, 1.5} * 0.8;
+        color = {color.x * incoming.x, color.y * incoming.y, color.z * incoming.z};
+      }
+      for (int k = 0; k < 3; ++k) {
+        raw.sh0[static_cast<std::size_t>(k)] = static_cast<float>((display(color[k]) - 0.5) / kSh0);
+      }
+      out.push_back(raw);
+    }
+  }
+}
+
+/// What emit_gaussians makes of the patch where no row has extra Gaussians.
+Painter::Counted Painter::count(const Patch& patch, double stretch) const {
+  const std::vector<Box> covers = covers_of(patch);
+  const int rows =
+      count_for(column_length(patch.position, 0.5, patch.flat), patch.spacing.v * stretch);
+  Counted out{0, covers.empty() ? static_cast<std::size_t>(rows) : 0};
+  for (int j = 0; j < rows; ++j) {
+    const double t = (j + 0.5) / rows;
+    const int columns =
+        count_for(row_length(patch.position, t, patch.flat), patch.spacing.u * stretch);
+    out.gaussians += static_cast<std::size_t>(columns);
+    for (int i = 0; !covers.empty() && i < columns; ++i) {
+      if (hidden(covers, patch.position((i + 0.5) / columns, t))) --out.gaussians;
+    }
+  }
+  return out;
+}
+
+Result<Painter::Cut> Painter::cut_at(double stretch, ThreadPool& pool) const {
+  Cut cut;
+  cut.stretch = stretch;
+  cut.patches.resize(patches_.size());
+  const Status s = detail::run_guarded(
+      pool, static_cast<std::uint32_t>(patches_.size()), [&](std::uint32_t p) -> Status {
+        cut.patches[p] = count(patches_[p], stretch);
+        return {};
+      });
+  if (!s) return s;
+  for (const Counted& c : cut.patches) {
+    cut.gaussians += c.gaussians;
+    cut.rows += c.open_rows;
+  }
+  return cut;
+}
+
+Result<Painter::Cut> Painter::cut_into(std::size_t gaussians, ThreadPool& pool) const {
+  // The number falls with the square of `stretch`, in steps. What is then missing is made up for by
+  // longer rows, most of them by one Gaussian at most.
+  const double goal = static_cast<double>(gaussians);
+  std::optional<Cut> best;
+  double few = 0, many = 0;  // stretches that gave no more than `gaussians`, and more; 0: none yet
+  double stretch = 1.07 * std::sqrt(400000 / goal);
+  constexpr int kTries = 16;
+  for (int i = 0; i < kTries; ++i) {
+    Result<Cut> cut = cut_at(stretch, pool);
+    if (!cut) return cut;
+    const double made = static_cast<double>(cut->gaussians), rows = static_cast<double>(cut->rows);
+    if (cut->gaussians <= gaussians) {
+      few = few > 0 ? std::min(few, stretch) : stretch;
+      const bool close = gaussians - cut->gaussians <= cut->rows;
+      if (!best || best->gaussians < cut->gaussians) best = std::move(*cut);
+      if (close) break;
+    } else {
+      many = std::max(many, stretch);
+    }
+    stretch *= std::sqrt(made / std::max(goal - 0.5 * rows, 0.5 * goal));
+    if (few > 0 && many > 0 && !(stretch > many && stretch < few)) stretch = std::sqrt(few * many);
+  }
+  if (!best) {
+    constexpr double kOneEach = 1e6;
+    Result<Cut> least = cut_at(kOneEach, pool);
+    if (!least) return least;
+    if (least->gaussians > gaussians) {
+      return Status{Errc::invalid_argument,
+                    "gaussians = " + std::to_string(gaussians) + ": this flat needs at least " +
+                        std::to_string(least->gaussians) + ", one for each surface"};
+    }
+    best = std::move(*least);
+  }
+  best->missing = gaussians - best->gaussians;
+  best->gaussians = gaussians;
+  return std::move(*best);
+}
+
+void Painter::emit_triangles(const Patch& patch, DefaultScene& scene) {
+  const auto first = static_cast<std::uint32_t>(scene.vertices.size());
+  const int ns = patch.cells_s, nt = patch.cells_t;
+  for (int j = 0; j <= nt; ++j) {
+    for (int i = 0; i <= ns; ++i) {
+      scene.vertices.push_back(patch.position(static_cast<double>(i) / ns, static_cast<double>(j) / nt));
+    }
+  }
+  for (int j = 0; j < nt; ++j) {
+    for (int i = 0; i < ns; ++i) {
+      const std::uint32_t a = first + static_cast<std::uint32_t>(j * (ns + 1) + i);
+      const std::uint32_t b = a + static_cast<std::uint32_t>(ns + 1);
+      scene.triangles.push_back({a, a + 1, b + 1});
+      scene.triangles.push_back({a, b + 1, b});
+    }
+  }
+}
+
+Status Painter::emit(const Cut& cut, const std::function<void(double)>& progress, ThreadPool& pool,
+                     GaussianCloudBuilder& builder) const {
+  constexpr std::size_t kBatch = 1 << 20;  // Gaussians that wait to be put in order
+  std::size_t first_row = 0, done = 0;
+  std::vector<std::size_t> first_rows;
+  std::vector<std::vector<RawGaussian>> made;
+  for (std::size_t begin = 0; begin < patches_.size();) {
+    std::size_t end = begin;
+    first_rows.clear();
+    for (std::size_t n = 0; end < patches_.size() && n < kBatch; ++end) {
+      n += cut.patches[end].gaussians;
+      first_rows.push_back(first_row);
+      first_row += cut.patches[end].open_rows;
+    }
+    made.assign(end - begin, {});
+    const Status s = detail::run_guarded(
+        pool, static_cast<std::uint32_t>(end - begin), [&](std::uint32_t p) -> Status {
+          made[p].reserve(cut.patches[begin + p].gaussians);
+          emit_gaussians(patches_[begin + p], cut, first_rows[p], made[p]);
+          return {};
+        });
+    if (!s) return s;
+    for (const std::vector<RawGaussian>& patch : made) {
+      for (const RawGaussian& g : patch) builder.add(g);
+      done += patch.size();
+    }
+    begin = end;
+    if (progress) progress(static_cast<double>(done) / static_cast<double>(cut.gaussians));
+  }
+  return {};
+}
+
+Result<DefaultScene> Painter::finish(const SceneSampling& sampling) const {
+  if (Status s = validate(sampling); !s) return s;
+  const int cores = static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1u, 16u));
+  ThreadPool pool(sampling.threads > 0 ? sampling.threads : cores);
+  DefaultScene scene;
+  const Status s = detail::guarded([&]() -> Status {
+    const Result<Cut> cut = sampling.gaussians > 0 ? cut_into(sampling.gaussians, pool)
+                                                   : cut_at(1.07 / std::sqrt(sampling.density), pool);
+    if (!cut) return cut.status();
+    GaussianCloudBuilder builder(0, "default scene");
+    builder.reserve(cut->gaussians);
+    if (Status made = emit(*cut, sampling.progress, pool, builder); !made) return made;
+    for (const Patch& p : patches_) emit_triangles(p, scene);
+    scene.bounds = builder.report().bounds;
+    scene.cloud = std::move(builder.cloud());
+    sort_spatially(scene.cloud);
+    return {};
+  });
+  if (!s) return s;
+  return scene;
+}
+
+}  // namespace gsnav::flat
