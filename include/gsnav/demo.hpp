@@ -5,6 +5,7 @@
 // Link gsnav::demo.
 
 #include "gsnav/detail/demo/default_scene.hpp"
+#include "gsnav/detail/demo/floor_plan.hpp"
 #include "gsnav/detail/demo/gait.hpp"
 #include "gsnav/detail/demo/humanoid.hpp"
 #include "gsnav/detail/demo/people.hpp"

@@ -171,13 +171,11 @@ void Painter::emit_gaussians(const Patch& patch, const Cut& cut, std::size_t fir
 /// What emit_gaussians makes of the patch where no row has extra Gaussians.
 Painter::Counted Painter::count(const Patch& patch, double stretch) const {
   const std::vector<Box> covers = covers_of(patch);
-  const int rows =
-      count_for(column_length(patch.position, 0.5, patch.flat), patch.spacing.v * stretch);
+  const int rows = count_for(column_length(patch.position, 0.5, patch.flat), patch.spacing.v * stretch);
   Counted out{0, covers.empty() ? static_cast<std::size_t>(rows) : 0};
   for (int j = 0; j < rows; ++j) {
     const double t = (j + 0.5) / rows;
-    const int columns =
-        count_for(row_length(patch.position, t, patch.flat), patch.spacing.u * stretch);
+    const int columns = count_for(row_length(patch.position, t, patch.flat), patch.spacing.u * stretch);
     out.gaussians += static_cast<std::size_t>(columns);
     for (int i = 0; !covers.empty() && i < columns; ++i) {
       if (hidden(covers, patch.position((i + 0.5) / columns, t))) --out.gaussians;
@@ -190,11 +188,11 @@ Result<Painter::Cut> Painter::cut_at(double stretch, ThreadPool& pool) const {
   Cut cut;
   cut.stretch = stretch;
   cut.patches.resize(patches_.size());
-  const Status s = detail::run_guarded(
-      pool, static_cast<std::uint32_t>(patches_.size()), [&](std::uint32_t p) -> Status {
-        cut.patches[p] = count(patches_[p], stretch);
-        return {};
-      });
+  const Status s = detail::run_guarded(pool, static_cast<std::uint32_t>(patches_.size()),
+                                       [&](std::uint32_t p) -> Status {
+                                         cut.patches[p] = count(patches_[p], stretch);
+                                         return {};
+                                       });
   if (!s) return s;
   for (const Counted& c : cut.patches) {
     cut.gaussians += c.gaussians;

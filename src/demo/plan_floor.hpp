@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "gsnav/detail/demo/floor_plan.hpp"
+
+namespace gsnav::plan {
+
+inline constexpr double kHalfWall = 0.06;  // metres
+
+inline bool overlap(const FloorRect& a, const FloorRect& b, double gap = 0) noexcept {
+  return a.x0 < b.x1 + gap && b.x0 < a.x1 + gap && a.z0 < b.z1 + gap && b.z0 < a.z1 + gap;
+}
+inline bool contains(const FloorRect& outer, const FloorRect& inner) noexcept {
+  return inner.x0 >= outer.x0 && inner.z0 >= outer.z0 && inner.x1 <= outer.x1 && inner.z1 <= outer.z1;
+}
+
+/// The floor of one room, where a disc can stand: cells of 0.1 m, taken where any part of them is too
+/// near to a wall or a piece of furniture. Neighbouring free cells are joined, and so are all points in
+/// them for the disc.
+class FreeFloor {
+ public:
+  FreeFloor(const FloorRect& inside, double clearance);
+
+  /// Takes the floor about a rectangle.
+  void take(const FloorRect& rect);
+  /// Whether the cell at a point is free.
+  bool free(double x, double z) const noexcept;
+  /// Whether all free cells are joined, and there is one.
+  bool in_one_piece();
+
+ private:
+  static constexpr double kCell = 0.1;
+  FloorRect inside_;
+  double clearance_;
+  int columns_, rows_;
+  std::vector<char> taken_;         // [rows_][columns_]
+  std::vector<char> reached_;       // scratch, the same
+  std::vector<std::size_t> queue_;  // scratch
+};
+
+}  // namespace gsnav::plan
