@@ -8,4 +8,5 @@
 #include "gsnav/detail/demo/floor_plan.hpp"
 #include "gsnav/detail/demo/gait.hpp"
 #include "gsnav/detail/demo/humanoid.hpp"
+#include "gsnav/detail/demo/indoor_views.hpp"
 #include "gsnav/detail/demo/people.hpp"

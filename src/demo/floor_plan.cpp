@@ -16,9 +16,9 @@ namespace gsnav {
 namespace plan {
 namespace {
 
-constexpr double kLeastSide = 2.4;    // of a room, metres
-constexpr double kDoorMargin = 0.3;   // between a door and a corner
-constexpr double kLeastDoor = 0.85;   // a leaf of 0.8 and its stops
+constexpr double kLeastSide = 2.4;   // of a room, metres
+constexpr double kDoorMargin = 0.3;  // between a door and a corner
+constexpr double kLeastDoor = 0.85;  // a leaf of 0.8 and its stops
 constexpr double kDoorHeight = 2.1;
 
 double rounded(double metres) { return std::round(metres * 20) / 20; }
@@ -45,8 +45,10 @@ void cut(const FloorRect& r, int n, Rng& rng, std::vector<FloorRect>& out) {
 
 /// What is left of a cell of the outline between its walls; outer walls lie outside.
 FloorRect between_walls(const FloorRect& cell, const FloorRect& outline) {
-  return {cell.x0 + (cell.x0 > outline.x0 ? kHalfWall : 0), cell.z0 + (cell.z0 > outline.z0 ? kHalfWall : 0),
-          cell.x1 - (cell.x1 < outline.x1 ? kHalfWall : 0), cell.z1 - (cell.z1 < outline.z1 ? kHalfWall : 0)};
+  return {cell.x0 + (cell.x0 > outline.x0 ? kHalfWall : 0),
+          cell.z0 + (cell.z0 > outline.z0 ? kHalfWall : 0),
+          cell.x1 - (cell.x1 < outline.x1 ? kHalfWall : 0),
+          cell.z1 - (cell.z1 < outline.z1 ? kHalfWall : 0)};
 }
 
 bool has_outer_wall(const FloorRect& r, const FloorRect& outline) {
@@ -55,9 +57,9 @@ bool has_outer_wall(const FloorRect& r, const FloorRect& outline) {
 
 /// A piece of wall that two rooms share.
 struct SharedWall {
-  std::size_t a, b;        // a on the side of lower coordinates
-  bool across_x;           // it divides along x
-  double wall, from, to;   // where a door may be
+  std::size_t a, b;       // a on the side of lower coordinates
+  bool across_x;          // it divides along x
+  double wall, from, to;  // where a door may be
 };
 
 std::vector<SharedWall> shared_walls(const std::vector<PlannedRoom>& rooms) {
@@ -84,7 +86,8 @@ PlannedDoor door_in(const SharedWall& w, bool wide, Rng& rng) {
                        : std::array{WallSide::z_high, WallSide::z_low};
   d.wall = w.wall;
   const double room = w.to - w.from;
-  const double wanted = wide ? rng.uniform(1.3, 1.9) : kLeastDoor + 0.05 * static_cast<double>(rng.below(4));
+  const double wanted =
+      wide ? rng.uniform(1.3, 1.9) : kLeastDoor + 0.05 * static_cast<double>(rng.below(4));
   const double width = std::min(wanted, room);
   // Near an end of the wall more of it is left for furniture.
   const double place = rng.uniform();
@@ -102,14 +105,11 @@ bool join_rooms(FloorPlan& plan, Rng& rng) {
   };
   std::vector<Candidate> all;
   for (const SharedWall& w : shared_walls(plan.rooms)) {
-    const auto is_hub = [&](std::size_t r) {
-      return r == 0 || plan.rooms[r].kind == RoomKind::hall;
-    };
+    const auto is_hub = [&](std::size_t r) { return r == 0 || plan.rooms[r].kind == RoomKind::hall; };
     all.push_back({w, rng.uniform() - (is_hub(w.a) || is_hub(w.b) ? 0.7 : 0.0)});
   }
-  std::sort(all.begin(), all.end(), [](const Candidate& a, const Candidate& b) {
-    return a.order < b.order;
-  });
+  std::sort(all.begin(), all.end(),
+            [](const Candidate& a, const Candidate& b) { return a.order < b.order; });
   std::vector<std::size_t> group(plan.rooms.size());
   std::iota(group.begin(), group.end(), std::size_t{0});
   std::size_t groups = group.size();
@@ -170,9 +170,8 @@ std::optional<FloorPlan> try_rooms(const FloorPlanOptions& options, Rng& rng, bo
   plan.outline = {0, 0, rounded(std::sqrt(area * aspect)), rounded(std::sqrt(area / aspect))};
   std::vector<FloorRect> cells;
   cut(plan.outline, options.rooms, rng, cells);
-  std::stable_sort(cells.begin(), cells.end(), [](const FloorRect& a, const FloorRect& b) {
-    return a.area() > b.area();
-  });
+  std::stable_sort(cells.begin(), cells.end(),
+                   [](const FloorRect& a, const FloorRect& b) { return a.area() > b.area(); });
   for (const FloorRect& c : cells) {
     const FloorRect in = between_walls(c, plan.outline);
     const auto [low, high] = std::minmax({in.width(), in.depth()});

@@ -71,11 +71,7 @@ FloorRect strip(const FloorRect& in, WallSide side, double from, double to, doub
 class Furnisher {
  public:
   Furnisher(FloorPlan& plan, std::size_t room, double clearance, Rng& rng)
-      : plan_(plan),
-        room_(room),
-        in_(plan.rooms[room].inside),
-        rng_(rng),
-        floor_(in_, clearance) {
+      : plan_(plan), room_(room), in_(plan.rooms[room].inside), rng_(rng), floor_(in_, clearance) {
     for (const PlannedDoor& d : plan.doors) {
       for (std::size_t k = 0; k < 2; ++k) {
         if (d.rooms[k] != room) continue;
@@ -101,7 +97,7 @@ class Furnisher {
     for (const Group& g : groups) {
       std::vector<Place> places = g.at_wall ? wall_places(g) : floor_places(g);
       std::stable_sort(places.begin(), places.end(),
-                [](const Place& a, const Place& b) { return a.score > b.score; });
+                       [](const Place& a, const Place& b) { return a.score > b.score; });
       for (const Place& p : places) {
         if (place(g, p.frame)) return;
       }

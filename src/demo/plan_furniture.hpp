@@ -18,10 +18,10 @@ struct Group {
     double width = 0, length = 0;
   };
   std::vector<Piece> pieces;
-  bool at_wall = true;        ///< else anywhere on the floor
-  bool tall = false;          ///< may not stand in front of a window
-  double corner = 0;          ///< how much it likes corners of the room, [-1, 1]
-  double picture = 0;         ///< probability of one above the first piece
+  bool at_wall = true;  ///< else anywhere on the floor
+  bool tall = false;    ///< may not stand in front of a window
+  double corner = 0;    ///< how much it likes corners of the room, [-1, 1]
+  double picture = 0;   ///< probability of one above the first piece
 };
 
 /// What a room of this kind should have, the most important first; of each the first of several

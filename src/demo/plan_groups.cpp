@@ -81,8 +81,8 @@ std::vector<std::vector<Group>> furniture_for(const PlannedRoom& room, bool only
     case RoomKind::living_room:
       if (only_room) out.push_back({kitchen(2.4, true), kitchen(1.8, true)});
       if (only_room) out.push_back({bed(1, false), bed(0, false)});
-      out.push_back({seating(2.3, true), seating(1.9, true), seating(1.9, false),
-                     single(K::sofa, 1.5, 0)});
+      out.push_back(
+          {seating(2.3, true), seating(1.9, true), seating(1.9, false), single(K::sofa, 1.5, 0)});
       want(0.9, by_size(K::bookshelf, {2.0, 1.6, 1.1}, 0.3));
       want(0.9, by_size(K::sideboard, {1.8, 1.4, 1.0}, 0));
       want(0.8, by_size(K::sofa, {0.95}, 0.6));

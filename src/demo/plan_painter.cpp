@@ -22,13 +22,13 @@ Vec3d one_of(const unsigned (&colors)[N], Rng& rng) {
 }
 
 constexpr unsigned kPlain[] = {0xf0eadf, 0xf2efe8, 0xefe9df, 0xf1ebe0, 0xeef0ec, 0xe9e4d6};
-constexpr unsigned kAccents[] = {0x9cab92, 0x8ea3b5, 0xcf9f7c, 0xc9b48a, 0xb58f8a, 0x7f9aa0,
-                                 0xa9a3b8, 0xd8c7a3, 0xb9c4bd, 0x6f8478};
+constexpr unsigned kAccents[] = {0x9cab92, 0x8ea3b5, 0xcf9f7c, 0xc9b48a, 0xb58f8a,
+                                 0x7f9aa0, 0xa9a3b8, 0xd8c7a3, 0xb9c4bd, 0x6f8478};
 constexpr unsigned kFloors[] = {0xc0905c, 0xb98a5a, 0xa67445, 0x8f6239, 0xcda677};
-constexpr unsigned kFabrics[] = {0x3c6a70, 0x8a8f6a, 0xb9a184, 0x54637a, 0x7d4f4a, 0x5f6f5a,
-                                 0x8a6f8c, 0x3f4a5c, 0xa7a196, 0xc08a4f};
-constexpr unsigned kCushions[] = {0xd9a441, 0xc8553d, 0xe6d8bd, 0xb0573b, 0x2f5d62, 0xe9dfcc,
-                                  0x8fb9aa, 0x7a3b46};
+constexpr unsigned kFabrics[] = {0x3c6a70, 0x8a8f6a, 0xb9a184, 0x54637a, 0x7d4f4a,
+                                 0x5f6f5a, 0x8a6f8c, 0x3f4a5c, 0xa7a196, 0xc08a4f};
+constexpr unsigned kCushions[] = {0xd9a441, 0xc8553d, 0xe6d8bd, 0xb0573b,
+                                  0x2f5d62, 0xe9dfcc, 0x8fb9aa, 0x7a3b46};
 constexpr unsigned kCovers[] = {0x7f97a8, 0x8a9a7c, 0xb38b7d, 0x9a8fae, 0xc2b59b, 0x5e7d86};
 constexpr unsigned kCurtains[] = {0xe9dfcc, 0xdfe5e8, 0xe8d9c0, 0xd9d3c7, 0xcfd8cc, 0xe3cfc4};
 constexpr unsigned kSeats[] = {0xd9a441, 0x3a4a52, 0x9fb0a0, 0xb9603f, 0xe4ddd0, 0x5f7f8c};
@@ -61,8 +61,8 @@ void walls(Painter& p, const FloorPlan& plan, std::size_t room, const Palette& c
     for (const PlannedDoor& d : plan.doors) {
       for (std::size_t k = 0; k < 2; ++k) {
         if (d.rooms[k] != room || d.sides[k] != here) continue;
-        openings.push_back({k == 0 ? Opening::door : Opening::doorway_made_elsewhere, d.from, d.to, 0,
-                            d.height});
+        openings.push_back(
+            {k == 0 ? Opening::door : Opening::doorway_made_elsewhere, d.from, d.to, 0, d.height});
       }
     }
     for (const PlannedWindow& w : plan.windows) {

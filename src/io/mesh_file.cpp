@@ -3,10 +3,12 @@
 
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <string_view>
 
 #include "file.hpp"
 #include "gsnav/core/lower_case.hpp"
+#include "gsnav/core/replace_file.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -116,6 +118,45 @@ std::string extension_of(const std::filesystem::path& path) {
 bool is_gltf(const std::string& extension) { return extension == ".glb" || extension == ".gltf"; }
 
 }  // namespace
+
+Status save_obj(const std::filesystem::path& path, std::span<const Vec3d> vertices,
+                std::span<const std::array<std::uint32_t, 3>> triangles) {
+  const auto refuse = [&](const char* what, std::size_t index, const char* why) -> Status {
+    return {Errc::invalid_argument, path.string() + ": " + what + " " + std::to_string(index) + why};
+  };
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    if (!is_finite(vertices[i])) return refuse("vertex", i, " is not finite");
+  }
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    for (const std::uint32_t v : triangles[i]) {
+      if (v >= vertices.size()) return refuse("triangle", i, " names a vertex that there is not");
+    }
+  }
+  return replace_file(path, [&](OutputFile& file) {
+    // to_chars: the shortest text that gives the same float32, in every locale.
+    char line[128];
+    for (const Vec3d& v : vertices) {
+      char* at = line;
+      *at++ = 'v';
+      for (int k = 0; k < 3; ++k) {
+        *at++ = ' ';
+        at = std::to_chars(at, std::end(line), static_cast<float>(v[k])).ptr;
+      }
+      *at++ = '\n';
+      file.write(line, static_cast<std::size_t>(at - line));
+    }
+    for (const std::array<std::uint32_t, 3>& t : triangles) {
+      char* at = line;
+      *at++ = 'f';
+      for (const std::uint32_t v : t) {
+        *at++ = ' ';
+        at = std::to_chars(at, std::end(line), std::uint64_t{v} + 1).ptr;
+      }
+      *at++ = '\n';
+      file.write(line, static_cast<std::size_t>(at - line));
+    }
+  });
+}
 
 Result<TriangleMesh> load_mesh(const std::filesystem::path& path, const ReadLimits& limits) {
   const std::string extension = extension_of(path);

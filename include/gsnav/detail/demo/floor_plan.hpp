@@ -112,7 +112,8 @@ struct FloorPlan {
 /// Errors: invalid_argument naming the option.
 Result<FloorPlan> make_floor_plan(const FloorPlanOptions& options = {});
 
-/// Builds a floor plan: walls, furniture and light, in colours drawn by its seed. Errors: invalid_argument
+/// Builds a floor plan: walls, furniture and light, in colours drawn by its seed. Errors:
+/// invalid_argument
 /// (`sampling`), out_of_memory.
 Result<DefaultScene> make_planned_scene(const FloorPlan& plan, const SceneSampling& sampling = {});
 

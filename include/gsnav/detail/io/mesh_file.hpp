@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <filesystem>
+#include <span>
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/detail/io/read_limits.hpp"
 #include "gsnav/detail/scene/textured_scene.hpp"
 #include "gsnav/detail/scene/triangle_mesh.hpp"
+#include "gsnav/math/vec.hpp"
 
 namespace gsnav::io {
 
@@ -16,6 +20,12 @@ namespace gsnav::io {
 /// outside the vertices read so far, fewer than three corners, a coordinate that is no finite number);
 /// out_of_memory. Never throws.
 Result<TriangleMesh> load_obj(const std::filesystem::path& path);
+
+/// Writes triangles as a Wavefront OBJ, `v` and `f` lines. A vertex comes back as the float32 nearest to
+/// it. Errors: invalid_argument naming the vertex that is not finite or the triangle with an index
+/// outside the vertices; file_not_found, write_failed, after which the file of before is unchanged.
+Status save_obj(const std::filesystem::path& path, std::span<const Vec3d> vertices,
+                std::span<const std::array<std::uint32_t, 3>> triangles);
 
 /// Reads the vertices (x y z of element `vertex`, any scalar type) and faces (the list `vertex_indices`
 /// or `vertex_index` of element `face`; polygons become fans) of a PLY, text or binary of either byte

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+// gsnav-scene: scenes and people that are made by code alone.
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+
+#include "gsnav/core/lower_case.hpp"
+#include "gsnav/core/printable.hpp"
+#include "gsnav/core/replace_file.hpp"
+#include "gsnav/io.hpp"
+#include "options.hpp"
+
+namespace gsnav_scene {
+namespace {
+
+using gsnav::Errc;
+using gsnav::Result;
+using gsnav::Status;
+
+/// Prints on stderr what the program is at, from its third second on.
+class Progress {
+ public:
+  void at(double share) {
+    const bool terminal = isatty(fileno(stderr)) != 0;
+    if (early() || (seconds(shown_) < (terminal ? 0.2 : 10.0) && share < 1)) return;
+    shown_ = Clock::now();
+    std::fprintf(stderr, "%sGaussians: %3.0f %%%s", terminal ? "\r" : "", 100 * share,
+                 terminal && share < 1 ? "" : "\n");
+    std::fflush(stderr);
+  }
+  void writing(const std::string& path) const {
+    if (!early()) std::fprintf(stderr, "writing %s\n", gsnav::printable(path).c_str());
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static double seconds(Clock::time_point since) {
+    return std::chrono::duration<double>(Clock::now() - since).count();
+  }
+  bool early() const { return seconds(begin_) < 2; }
+
+  Clock::time_point begin_ = Clock::now(), shown_{};
+};
+
+/// Whether the files of a scene can be written, asked before it is made.
+Status outputs_status(const Outputs& o) {
+  if (!o.folder.empty()) {
+    if (Status s = gsnav::make_output_folder(o.folder); !s) return s;
+  }
+  if (Status s = gsnav::io::check_scene_output(o.scene); !s) return s;
+  for (const std::string* path : {&o.mesh, &o.cameras}) {
+    if (path->empty()) continue;
+    if (Status s = gsnav::check_output_path(*path); !s) return s;
+  }
+  if (!o.mesh.empty() && !gsnav::lower_case(o.mesh).ends_with(".obj")) {
+    return {Errc::unsupported, o.mesh + ": meshes are written as .obj; name one for --mesh"};
+  }
+  const auto same = [](const std::string& a, const std::string& b) { return !a.empty() && a == b; };
+  if (same(o.scene, o.cameras) || same(o.mesh, o.cameras) || same(o.scene, o.mesh)) {
+    return {Errc::invalid_argument, "--out, --mesh and --cameras must name different files"};
+  }
+  return {};
+}
+
+Result<gsnav::DefaultScene> make(const SceneCommand& c, const gsnav::SceneSampling& sampling) {
+  if (!c.rooms) return gsnav::make_default_scene(sampling);
+  const auto plan = gsnav::make_floor_plan(c.plan);
+  if (!plan) return plan.status();
+  std::printf("%zu rooms on %.1f x %.1f m, %zu doors, %zu windows, %zu pieces of furniture:",
+              plan->rooms.size(), plan->outline.width(), plan->outline.depth(), plan->doors.size(),
+              plan->windows.size(), plan->furniture.size());
+  for (const gsnav::PlannedRoom& r : plan->rooms) {
+    std::printf("%s %s %.1f m2", &r == plan->rooms.data() ? "" : ",", gsnav::name_of(r.kind),
+                r.inside.area());
+  }
+  std::printf("\n");
+  return gsnav::make_planned_scene(*plan, sampling);
+}
+
+Status run(const SceneCommand& c) {
+  Progress progress;
+  if (Status s = outputs_status(c.out); !s) return s;
+  gsnav::SceneSampling sampling = c.sampling;
+  sampling.progress = [&](double share) { progress.at(share); };
+  const auto scene = make(c, sampling);
+  if (!scene) return scene.status();
+  progress.writing(c.out.scene);
+  if (Status s = gsnav::io::save_scene(c.out.scene, scene->cloud); !s) return s;
+  std::printf("%s: %zu Gaussians\n", gsnav::printable(c.out.scene).c_str(), scene->cloud.size());
+  if (!c.out.mesh.empty()) {
+    if (Status s = gsnav::io::save_obj(c.out.mesh, scene->vertices, scene->triangles); !s) return s;
+    std::printf("%s: %zu triangles\n", gsnav::printable(c.out.mesh).c_str(), scene->triangles.size());
+  }
+  if (!c.out.cameras.empty()) {
+    const auto views = gsnav::indoor_views(*scene, c.views);
+    if (!views) return views.status();
+    if (Status s = gsnav::io::save_cameras(c.out.cameras, *views); !s) return s;
+    std::printf("%s: %zu views of %d x %d\n", gsnav::printable(c.out.cameras).c_str(), views->size(),
+                c.views.width, c.views.height);
+  }
+  return {};
+}
+
+Status run(const HumanoidCommand& c) {
+  const bool avatar = gsnav::lower_case(c.out).ends_with(".npz");
+  if (Status s = avatar ? gsnav::check_output_path(c.out) : gsnav::io::check_scene_output(c.out); !s) {
+    return s;
+  }
+  gsnav::HumanoidOptions options = c.seed == 0 ? gsnav::HumanoidOptions{} : gsnav::random_person(c.seed);
+  options.gaussians = c.gaussians;
+  const auto person = gsnav::try_make_humanoid(options);
+  if (!person) return person.status();
+  const Status s = avatar ? gsnav::io::save_avatar(c.out, *person)
+                          : gsnav::io::save_scene(c.out, person->cloud);
+  if (!s) return s;
+  std::printf("%s: %zu Gaussians", gsnav::printable(c.out).c_str(), person->size());
+  if (avatar) {
+    std::printf(", %zu joints, %zu capsules", person->skeleton.size(), person->capsules.size());
+  }
+  std::printf(", %.2f m tall\n", options.height);
+  return {};
+}
+
+}  // namespace
+}  // namespace gsnav_scene
+
+int main(int argc, char** argv) {
+  int exit_code = 0;
+  const auto options = gsnav_scene::parse_options(argc, argv, exit_code);
+  if (!options) return exit_code;
+  const gsnav::Status s =
+      options->scene ? gsnav_scene::run(*options->scene) : gsnav_scene::run(*options->humanoid);
+  if (s.ok()) return 0;
+  std::fprintf(stderr, "gsnav-scene: %s\n", gsnav::printable(s.message()).c_str());
+  return 1;
+}
