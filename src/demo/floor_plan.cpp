@@ -160,8 +160,8 @@ RoomKind kind_of(std::size_t place) {
   return kinds[place];
 }
 
-/// One try at rooms and doors; nothing where rooms are too narrow, or `strict` and a room has no outer
-/// wall or is a corridor.
+/// One try at rooms and doors. Nothing where a room is too narrow or cannot be reached; where `strict`,
+/// nor where one has no outer wall or is a corridor.
 std::optional<FloorPlan> try_rooms(const FloorPlanOptions& options, Rng& rng, bool strict) {
   FloorPlan plan;
   plan.seed = options.seed;
@@ -175,7 +175,7 @@ std::optional<FloorPlan> try_rooms(const FloorPlanOptions& options, Rng& rng, bo
   for (const FloorRect& c : cells) {
     const FloorRect in = between_walls(c, plan.outline);
     const auto [low, high] = std::minmax({in.width(), in.depth()});
-    if (low < kLeastSide) return {};
+    if (low < kLeastSide || low > FreeFloor::kMostShortSide) return {};
     if (strict && (high > 1.9 * low || !has_outer_wall(c, plan.outline))) return {};
     plan.rooms.push_back({kind_of(plan.rooms.size()), in});
   }
@@ -209,10 +209,11 @@ Result<FloorPlan> make_floor_plan(const FloorPlanOptions& options) {
           static_cast<std::uint64_t>(options.rooms));
   constexpr int kStrictTries = 60, kTries = 1000;
   for (int i = 0; i < kTries; ++i) {
-    std::optional<FloorPlan> plan = plan::try_rooms(options, rng, i < kStrictTries);
+    const bool strict = i < kStrictTries;
+    std::optional<FloorPlan> plan = plan::try_rooms(options, rng, strict);
     if (!plan) continue;
     plan::add_windows(*plan, rng);
-    plan::furnish(*plan, options.clearance, rng);
+    if (!plan::furnish(*plan, options.clearance, rng) && strict) continue;
     return std::move(*plan);
   }
   return {Errc::invalid_argument, "seed = " + std::to_string(options.seed) + ": no plan of " +

@@ -14,19 +14,20 @@ namespace gsnav {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kClear = 0.35;        // metres about an eye
-constexpr double kLeastSight = 1.5;    // metres
-constexpr double kDown = 0.12;         // slope of a view
+constexpr double kClear = 0.4;       // metres about an eye
+constexpr double kLeastSight = 1.5;  // metres
+constexpr double kDown = 0.12;       // slope of a view
 
 Status validate(const IndoorViewOptions& o) {
   const auto in = [](const char* name, double value, double low, double high) -> Status {
     if (value >= low && value <= high) return {};
-    return {Errc::invalid_argument, std::string(name) + " = " + std::to_string(value) + ": must be in [" +
-                                        std::to_string(low) + ", " + std::to_string(high) + "]"};
+    return {Errc::invalid_argument, std::string(name) + " = " + std::to_string(value) +
+                                        ": must be in [" + std::to_string(low) + ", " +
+                                        std::to_string(high) + "]"};
   };
-  for (const Status& s : {in("count", o.count, 1, 10000), in("width", o.width, 1, 16384),
-                          in("height", o.height, 1, 16384), in("hfov", o.hfov, 10, 150),
-                          in("eye_height", o.eye_height, 0.3, 2.2)}) {
+  for (const Status& s :
+       {in("count", o.count, 1, 10000), in("width", o.width, 1, 16384), in("height", o.height, 1, 16384),
+        in("hfov", o.hfov, 10, 150), in("eye_height", o.eye_height, 0.3, 2.2)}) {
     if (!s) return s;
   }
   return {};
@@ -92,7 +93,9 @@ std::optional<Vec3d> longest_sight(const Surfaces& surfaces, const Vec3d& eye, d
   double furthest = kLeastSight;
   std::optional<Vec3d> best;
   for (int i = 0; i < kDirections; ++i) {
-    const auto at = [&](int k) { return sight[static_cast<std::size_t>((i + k + kDirections) % kDirections)]; };
+    const auto at = [&](int k) {
+      return sight[static_cast<std::size_t>((i + k + kDirections) % kDirections)];
+    };
     const double seen = std::min({at(-1), at(0), at(1)});
     if (seen <= furthest || std::isinf(at(0))) continue;
     furthest = seen;
@@ -101,31 +104,55 @@ std::optional<Vec3d> longest_sight(const Surfaces& surfaces, const Vec3d& eye, d
   return best;
 }
 
-}  // namespace
+struct Sight {
+  Vec3d eye, ray;
+};
 
-Result<std::vector<Camera>> indoor_views(const DefaultScene& scene, const IndoorViewOptions& o) {
-  if (Status s = validate(o); !s) return s;
-  const Surfaces surfaces(scene);
+/// Nothing where many places in a row were taken.
+std::optional<Sight> random_view(const Surfaces& surfaces, double height, Rng& rng) {
   const Aabb<double>& all = surfaces.bounds();
-  Rng rng(o.seed);
-  std::vector<Camera> out;
-  constexpr int kTries = 2000;  // for a view: a place is free in a few
-  for (int tries = 0; static_cast<int>(out.size()) < o.count; ++tries) {
-    if (tries == kTries || all.empty()) {
-      return {Errc::nothing_navigable, "no place for an eye at " + std::to_string(o.eye_height) +
-                                           " m found between the scene's surfaces"};
-    }
-    const Vec3d eye{rng.uniform(all.low.x, all.high.x), o.eye_height,
-                    rng.uniform(all.low.z, all.high.z)};
+  constexpr int kTries = 1000;
+  for (int i = 0; i < kTries && !all.empty(); ++i) {
+    const Vec3d eye{rng.uniform(all.low.x, all.high.x), height, rng.uniform(all.low.z, all.high.z)};
     const double turn = rng.uniform(0, 2 * kPi);
     constexpr double kAboveRugs = 0.1;
     if (!surfaces.free({{eye.x - kClear, kAboveRugs, eye.z - kClear},
                         {eye.x + kClear, eye.y + kClear, eye.z + kClear}}))
       continue;
-    const auto ray = longest_sight(surfaces, eye, turn);
-    if (!ray) continue;
-    out.push_back(Camera::look_at(eye, eye + *ray, {0, 1, 0}, o.width, o.height, o.hfov));
-    tries = -1;
+    if (const auto ray = longest_sight(surfaces, eye, turn)) return Sight{eye, *ray};
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::vector<Camera>> indoor_views(const DefaultScene& scene, const IndoorViewOptions& o) {
+  if (Status s = validate(o); !s) return s;
+  const Surfaces surfaces(scene);
+  Rng rng(o.seed);
+  std::vector<Camera> out;
+  std::vector<Vec3d> eyes;
+  while (static_cast<int>(out.size()) < o.count) {
+    // Of several the one that is furthest from all before it, so that views spread over the rooms.
+    constexpr int kCandidates = 6;
+    std::optional<Sight> best;
+    double furthest = -1;
+    for (int i = 0; i < kCandidates; ++i) {
+      const auto view = random_view(surfaces, o.eye_height, rng);
+      if (!view) break;
+      double nearest = std::numeric_limits<double>::max();
+      for (const Vec3d& e : eyes) nearest = std::min(nearest, norm(e - view->eye));
+      if (nearest <= furthest) continue;
+      furthest = nearest;
+      best = view;
+    }
+    if (!best) {
+      return {Errc::nothing_navigable, "no place for an eye at " + std::to_string(o.eye_height) +
+                                           " m found between the scene's surfaces"};
+    }
+    eyes.push_back(best->eye);
+    out.push_back(
+        Camera::look_at(best->eye, best->eye + best->ray, {0, 1, 0}, o.width, o.height, o.hfov));
   }
   return out;
 }

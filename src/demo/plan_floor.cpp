@@ -5,13 +5,34 @@
 #include <cmath>
 
 namespace gsnav::plan {
+namespace {
+
+std::uint64_t bits(int from, int to) noexcept {
+  const auto below = [](int n) { return n >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << n) - 1; };
+  return from < to ? below(to) & ~below(from) : 0;
+}
+
+/// The runs of `free` that have a bit of `seeds`.
+std::uint64_t runs_of(std::uint64_t seeds, std::uint64_t free) noexcept {
+  std::uint64_t up = seeds & free, down = up, free_up = free, free_down = free;
+  for (int step = 1; step < 64; step *= 2) {
+    up |= free_up & (up << step);
+    free_up &= free_up << step;
+    down |= free_down & (down >> step);
+    free_down &= free_down >> step;
+  }
+  return up | down;
+}
+
+}  // namespace
 
 FreeFloor::FreeFloor(const FloorRect& inside, double clearance)
     : inside_(inside),
       clearance_(clearance),
-      columns_(static_cast<int>(std::ceil(inside.width() / kCell))),
-      rows_(static_cast<int>(std::ceil(inside.depth() / kCell))),
-      taken_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), 0) {
+      rows_along_x_(inside.width() < inside.depth()),
+      columns_(static_cast<int>(std::ceil(std::min(inside.width(), inside.depth()) / kCell))),
+      rows_(static_cast<int>(std::ceil(std::max(inside.width(), inside.depth()) / kCell))),
+      free_(static_cast<std::size_t>(rows_), bits(0, columns_)) {
   const FloorRect& r = inside;
   constexpr double kOutside = 1.0;
   take({r.x0 - kOutside, r.z0 - kOutside, r.x0, r.z1 + kOutside});
@@ -28,38 +49,32 @@ void FreeFloor::take(const FloorRect& rect) {
   const auto high = [&](double v, double origin, int n) {
     return std::min(static_cast<int>(std::ceil((v + clearance_ - origin) / kCell - 1e-9)), n);
   };
-  const int i0 = low(rect.x0, inside_.x0), i1 = high(rect.x1, inside_.x0, columns_);
-  const int j0 = low(rect.z0, inside_.z0), j1 = high(rect.z1, inside_.z0, rows_);
-  for (int j = j0; j < j1 && i0 < i1; ++j) {
-    std::fill_n(taken_.begin() + static_cast<std::ptrdiff_t>(j) * columns_ + i0, i1 - i0, char{1});
-  }
-}
-
-bool FreeFloor::free(double x, double z) const noexcept {
-  const int i = static_cast<int>(std::floor((x - inside_.x0) / kCell));
-  const int j = static_cast<int>(std::floor((z - inside_.z0) / kCell));
-  return i >= 0 && j >= 0 && i < columns_ && j < rows_ &&
-         taken_[static_cast<std::size_t>(j * columns_ + i)] == 0;
+  const int along_x = rows_along_x_ ? columns_ : rows_, along_z = rows_along_x_ ? rows_ : columns_;
+  const int x0 = low(rect.x0, inside_.x0), x1 = high(rect.x1, inside_.x0, along_x);
+  const int z0 = low(rect.z0, inside_.z0), z1 = high(rect.z1, inside_.z0, along_z);
+  const std::uint64_t taken = rows_along_x_ ? bits(x0, x1) : bits(z0, z1);
+  const int first = rows_along_x_ ? z0 : x0, last = rows_along_x_ ? z1 : x1;
+  for (int j = first; j < last; ++j) free_[static_cast<std::size_t>(j)] &= ~taken;
 }
 
 bool FreeFloor::in_one_piece() {
-  const auto first = std::find(taken_.begin(), taken_.end(), char{0});
-  if (first == taken_.end()) return false;
-  const auto width = static_cast<std::size_t>(columns_);
-  // Cells at the walls are taken, so that no step leaves the room.
-  reached_ = taken_;
-  queue_.assign(1, static_cast<std::size_t>(first - taken_.begin()));
-  reached_[queue_.front()] = 1;
-  while (!queue_.empty()) {
-    const std::size_t at = queue_.back();
-    queue_.pop_back();
-    for (const std::size_t next : {at - 1, at + 1, at - width, at + width}) {
-      if (reached_[next] != 0) continue;
-      reached_[next] = 1;
-      queue_.push_back(next);
+  const auto first =
+      std::find_if(free_.begin(), free_.end(), [](std::uint64_t row) { return row != 0; });
+  if (first == free_.end()) return false;
+  reached_.assign(free_.size(), 0);
+  reached_[static_cast<std::size_t>(first - free_.begin())] = runs_of(*first & (0 - *first), *first);
+  const std::size_t n = free_.size();
+  for (bool grows = true; grows;) {
+    grows = false;
+    for (std::size_t k = 0; k < 2 * n; ++k) {  // down and up again
+      const std::size_t j = k < n ? k : 2 * n - 1 - k;
+      const std::uint64_t beside = (j > 0 ? reached_[j - 1] : 0) | (j + 1 < n ? reached_[j + 1] : 0);
+      const std::uint64_t now = runs_of(reached_[j] | beside, free_[j]);
+      grows = grows || now != reached_[j];
+      reached_[j] = now;
     }
   }
-  return std::find(reached_.begin(), reached_.end(), char{0}) == reached_.end();
+  return reached_ == free_;
 }
 
 }  // namespace gsnav::plan

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
-#include <utility>
+#include <cstdint>
 #include <vector>
 
 #include "gsnav/detail/demo/floor_plan.hpp"
@@ -20,15 +19,15 @@ inline bool contains(const FloorRect& outer, const FloorRect& inner) noexcept {
 
 /// The floor of one room, where a disc can stand: cells of 0.1 m, taken where any part of them is too
 /// near to a wall or a piece of furniture. Neighbouring free cells are joined, and so are all points in
-/// them for the disc.
+/// them for the disc. The shorter side of the room is at most kMostShortSide.
 class FreeFloor {
  public:
+  static constexpr double kMostShortSide = 6.4;  // metres: 64 cells, bits of a row
+
   FreeFloor(const FloorRect& inside, double clearance);
 
   /// Takes the floor about a rectangle.
   void take(const FloorRect& rect);
-  /// Whether the cell at a point is free.
-  bool free(double x, double z) const noexcept;
   /// Whether all free cells are joined, and there is one.
   bool in_one_piece();
 
@@ -36,10 +35,10 @@ class FreeFloor {
   static constexpr double kCell = 0.1;
   FloorRect inside_;
   double clearance_;
+  bool rows_along_x_;
   int columns_, rows_;
-  std::vector<char> taken_;         // [rows_][columns_]
-  std::vector<char> reached_;       // scratch, the same
-  std::vector<std::size_t> queue_;  // scratch
+  std::vector<std::uint64_t> free_;     // [rows_], a bit for each column
+  std::vector<std::uint64_t> reached_;  // scratch, the same
 };
 
 }  // namespace gsnav::plan

@@ -3,6 +3,7 @@
 #include "plan_furniture.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "plan_floor.hpp"
@@ -15,6 +16,7 @@ constexpr double kGap = 0.03;            // between pieces of different groups
 constexpr double kAtWall = 0.02;         // from the wall
 constexpr double kBehindCurtain = 0.14;  // where curtains hang behind
 constexpr double kCurtainDepth = 0.12;
+constexpr double kNarrow = 0.1;  // radius of a disc for which no part of the floor is cut off either
 
 /// A frame that is turned by quarters, moved to x, z.
 struct Frame {
@@ -71,7 +73,11 @@ FloorRect strip(const FloorRect& in, WallSide side, double from, double to, doub
 class Furnisher {
  public:
   Furnisher(FloorPlan& plan, std::size_t room, double clearance, Rng& rng)
-      : plan_(plan), room_(room), in_(plan.rooms[room].inside), rng_(rng), floor_(in_, clearance) {
+      : plan_(plan),
+        room_(room),
+        in_(plan.rooms[room].inside),
+        rng_(rng),
+        floors_{FreeFloor(in_, clearance), FreeFloor(in_, kNarrow)} {
     for (const PlannedDoor& d : plan.doors) {
       for (std::size_t k = 0; k < 2; ++k) {
         if (d.rooms[k] != room) continue;
@@ -87,21 +93,22 @@ class Furnisher {
       curtains_ = true;
       for (const double a : {w.from - reach, w.to - kCurtainOverlap}) {
         taken_.push_back(strip(in_, w.side, a, a + kCurtainWidth, kCurtainDepth));
-        floor_.take(taken_.back());
+        for (FreeFloor& f : floors_) f.take(taken_.back());
       }
     }
   }
 
-  /// Places the first of the groups that fits, if one does.
-  void place_one_of(const std::vector<Group>& groups) {
+  /// Places the first of the groups that fits. False where none does.
+  bool place_one_of(const std::vector<Group>& groups) {
     for (const Group& g : groups) {
       std::vector<Place> places = g.at_wall ? wall_places(g) : floor_places(g);
       std::stable_sort(places.begin(), places.end(),
                        [](const Place& a, const Place& b) { return a.score > b.score; });
       for (const Place& p : places) {
-        if (place(g, p.frame)) return;
+        if (place(g, p.frame)) return true;
       }
     }
+    return false;
   }
 
  private:
@@ -168,15 +175,15 @@ class Furnisher {
       if (p.kind == FurnitureKind::rug) continue;
       if (meets(r, before_doors_, 0) || (g.tall && meets(r, before_windows_, 0))) return false;
     }
-    FreeFloor floor = floor_;
+    std::array<FreeFloor, 2> floors = floors_;
     std::vector<FloorRect> takes;
     for (const Group::Piece& p : g.pieces) {
       if (p.kind == FurnitureKind::rug) continue;
       takes.push_back(frame.at(moved(footprint_of(p), p.x, p.z)));
-      floor.take(takes.back());
+      for (FreeFloor& f : floors) f.take(takes.back());
     }
-    if (!floor.in_one_piece()) return false;
-    floor_ = std::move(floor);
+    if (!floors[0].in_one_piece() || !floors[1].in_one_piece()) return false;
+    floors_ = std::move(floors);
     taken_.insert(taken_.end(), takes.begin(), takes.end());
     add(g, frame);
     return true;
@@ -207,20 +214,24 @@ class Furnisher {
   std::size_t room_;
   FloorRect in_;
   Rng& rng_;
-  FreeFloor floor_;
+  std::array<FreeFloor, 2> floors_;
   bool curtains_ = false;
   std::vector<FloorRect> taken_, before_doors_, before_windows_;
 };
 
 }  // namespace
 
-void furnish(FloorPlan& plan, double clearance, Rng& rng) {
+bool furnish(FloorPlan& plan, double clearance, Rng& rng) {
+  bool all = true;
   for (std::size_t r = 0; r < plan.rooms.size(); ++r) {
     Furnisher furnisher(plan, r, clearance, rng);
-    for (const std::vector<Group>& want : furniture_for(plan.rooms[r], plan.rooms.size() == 1, rng)) {
-      furnisher.place_one_of(want);
+    const auto wants = furniture_for(plan.rooms[r], plan.rooms.size() == 1, rng);
+    for (const std::vector<Group>& want : wants) {
+      const bool placed = furnisher.place_one_of(want);
+      all = all && (placed || &want != wants.data());
     }
   }
+  return all;
 }
 
 }  // namespace gsnav::plan

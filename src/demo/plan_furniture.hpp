@@ -32,7 +32,8 @@ std::vector<std::vector<Group>> furniture_for(const PlannedRoom& room, bool only
 FloorRect footprint_of(const Group::Piece& piece) noexcept;
 
 /// Puts furniture into all rooms of a plan that has its doors and windows. The floor stays in one piece
-/// for a disc of radius `clearance`, and the floor before doors free.
-void furnish(FloorPlan& plan, double clearance, Rng& rng);
+/// for a disc of radius `clearance`, and the floor before doors free. False where a room did not get
+/// what it should have most of all.
+bool furnish(FloorPlan& plan, double clearance, Rng& rng);
 
 }  // namespace gsnav::plan

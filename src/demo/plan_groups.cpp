@@ -95,6 +95,9 @@ std::vector<std::vector<Group>> furniture_for(const PlannedRoom& room, bool only
       break;
     case RoomKind::bedroom:
       out.push_back({bed(2, rng.uniform() < 0.6), bed(2, false), bed(1, false), bed(0, false)});
+      // Rather before a window than none.
+      out.back().push_back(bed(1, false));
+      out.back().back().tall = false;
       want(1.0, by_size(K::wardrobe, {2.2, 1.65, 1.1}, 0.6));
       want(0.4, {desk()});
       want(0.6, by_size(K::sideboard, {1.2, 0.9}, 0));

@@ -113,8 +113,8 @@ Status run(const HumanoidCommand& c) {
   options.gaussians = c.gaussians;
   const auto person = gsnav::try_make_humanoid(options);
   if (!person) return person.status();
-  const Status s = avatar ? gsnav::io::save_avatar(c.out, *person)
-                          : gsnav::io::save_scene(c.out, person->cloud);
+  const Status s =
+      avatar ? gsnav::io::save_avatar(c.out, *person) : gsnav::io::save_scene(c.out, person->cloud);
   if (!s) return s;
   std::printf("%s: %zu Gaussians", gsnav::printable(c.out).c_str(), person->size());
   if (avatar) {

@@ -10,7 +10,8 @@ namespace gsnav_scene {
 namespace {
 
 const char kDescription[] =
-    "Makes scenes and people by code alone, to run benchmarks, examples and tests on. Lengths in metres, "
+    "Makes scenes and people by code alone, to run benchmarks, examples and tests on. Lengths in "
+    "metres, "
     "Y up, floors at y = 0. The same options give the same files. Exit status: 0, 1 with one line that "
     "says what is wrong, 2 for options that cannot be used.";
 
@@ -45,8 +46,8 @@ CLI::Option* add_gaussians(CLI::App& app, SceneCommand& c, const char* what) {
 }
 
 CLI::App* add_flat(CLI::App& app, SceneCommand& c) {
-  CLI::App* flat = app.add_subcommand(
-      "flat", "The benchmark flat: four furnished rooms, in any number of Gaussians");
+  CLI::App* flat =
+      app.add_subcommand("flat", "The benchmark flat: four furnished rooms, in any number of Gaussians");
   c.sampling.gaussians = 1'000'000;
   add_scene_file(*flat, c);
   add_gaussians(*flat, c, "Exactly so many")->capture_default_str();
@@ -81,9 +82,10 @@ CLI::App* add_rooms(CLI::App& app, SceneCommand& c) {
 CLI::App* add_default(CLI::App& app, SceneCommand& c) {
   CLI::App* flat = app.add_subcommand(
       "default", "The flat that is used where no scene is given, as it is embedded in the library");
-  flat->add_option("--out", c.out.scene,
-                   "Folder for flat.ply, flat.obj and cameras.json, made where it does not exist; or the "
-                   "scene alone, by its extension")
+  flat->add_option(
+          "--out", c.out.scene,
+          "Folder for flat.ply, flat.obj and cameras.json, made where it does not exist; or the "
+          "scene alone, by its extension")
       ->required();
   add_outputs(*flat, c);
   return flat;
@@ -97,8 +99,9 @@ CLI::App* add_humanoid(CLI::App& app, HumanoidCommand& c) {
                    "Avatar to write (.npz, Habitat-GS's keys); a scene's extension gives its Gaussians "
                    "alone, as it stands")
       ->required();
-  person->add_option("--seed", c.seed,
-                     "Another height, build, hair and clothes for each; 0: the person of the demo")
+  person
+      ->add_option("--seed", c.seed,
+                   "Another height, build, hair and clothes for each; 0: the person of the demo")
       ->capture_default_str();
   person->add_option("--gaussians", c.gaussians, "About so many")
       ->check(CLI::Range(2000, 400000))
