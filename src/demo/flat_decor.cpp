@@ -222,12 +222,13 @@ void pendant(Painter& p, double drop, double power) {
 
 void picture(Painter& p, double x, double y, double w, double h, int seed) {
   const unsigned frame = seed % 2 == 0 ? 0x2e2a26 : 0xb98d5a;
-  p.box({x - w / 2 - 0.03, y - h / 2 - 0.03, 0}, {x + w / 2 + 0.03, y + h / 2 + 0.03, 0.022},
+  p.box({x - w / 2 - 0.03, y - h / 2 - 0.03, 0}, {x + w / 2 + 0.03, y + h / 2 + 0.03, 0.022 * p.relief},
         plain(srgb(frame)), 0.016, Painter::kAll & ~unsigned{Painter::kZn}, false);
   p.cover({x - w / 2 - 0.03, y - h / 2 - 0.03, -0.002}, {x + w / 2 + 0.03, y + h / 2 + 0.03, 0.002});
-  p.cover({x - w / 2 + 0.01, y - h / 2 + 0.01, 0.002}, {x + w / 2 - 0.01, y + h / 2 - 0.01, 0.024});
+  p.cover({x - w / 2 + 0.01, y - h / 2 + 0.01, 0.002},
+          {x + w / 2 - 0.01, y + h / 2 - 0.01, 0.024 * p.relief});
   p.rect(
-      {x - w / 2, y - h / 2, 0.028}, {w, 0, 0}, {0, h, 0},
+      {x - w / 2, y - h / 2, 0.028 * p.relief}, {w, 0, 0}, {0, h, 0},
       [=](double s, double t) {
         const double mat = 0.09;
         if (std::min({s * w, (1 - s) * w, t * h, (1 - t) * h}) < mat * std::min(w, h))

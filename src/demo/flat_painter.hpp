@@ -61,6 +61,10 @@ class Painter {
  public:
   Painter();
 
+  /// Depth of trims and picture frames against the embedded flat's. Deeper ones hide the wall behind
+  /// them from more directions: Gaussians are drawn in the order of their centres.
+  double relief = 1.0;
+
   Room& add_room(const Box& inside, const Vec3d& bounce);
   Room& room() { return rooms_.back(); }
   /// Local frame of what follows: turned by `yaw` (radians about +Y), then moved.

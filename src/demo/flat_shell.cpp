@@ -44,15 +44,15 @@ void window(Painter& p, double x0, double x1, double y0, double y1) {
   frame(x0, y1 - bar, x1, y1);
   frame((x0 + x1 - bar) / 2, y0, (x0 + x1 + bar) / 2, y1);
   frame(x0, y0 + 0.62 * h - 0.02, x1, y0 + 0.62 * h + 0.02);
-  const double c = 0.07;
+  const double c = 0.07, thick = 0.018 * p.relief;
   for (const double x : {x0 - c, x1}) {
-    p.box({x, y0 - 0.04, 0}, {x + c, y1 + c, 0.018}, trim, {0.03, 0.035}, Painter::kAll, false);
+    p.box({x, y0 - 0.04, 0}, {x + c, y1 + c, thick}, trim, {0.03, 0.035}, Painter::kAll, false);
   }
-  p.box({x0, y1, 0}, {x1, y1 + c, 0.018}, trim, {0.035, 0.03}, Painter::kAll, false);
+  p.box({x0, y1, 0}, {x1, y1 + c, thick}, trim, {0.035, 0.03}, Painter::kAll, false);
 }
 
 void casing(Painter& p, double x0, double x1, double top) {
-  const double c = 0.08, thick = 0.02;
+  const double c = 0.08, thick = 0.02 * p.relief;
   const Field trim = plain(kTrim);
   p.box({x0 - c, 0, 0}, {x0, top + c, thick}, trim, {0.03, 0.04}, Painter::kAll, false);
   p.box({x1, 0, 0}, {x1 + c, top + c, thick}, trim, {0.03, 0.04}, Painter::kAll, false);

@@ -16,7 +16,8 @@ constexpr double kGap = 0.03;            // between pieces of different groups
 constexpr double kAtWall = 0.02;         // from the wall
 constexpr double kBehindCurtain = 0.14;  // where curtains hang behind
 constexpr double kCurtainDepth = 0.12;
-constexpr double kNarrow = 0.1;  // radius of a disc for which no part of the floor is cut off either
+// Radii of discs for which no part of the floor is cut off either.
+constexpr double kSlim = 0.2, kSlimmest = 0.1;
 
 /// A frame that is turned by quarters, moved to x, z.
 struct Frame {
@@ -77,7 +78,7 @@ class Furnisher {
         room_(room),
         in_(plan.rooms[room].inside),
         rng_(rng),
-        floors_{FreeFloor(in_, clearance), FreeFloor(in_, kNarrow)} {
+        floors_{FreeFloor(in_, clearance), FreeFloor(in_, kSlim), FreeFloor(in_, kSlimmest)} {
     for (const PlannedDoor& d : plan.doors) {
       for (std::size_t k = 0; k < 2; ++k) {
         if (d.rooms[k] != room) continue;
@@ -175,14 +176,15 @@ class Furnisher {
       if (p.kind == FurnitureKind::rug) continue;
       if (meets(r, before_doors_, 0) || (g.tall && meets(r, before_windows_, 0))) return false;
     }
-    std::array<FreeFloor, 2> floors = floors_;
+    std::array<FreeFloor, 3> floors = floors_;
     std::vector<FloorRect> takes;
     for (const Group::Piece& p : g.pieces) {
       if (p.kind == FurnitureKind::rug) continue;
       takes.push_back(frame.at(moved(footprint_of(p), p.x, p.z)));
       for (FreeFloor& f : floors) f.take(takes.back());
     }
-    if (!floors[0].in_one_piece() || !floors[1].in_one_piece()) return false;
+    if (!std::all_of(floors.begin(), floors.end(), [](FreeFloor& f) { return f.in_one_piece(); }))
+      return false;
     floors_ = std::move(floors);
     taken_.insert(taken_.end(), takes.begin(), takes.end());
     add(g, frame);
@@ -214,7 +216,7 @@ class Furnisher {
   std::size_t room_;
   FloorRect in_;
   Rng& rng_;
-  std::array<FreeFloor, 2> floors_;
+  std::array<FreeFloor, 3> floors_;
   bool curtains_ = false;
   std::vector<FloorRect> taken_, before_doors_, before_windows_;
 };

@@ -134,6 +134,7 @@ void furniture(Painter& p, const PlannedFurniture& f, const FloorRect& in, const
       table(p, f.width, f.length, 0.75, srgb(seed % 2 == 0 ? 0xb98a5a : 0x8f6239));
       vase(p, {-0.1, 0.75, 0.05});
       p.cone({0.22, 0.75, -0.1}, 0.07, 0.13, 0.06, plain(srgb(0xe8e0cf)), 0.018, false);
+      p.disc({0.22, 0.756, -0.1}, 0.075, plain(srgb(0xd8cfbd)), 0.018);
       break;
     case FurnitureKind::chair:
       chair(p, c.seat);
@@ -205,6 +206,7 @@ void room(Painter& p, const FloorPlan& plan, std::size_t index, Rng rng) {
 
 Result<DefaultScene> make_planned_scene(const FloorPlan& plan, const SceneSampling& sampling) {
   flat::Painter painter;
+  painter.relief = 1.8;
   Rng rng(plan.seed + 1);
   for (std::size_t r = 0; r < plan.rooms.size(); ++r) flat::room(painter, plan, r, Rng(rng.next()));
   return painter.finish(sampling);

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <string>
+#include <vector>
+
 #include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/detail/nav/gaussian_navmesh.hpp"
 
@@ -44,6 +48,62 @@ TEST_CASE("density changes the Gaussians, never the mesh") {
   CHECK(a.vertices == b.vertices);
   CHECK(make_default_scene(0.0).code() == Errc::invalid_argument);
   CHECK(make_default_scene(std::nan("")).code() == Errc::invalid_argument);
+}
+
+namespace {
+
+/// Area of the cells that Gaussians stand for: they are 0.7 of a cell wide, one sigma.
+double covered_area(const GaussianCloud& c) {
+  double area = 0;
+  for (std::size_t i = 0; i < c.size(); ++i) area += double{c.scales[0][i]} * double{c.scales[1][i]};
+  return area / (0.7 * 0.7);
+}
+
+}  // namespace
+
+TEST_CASE("the flat has exactly as many Gaussians as asked for, which cover its surfaces") {
+  const double area = covered_area(make_default_scene(1.0).value().cloud);
+  SceneSampling sampling;
+  for (const std::size_t n : {10000, 54321, 200000, 700001}) {
+    CAPTURE(n);
+    sampling.gaussians = n;
+    const DefaultScene scene = make_default_scene(sampling).value();
+    CHECK(scene.cloud.size() == n);
+    // Small numbers cut cones and spheres into few pieces.
+    CHECK(covered_area(scene.cloud) == doctest::Approx(area).epsilon(n < 20000 ? 0.10 : 0.02));
+  }
+}
+
+TEST_CASE("the flat is the same on any number of threads, and says how far it is") {
+  SceneSampling sampling;
+  sampling.gaussians = 60001;
+  sampling.threads = 1;
+  const DefaultScene a = make_default_scene(sampling).value();
+  sampling.threads = 5;
+  std::vector<double> shares;
+  sampling.progress = [&](double share) { shares.push_back(share); };
+  const DefaultScene b = make_default_scene(sampling).value();
+  CHECK(a.cloud.means == b.cloud.means);
+  CHECK(a.cloud.scales == b.cloud.scales);
+  CHECK(a.cloud.sh0 == b.cloud.sh0);
+  CHECK(a.cloud.row_ids == b.cloud.row_ids);
+  REQUIRE_FALSE(shares.empty());
+  CHECK(std::is_sorted(shares.begin(), shares.end()));
+  CHECK(shares.back() == 1.0);
+}
+
+TEST_CASE("a number of Gaussians that cannot be is refused with the limit") {
+  SceneSampling sampling;
+  sampling.gaussians = 100;
+  const auto few = make_default_scene(sampling);
+  REQUIRE(few.code() == Errc::invalid_argument);
+  // The number that it names is enough.
+  const std::size_t at = few.message().find("at least ");
+  REQUIRE(at != std::string::npos);
+  sampling.gaussians = std::stoul(few.message().substr(at + 9));
+  CHECK(make_default_scene(sampling).value().cloud.size() == sampling.gaussians);
+  sampling.gaussians = kMostSceneGaussians + 1;
+  CHECK(make_default_scene(sampling).message().find("at most 50000000") != std::string::npos);
 }
 
 TEST_CASE("the flat's mesh gives one floor that joins all rooms") {
