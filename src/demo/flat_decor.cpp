@@ -60,7 +60,7 @@ void bookshelf(Painter& p, double width, double height, int seed) {
     books(p, -width / 2 + board + 0.01, -width / 2 + split, y + board, 0.06, d - 0.02, space,
           seed * 31 + i);
     const double left = -width / 2 + split + 0.10, right = width / 2 - board;
-    if (right - left < 0.10) continue;
+    if (right - left < 0.15) continue;
     const double x = (left + right) / 2;
     switch (i % 3) {
       case 0:

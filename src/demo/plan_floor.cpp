@@ -68,6 +68,7 @@ bool FreeFloor::in_one_piece() {
     grows = false;
     for (std::size_t k = 0; k < 2 * n; ++k) {  // down and up again
       const std::size_t j = k < n ? k : 2 * n - 1 - k;
+      if (reached_[j] == free_[j]) continue;
       const std::uint64_t beside = (j > 0 ? reached_[j - 1] : 0) | (j + 1 < n ? reached_[j + 1] : 0);
       const std::uint64_t now = runs_of(reached_[j] | beside, free_[j]);
       grows = grows || now != reached_[j];

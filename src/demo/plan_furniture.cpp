@@ -16,7 +16,7 @@ constexpr double kGap = 0.03;            // between pieces of different groups
 constexpr double kAtWall = 0.02;         // from the wall
 constexpr double kBehindCurtain = 0.14;  // where curtains hang behind
 constexpr double kCurtainDepth = 0.12;
-// Radii of discs for which no part of the floor is cut off either.
+// Radii of other discs for which no part of the floor that FreeFloor sees is cut off.
 constexpr double kSlim = 0.2, kSlimmest = 0.1;
 
 /// A frame that is turned by quarters, moved to x, z.

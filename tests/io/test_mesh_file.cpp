@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <array>
+#include <cmath>
 #include <string>
+#include <vector>
 
 #include "check_refused.hpp"
 #include "gsnav/detail/io/mesh_file.hpp"
@@ -61,6 +64,33 @@ TEST_CASE("obj: errors name line and word") {
   check_fails("v 1 1e999 3\n", "line 1: coordinate y is '1e999'");
   check_fails("v 1,5 2 3\n", "line 1: coordinate x is '1,5'");
   CHECK(io::load_obj("/none/a.obj").code() == Errc::file_not_found);
+}
+
+TEST_CASE("obj: what is written comes back as the nearest float32") {
+  const TempFolder folder("obj");
+  const std::vector<Vec3d> vertices{{0.1, -2.5e-7, 1e20}, {1.0 / 3, 123456.789, -0.0}, {3, 4, 5}};
+  const std::vector<std::array<std::uint32_t, 3>> triangles{{0, 1, 2}, {2, 1, 0}};
+  REQUIRE(io::save_obj(folder / "a.obj", vertices, triangles).ok());
+  const TriangleMesh read = io::load_obj(folder / "a.obj").value();
+  REQUIRE(read.vertices.size() == 3);
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) CHECK(read.vertices[i][k] == static_cast<float>(vertices[i][k]));
+  }
+  CHECK(read.triangles == triangles);
+}
+
+TEST_CASE("obj: what cannot be written is named and the file of before stays") {
+  const TempFolder folder("obj");
+  const std::vector<Vec3d> good{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, bad{{0, 0, 0}, {0, std::nan(""), 0}};
+  const std::vector<std::array<std::uint32_t, 3>> one{{0, 1, 2}}, outside{{0, 1, 2}, {0, 1, 3}};
+  REQUIRE(io::save_obj(folder / "a.obj", good, one).ok());
+  const std::string before = read_file((folder / "a.obj").string());
+  CHECK(io::save_obj(folder / "a.obj", bad, {}).message().find("vertex 1 is not finite") !=
+        std::string::npos);
+  CHECK(io::save_obj(folder / "a.obj", good, outside).message().find("triangle 1 names a vertex") !=
+        std::string::npos);
+  CHECK(read_file((folder / "a.obj").string()) == before);
+  CHECK(io::save_obj(folder / "none" / "a.obj", good, one).code() == Errc::file_not_found);
 }
 
 TEST_CASE("obj: a real mesh") {

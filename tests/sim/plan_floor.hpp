@@ -77,20 +77,23 @@ class Floor {
   /// f(cell) for each whose centre lies in the rectangle.
   template <class F>
   void each(const FloorRect& r, const F& f) const {
-    const auto first = [](double v) { return std::max(static_cast<int>(std::ceil(v / kCell + 0.5)), 0); };
+    const auto first = [](double v) {
+      return std::max(static_cast<int>(std::ceil(v / kCell + 0.5)), 0);
+    };
     const auto end = [](double v, int n) {
       return std::min(static_cast<int>(std::floor(v / kCell + 0.5)) + 1, n);
     };
     for (int j = first(r.z0); j < end(r.z1, rows_); ++j) {
-      for (int i = first(r.x0); i < end(r.x1, columns_); ++i) f(static_cast<std::size_t>(j * columns_ + i));
+      for (int i = first(r.x0); i < end(r.x1, columns_); ++i)
+        f(static_cast<std::size_t>(j * columns_ + i));
     }
   }
   void paint(const FloorRect& r, char value) {
     each(r, [&](std::size_t at) { free_[at] = value; });
   }
-  /// Takes what is nearer than the disc's radius, and a cell's half diagonal, to a solid cell's centre.
+  /// Takes what is nearer to a solid cell than the disc's radius.
   void erode() {
-    constexpr double kRadius = 0.2 + 0.5 * 1.4143 * kCell;
+    constexpr double kRadius = 0.2 + 0.5 * kCell;
     constexpr int kReach = static_cast<int>(kRadius / kCell);
     const std::vector<char> floor = free_;
     for (int j = 0; j < rows_; ++j) {

@@ -49,7 +49,8 @@ std::string shell_fault(const FloorPlan& plan, int rooms) {
     const bool outer[] = {in.x0 == o.x0, in.x1 == o.x1, in.z0 == o.z0, in.z1 == o.z1};
     if (!outer[static_cast<int>(w.side)]) return "window in an inner wall";
     const bool along_x = w.side == WallSide::z_low || w.side == WallSide::z_high;
-    if (w.from < (along_x ? in.x0 : in.z0) || w.to > (along_x ? in.x1 : in.z1)) return "window in a corner";
+    if (w.from < (along_x ? in.x0 : in.z0) || w.to > (along_x ? in.x1 : in.z1))
+      return "window in a corner";
     if (w.to - w.from < 0.8 || w.top - w.bottom < 1 || w.top > 2.7) return "small window";
   }
   return {};
@@ -76,7 +77,7 @@ std::string floor_fault(const FloorPlan& plan) {
   for (const PlannedRoom& r : plan.rooms) {
     const auto [free, reached] = floor.cells(r.inside);
     if (free * Floor::kCell * Floor::kCell < 1.0) return "a room without floor";
-    if (reached < 0.95 * free) return "a room that is not reached";
+    if (reached < 0.8 * free) return "a room that is not reached";
   }
   for (const PlannedDoor& d : plan.doors) {
     if (floor.cells(d.floor()).second == 0) return "a door that is not reached";
@@ -100,7 +101,8 @@ TEST_CASE("floor plans of 10,000 seeds: rooms as asked, wide doors, furniture ap
   pool.parallel_for(plans, [&](std::size_t seed) {
     const int rooms = 1 + static_cast<int>(seed % kMostRooms);
     const FloorPlan plan = plan_of(seed, rooms);
-    for (const std::string& fault : {shell_fault(plan, rooms), furniture_fault(plan), floor_fault(plan)}) {
+    for (const std::string& fault :
+         {shell_fault(plan, rooms), furniture_fault(plan), floor_fault(plan)}) {
       if (faults[seed].empty()) faults[seed] = fault;
     }
   });
@@ -213,10 +215,11 @@ TEST_CASE("floor plans: one island of the NavMesh covers all rooms") {
       CHECK(mesh.geodesic_distance(first, p) < 60.0);
       cells += floor.cells(r.inside).second;
     }
-    // About the floor that the disc reaches in the plan; its cells are rounded, and doors come on top.
+    // About the floor that the disc reaches in the plan. The builder rounds the radius up to voxels;
+    // doorways come on top.
     const double area = cells * Floor::kCell * Floor::kCell;
-    CHECK(mesh.island_area(0) > area);
-    CHECK(mesh.island_area(0) < 1.35 * area);
+    CHECK(mesh.island_area(0) > 0.8 * area);
+    CHECK(mesh.island_area(0) < 1.1 * area);
   }
 }
 

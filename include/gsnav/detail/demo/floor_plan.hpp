@@ -27,8 +27,8 @@ inline constexpr int kMostRooms = 12;
 struct FloorPlanOptions {
   std::uint64_t seed = 1;
   int rooms = 4;  ///< [1, kMostRooms]
-  /// Metres, [0.1, 0.35]. Furniture leaves the floor in one piece for a disc of this radius, which also
-  /// fits through every door.
+  /// Metres, [0.1, 0.35]. A disc of this radius fits through every door and reaches the floor of every
+  /// room between the furniture; only corners that are narrower for it are cut off.
   double clearance = 0.3;
 };
 
