@@ -26,8 +26,8 @@ set(CPACK_PACKAGE_DESCRIPTION
     "Renders scenes of 3D Gaussians, animates Gaussian avatars and steps agents on\n\
 navigation meshes among them${_gpu}. This package has the\n\
 programs gsnav-render, gsnav-convert, gsnav-navmesh, gsnav-avatar, gsnav-eval,\n\
-gsnav-replay and gsnav-viewer, the static libraries, the headers, the CMake package\n\
-(find_package(gsnav)) and pkg-config files.")
+gsnav-replay, gsnav-scene and gsnav-viewer, the static libraries, the headers,\n\
+the CMake package (find_package(gsnav)) and pkg-config files.")
 set(CPACK_RESOURCE_FILE_LICENSE "${PROJECT_SOURCE_DIR}/LICENSE")
 set(CPACK_VERBATIM_VARIABLES ON)
 set(CPACK_STRIP_FILES ON)

@@ -33,7 +33,7 @@ apt() { inside apt-get -qq -o Dpkg::Use-Pty=0 "$@" > "$work/apt.log" 2>&1 || { t
 step() { echo "== $* ($SECONDS s)"; }
 programs() {  # of the prefix $1: each says what it is, and one plays an episode
   local program
-  for program in render convert navmesh avatar eval replay viewer; do
+  for program in render convert navmesh avatar eval replay scene viewer; do
     inside "$1/bin/gsnav-$program" --help > "$work/help.txt"
     grep -q -- "--help" "$work/help.txt" || { echo "FAILED: gsnav-$program --help"; cat "$work/help.txt"; exit 1; }
     if grep -q -- "--version" "$work/help.txt"; then

@@ -137,10 +137,10 @@ TEST_CASE("scene: outputs that cannot be written are named before work, and noth
 TEST_CASE("scene: options that cannot be used exit with 2, help and version with 0") {
   const TempFolder folder("scene");
   for (const char* arguments :
-       {"", "castle --out a.ply", "flat", "flat --out a.ply --gaussians 10", "flat --out a.ply --views 0",
-        "flat --out a.ply --gaussians 99999999999", "flat --out a.ply --gaussians -5",
-        "rooms --out a.ply --rooms 13", "rooms --out a.ply --gaussians 20000 --density 1",
-        "humanoid --gaussians 1 --out a.npz"}) {
+       {"", "castle --out a.ply", "flat", "flat --out a.ply --gaussians 10",
+        "flat --out a.ply --views 0", "flat --out a.ply --gaussians 99999999999",
+        "flat --out a.ply --gaussians -5", "rooms --out a.ply --rooms 13",
+        "rooms --out a.ply --gaussians 20000 --density 1", "humanoid --gaussians 1 --out a.npz"}) {
     CAPTURE(arguments);
     CHECK(exits_with(folder, arguments, 2));
   }

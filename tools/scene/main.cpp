@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // gsnav-scene: scenes and people that are made by code alone.
-#include <unistd.h>
-
-#include <chrono>
 #include <cstdio>
-#include <filesystem>
-#include <functional>
+#include <string>
 
+#include "../common/parse_options.hpp"
+#include "../common/progress.hpp"
 #include "gsnav/core/lower_case.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/core/replace_file.hpp"
@@ -19,31 +17,6 @@ namespace {
 using gsnav::Errc;
 using gsnav::Result;
 using gsnav::Status;
-
-/// Prints on stderr what the program is at, from its third second on.
-class Progress {
- public:
-  void at(double share) {
-    const bool terminal = isatty(fileno(stderr)) != 0;
-    if (early() || (seconds(shown_) < (terminal ? 0.2 : 10.0) && share < 1)) return;
-    shown_ = Clock::now();
-    std::fprintf(stderr, "%sGaussians: %3.0f %%%s", terminal ? "\r" : "", 100 * share,
-                 terminal && share < 1 ? "" : "\n");
-    std::fflush(stderr);
-  }
-  void writing(const std::string& path) const {
-    if (!early()) std::fprintf(stderr, "writing %s\n", gsnav::printable(path).c_str());
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  static double seconds(Clock::time_point since) {
-    return std::chrono::duration<double>(Clock::now() - since).count();
-  }
-  bool early() const { return seconds(begin_) < 2; }
-
-  Clock::time_point begin_ = Clock::now(), shown_{};
-};
 
 /// Whether the files of a scene can be written, asked before it is made.
 Status outputs_status(const Outputs& o) {
@@ -81,13 +54,12 @@ Result<gsnav::DefaultScene> make(const SceneCommand& c, const gsnav::SceneSampli
 }
 
 Status run(const SceneCommand& c) {
-  Progress progress;
   if (Status s = outputs_status(c.out); !s) return s;
   gsnav::SceneSampling sampling = c.sampling;
-  sampling.progress = [&](double share) { progress.at(share); };
+  const auto print = gsnav_tools::progress_printer();
+  sampling.progress = [&](double share) { print("Gaussians", share); };
   const auto scene = make(c, sampling);
   if (!scene) return scene.status();
-  progress.writing(c.out.scene);
   if (Status s = gsnav::io::save_scene(c.out.scene, scene->cloud); !s) return s;
   std::printf("%s: %zu Gaussians\n", gsnav::printable(c.out.scene).c_str(), scene->cloud.size());
   if (!c.out.mesh.empty()) {
@@ -134,6 +106,5 @@ int main(int argc, char** argv) {
   const gsnav::Status s =
       options->scene ? gsnav_scene::run(*options->scene) : gsnav_scene::run(*options->humanoid);
   if (s.ok()) return 0;
-  std::fprintf(stderr, "gsnav-scene: %s\n", gsnav::printable(s.message()).c_str());
-  return 1;
+  return gsnav_tools::fail("gsnav-scene", s.message());
 }

@@ -20,7 +20,7 @@ vcpkg_cmake_install()
 vcpkg_cmake_config_fixup(CONFIG_PATH lib/cmake/gsnav)
 if("tools" IN_LIST FEATURES)
   vcpkg_copy_tools(AUTO_CLEAN TOOL_NAMES gsnav-render gsnav-convert gsnav-navmesh gsnav-avatar gsnav-eval gsnav-replay
-                   gsnav-viewer)
+                   gsnav-scene gsnav-viewer)
 endif()
 vcpkg_fixup_pkgconfig()
 file(REMOVE_RECURSE "${CURRENT_PACKAGES_DIR}/debug/include" "${CURRENT_PACKAGES_DIR}/debug/share")
