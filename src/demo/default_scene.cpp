@@ -9,7 +9,6 @@ namespace gsnav {
 namespace flat {
 namespace {
 
-constexpr double kQuarter = 1.5707963267948966;
 constexpr double kWest = 0.0, kEast = 10.0, kSouth = 0.0, kNorth = 8.0;  // z grows to the north
 constexpr double kKitchen = 6.0, kStudy = 4.6, kMiddle = 4.6;            // centres of the inner walls
 constexpr double kHalf = kWallThickness / 2;

@@ -11,6 +11,7 @@ namespace gsnav::flat {
 
 inline constexpr double kCeiling = 2.7;
 inline constexpr double kWallThickness = 0.12;
+inline constexpr double kQuarter = 1.5707963267948966;  ///< of a turn, radians
 
 /// Which wall of a room, by where it lies.
 enum class Side { x_low, x_high, z_low, z_high };

@@ -14,8 +14,6 @@ namespace gsnav {
 namespace flat {
 namespace {
 
-constexpr double kQuarter = 1.5707963267948966;
-
 template <std::size_t N>
 Vec3d one_of(const unsigned (&colors)[N], Rng& rng) {
   return srgb(colors[rng.below(N)]);
