@@ -33,7 +33,7 @@ struct DefaultView {
 /// Eye-level viewpoints, one a room, the living room first.
 std::array<DefaultView, 4> default_scene_views() noexcept;
 
-/// Most Gaussians that SceneSampling::gaussians may ask for. They take 5 GB while they are made.
+/// Most Gaussians that SceneSampling::gaussians may ask for. They take 6 GB while they are made.
 inline constexpr std::size_t kMostSceneGaussians = 50'000'000;
 
 /// How finely the surfaces of a generated scene are covered with Gaussians. Gaussians are as wide as
