@@ -120,5 +120,6 @@ TEST_CASE("packed scene: bands of zeros that are read apart are let go as others
 TEST_CASE("packed cloud: keeps what its colours are") {
   GaussianCloud cloud;
   cloud.color_space = ColorSpace::linear;
-  CHECK(pack_cloud(std::move(cloud)).set().color_space == ColorSpace::linear);
+  const PackedCloud packed = pack_cloud(std::move(cloud));
+  CHECK(packed.set().color_space == ColorSpace::linear);
 }
