@@ -98,7 +98,8 @@ TEST_CASE("oracle: two layers, their depths and what is marked undecided") {
 
   const auto at_center = [&](const std::vector<RawGaussian>& g, const auto& mask,
                              const OracleConfig& c = {}) {
-    return int{mask(oracle({cloud_of(g).set()}, axis_camera(), c))[center]};
+    const GaussianCloud drawn = cloud_of(g);
+    return int{mask(oracle({drawn.set()}, axis_camera(), c))[center]};
   };
   const auto undecided = [](const OracleFrames& r) { return r.undecided; };
   const auto undecided_depth = [](const OracleFrames& r) { return r.undecided_depth; };
