@@ -171,7 +171,8 @@ TEST_CASE("cuda batch: a list of the chunks to draw is a cloud of those chunks")
     if (!std::binary_search(drawn.begin(), drawn.end(), c)) cloud.opacities[i] = 1e-4f;
   }
   const GaussianArrays<CudaBackend> faint(cuda, cloud);
-  const GaussianArrays<CudaBackend> other(cuda, random_cloud(32, {.count = 900}));
+  const GaussianCloud beside = random_cloud(32, {.count = 900});
+  const GaussianArrays<CudaBackend> other(cuda, beside);
   const std::vector<GaussianSet> sets{set, other.set()}, by_hand{faint.set(), other.set()};
   for (const int count : {3, many_cameras()}) {
     const std::vector<Camera> cameras = ring_of(count);

@@ -226,7 +226,8 @@ TEST_CASE(
 TEST_CASE("cuda batch: how many cameras a call can draw is told beforehand") {
   if (no_gpu("cuda batch capacity")) return;
   CudaBackend cuda;
-  const GaussianArrays<CudaBackend> arrays(cuda, random_cloud(5, {.count = 3000}));
+  const GaussianCloud scattered = random_cloud(5, {.count = 3000});
+  const GaussianArrays<CudaBackend> arrays(cuda, scattered);
   const std::vector<GaussianSet> sets{arrays.set()};
   CudaBatchRenderer renderer(cuda);
   CHECK(renderer.capacity(sets, {}) == 0);

@@ -94,7 +94,8 @@ TEST_CASE("cuda batch: meshes among the Gaussians have the bits they have one ca
 TEST_CASE("cuda batch: meshes alone, meshes that come and go, and rules that batches do not know") {
   if (no_gpu("cuda batches of meshes alone")) return;
   CudaBackend cuda;
-  const GaussianArrays<CudaBackend> arrays(cuda, random_cloud(6, {.count = 2000}));
+  const GaussianCloud scattered = random_cloud(6, {.count = 2000});
+  const GaussianArrays<CudaBackend> arrays(cuda, scattered);
   const Meshes meshes(cuda);
   const std::vector<Camera> cameras = ring(3, 97, 64);
   CudaBatchRenderer renderer(cuda);
@@ -133,7 +134,8 @@ TEST_CASE("cuda batch: meshes alone, meshes that come and go, and rules that bat
 TEST_CASE("cuda batch: counts of triangles stay on the device, and what does not fit is drawn again") {
   if (no_gpu("cuda batches of many triangles")) return;
   CudaBackend cuda;
-  const GaussianArrays<CudaBackend> arrays(cuda, random_cloud(7, {.count = 2000}));
+  const GaussianCloud scattered = random_cloud(7, {.count = 2000});
+  const GaussianArrays<CudaBackend> arrays(cuda, scattered);
   SurfaceMesh ball = sphere(0.4, 16, 10);
   ball.two_sided = true;  // nearly all of it is drawn: more than is guessed
   ball.geometry.vertices[70].x = std::numeric_limits<float>::quiet_NaN();
@@ -203,7 +205,8 @@ struct Gate {
 TEST_CASE("cuda batch: a steady call returns while the device is busy, with meshes and without") {
   if (no_gpu("cuda batches that wait for nothing")) return;
   CudaBackend cuda;
-  const GaussianArrays<CudaBackend> arrays(cuda, random_cloud(8, {.count = 3000}));
+  const GaussianCloud scattered = random_cloud(8, {.count = 3000});
+  const GaussianArrays<CudaBackend> arrays(cuda, scattered);
   const std::vector<GaussianSet> sets{arrays.set()};
   const Meshes meshes(cuda);
   constexpr std::size_t kPixels = 97 * 64;

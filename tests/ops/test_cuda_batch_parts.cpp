@@ -111,8 +111,9 @@ TEST_CASE("cuda batch: bounds of parts do not show") {
       random_cloud(64, {.count = 700, .sh_degree = 0, .center = {0, 0, 0}, .extent = 4});
   GaussianCloud only_chunks = b;
   only_chunks.part_bounds.clear();
-  const GaussianArrays<CudaBackend> on_a(cuda, a), on_b(cuda, b), on_c(cuda, c),
-      bare_a(cuda, without_bounds(a)), bare_b(cuda, without_bounds(b)), chunks_b(cuda, only_chunks);
+  const GaussianCloud plain_a = without_bounds(a), plain_b = without_bounds(b);
+  const GaussianArrays<CudaBackend> on_a(cuda, a), on_b(cuda, b), on_c(cuda, c), bare_a(cuda, plain_a),
+      bare_b(cuda, plain_b), chunks_b(cuda, only_chunks);
   // Every other chunk, the last in part one of them.
   std::vector<std::uint32_t> drawn;
   for (std::uint32_t i = 0; i < b.view().chunk_count(); ++i) {

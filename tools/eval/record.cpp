@@ -37,9 +37,9 @@ Json to_json(const Record& r) {
   throw gsnav::Error(Errc::invalid_file, field + " = " + shown + ": " + rule);
 }
 
-const Json& member(const Json& j, const std::string& inside, const char* name) {
+const Json& member(const Json& j, std::string_view inside, const char* name) {
   const auto at = j.find(name);
-  if (at == j.end()) throw gsnav::Error(Errc::invalid_file, inside + name + " is missing");
+  if (at == j.end()) throw gsnav::Error(Errc::invalid_file, std::string(inside) + name + " is missing");
   return *at;
 }
 
