@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "gaussian_floor.hpp"
+#include "gsnav/detail/core/guarded.hpp"
 #include "navmesh_stages.hpp"
 #include "triangle_heights.hpp"
 
@@ -244,19 +245,10 @@ Result<NavMesh> build_whole(const NavGround& ground, GaussianNavReport& report) 
                                 {Pruner{ground.options.min_island_area, report}, ground.height});
 }
 
-}  // namespace
-
-Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
-                                           std::span<const GaussianSet> sets,
-                                           const GaussianNavOptions& options) {
-  return build_navmesh(settings, sets, {}, {}, options);
-}
-
-Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
-                                           std::span<const GaussianSet> sets,
-                                           std::span<const Vec3d> vertices,
-                                           std::span<const NavMesh::Triangle> triangles,
-                                           const GaussianNavOptions& options) {
+Result<NavMeshFromGaussians> build(const NavMeshSettings& settings, std::span<const GaussianSet> sets,
+                                   std::span<const Vec3d> vertices,
+                                   std::span<const NavMesh::Triangle> triangles,
+                                   const GaussianNavOptions& options) {
   if (Status s = settings.validate(); !s.ok()) return s;
   if (Status s = validate(options); !s.ok()) return s;
   auto box = detail::check_triangles(vertices, triangles);
@@ -302,6 +294,22 @@ Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
   for (std::size_t i = 0; i < mesh->island_count(); ++i)
     report.island_areas.push_back(mesh->island_area(i));
   return NavMeshFromGaussians{std::move(*mesh), std::move(report)};
+}
+
+}  // namespace
+
+Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
+                                           std::span<const GaussianSet> sets,
+                                           const GaussianNavOptions& options) {
+  return build_navmesh(settings, sets, {}, {}, options);
+}
+
+Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
+                                           std::span<const GaussianSet> sets,
+                                           std::span<const Vec3d> vertices,
+                                           std::span<const NavMesh::Triangle> triangles,
+                                           const GaussianNavOptions& options) {
+  return detail::guarded([&] { return build(settings, sets, vertices, triangles, options); });
 }
 
 }  // namespace gsnav

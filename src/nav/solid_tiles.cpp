@@ -4,8 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
-#include <new>
+#include <string>
 
+#include "gsnav/detail/core/run_guarded.hpp"
 #include "solid_gaussians.hpp"
 
 namespace gsnav::detail::solids {
@@ -247,7 +248,6 @@ Status rasterise_tiles(VoxelGrid& g, std::span<const GaussianSet> sets, const Ga
   std::vector<TileRuns> tiles(lists.nx * lists.nz);
   std::mutex lock;
   std::size_t done = 0;
-  bool failed = false;
   const auto tile = [&](std::size_t t) {
     TileRuns& out = tiles[t];
     const std::size_t x0 = t % lists.nx * kTile, z0 = t / lists.nx * kTile;
@@ -287,20 +287,15 @@ Status rasterise_tiles(VoxelGrid& g, std::span<const GaussianSet> sets, const Ga
     }
     out.runs.shrink_to_fit();
   };
-  pool.run(static_cast<std::uint32_t>(tiles.size()), [&](std::uint32_t t) noexcept {
-    try {
-      tile(t);
-    } catch (const std::bad_alloc&) {
-      const std::lock_guard held(lock);
-      failed = true;
-    }
-    if (!o.progress) return;
+  const Status made = run_guarded(pool, static_cast<std::uint32_t>(tiles.size()), [&](std::uint32_t t) {
+    tile(t);
+    if (!o.progress) return Status();
     const std::lock_guard held(lock);
     ++done;
     o.progress("voxels", static_cast<double>(done) / static_cast<double>(tiles.size()));
+    return Status();
   });
-  if (failed)
-    return {Errc::out_of_memory, "NavMesh from Gaussians: not enough memory for the solid voxels"};
+  if (!made.ok()) return {made.code(), "NavMesh from Gaussians, solid voxels: " + made.message()};
   return join_tiles(g, lists, tiles);
 }
 

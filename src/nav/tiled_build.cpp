@@ -210,17 +210,18 @@ Result<NavMesh> build_in_tiles(const NavMeshSettings& settings, std::span<const 
         return Status();
       }
       auto made = build_tile(grid, lists, i - 1, vertices, triangles, origin, hooks);
-      if (made.ok()) tiles[i - 1] = std::move(*made);
-      return made.status();
+      if (!made.ok()) return made.status();
+      tiles[i - 1] = std::move(*made);
+      if (!hooks.progress) return Status();
+      const std::lock_guard held(lock);
+      hooks.progress(static_cast<double>(++done) / static_cast<double>(tiles.size()));
+      return Status();
     });
-    if (i == 0 || !hooks.progress) return;
-    const std::lock_guard held(lock);
-    hooks.progress(static_cast<double>(++done) / static_cast<double>(tiles.size()));
   };
   pool.run(static_cast<std::uint32_t>(tiles.size() + 1), piece);
   WalkableAreas areas;
   for (const Status& s : failed) {
-    if (s.code() == Errc::out_of_memory) return {s.code(), "NavMesh: not enough memory for the tiles"};
+    if (s.code() == Errc::out_of_memory) return {s.code(), "NavMesh, tiles: " + s.message()};
     if (!s.ok()) return s;
   }
   for (const TilePolygons& t : tiles) areas.add(t.areas);

@@ -560,6 +560,16 @@ TEST_CASE("gaussian navmesh: tiles, threads and a crop") {
     REQUIRE(u.y == v.y);
     REQUIRE(u.z == v.z);
   }
+  for (const std::string stage : {"voxels", "floors", "polygons"}) {
+    CAPTURE(stage);
+    o.progress = [&](const char* now, double) {
+      if (now == stage) throw Error(Errc::unsupported, "no more of " + stage);
+    };
+    const auto ended = build_navmesh(s, {&set, 1}, o);
+    REQUIRE(!ended.ok());
+    CHECK(ended.code() == Errc::unsupported);
+    CHECK(ended.message().find("no more of " + stage) != std::string::npos);
+  }
   // The second room alone.
   o = {};
   o.crop = Aabb<double>{{4.1, -1, -1}, {9, 4, 6}};

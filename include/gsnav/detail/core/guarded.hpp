@@ -2,6 +2,7 @@
 #pragma once
 
 #include <exception>
+#include <new>
 
 #include "gsnav/core/status.hpp"
 
@@ -17,6 +18,8 @@ auto guarded(const F& f) noexcept -> decltype(f()) {
     return f();
   } catch (const Error& e) {
     return Status(e.code(), e.what());
+  } catch (const std::bad_alloc&) {
+    return Status(Errc::out_of_memory, "not enough memory");
   } catch (const std::exception& e) {
     return Status(Errc::out_of_memory, e.what());
   }

@@ -33,7 +33,8 @@ struct GaussianNavOptions {
   std::optional<Aabb<double>> crop;  ///< build from what lies in this box only, metres in the world
   int threads = 0;  ///< threads to build with, 0: one per core. The mesh does not depend on it.
   /// Called now and then with the stage ("voxels", "floors", "polygons") and the share of it that is
-  /// done, 0 to 1. From any of the build's threads, one at a time.
+  /// done, 0 to 1. From any of the build's threads, one at a time. An exception that leaves it ends the
+  /// build with a Status: the code and message of a gsnav::Error, else out_of_memory and its what().
   std::function<void(const char* stage, double share)> progress;
 };
 
