@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cstddef>
+#include <iterator>
 #include <limits>
 #include <span>
 #include <string>
@@ -126,6 +127,7 @@ class BasicRenderer {
     FrameImages<S> images;
     const std::size_t pixels = out.width * out.height;
     for (std::size_t i = 0; i < kImageCount; ++i) {
+      static_assert(std::size(Frames<S>::kVectors) == kImageCount);
       std::vector<S>& values = out.*Frames<S>::kVectors[i];
       if (!values.empty())
         images.*kImages<S>[i].image = values.data() + c * pixels * kImages<S>[i].channels;

@@ -169,21 +169,20 @@ struct HardDepthPixel {
     const S a = alpha[pixel], z = mesh.depth[pixel], d = expected[pixel];
     const bool covered = has_mesh(z), dropped = !(a > S(0.01)), lost = dropped || (covered && d > z);
     const S t = lost ? S(1) : S(1) - a;
-    if (images.rgb != nullptr) {
-      const S* const k = mesh.color + 3 * pixel;
-      S* const c = images.rgb + 3 * pixel;
-      const Vec3<S> under = covered ? Vec3<S>{k[0], k[1], k[2]} : background;
-      for (int i = 0; i < 3; ++i) c[i] = fma(t, under[i], lost ? S(0) : c[i]);
-    }
-    const auto depth = [&](S* image, S own) GSNAV_INLINED {
-      if (image != nullptr) image[pixel] = lost ? (covered ? z : S(0)) : own;
-    };
-    // One depth is written for a pixel, whatever is asked for.
-    depth(images.median_depth, d);
-    depth(images.accumulated_depth, d);
-    depth(images.first_hit_depth, d);
-    depth(images.expected_depth, d);
-    if (images.alpha != nullptr) images.alpha[pixel] = covered ? S(1) : (lost ? S(0) : a);
+    for_each_image<DepthMode::any>(images, [&]<Output O>(S* image) GSNAV_INLINED {
+      if (image == nullptr) return;
+      if constexpr (O == kRgb) {
+        const S* const k = mesh.color + 3 * pixel;
+        S* const c = image + 3 * pixel;
+        const Vec3<S> under = covered ? Vec3<S>{k[0], k[1], k[2]} : background;
+        for (int i = 0; i < 3; ++i) c[i] = fma(t, under[i], lost ? S(0) : c[i]);
+      } else if constexpr (O == kAlpha) {
+        image[pixel] = covered ? S(1) : (lost ? S(0) : a);
+      } else {
+        // One depth is written for a pixel, whatever is asked for.
+        image[pixel] = lost ? (covered ? z : S(0)) : d;
+      }
+    });
   }
 };
 

@@ -7,8 +7,15 @@
 
 #include "gsnav/math/functions.hpp"
 
-// The images of a frame. A new one is a bit of Output, a pointer in FrameImages, a row of kImages, its
-// value in pixel_value (detail/frame/blend.hpp) and a vector in Frames (render/frames.hpp).
+// The images of a frame. A new one is
+// - here: a bit of Output, a pointer in FrameImages and a row of kImages;
+// - its value in pixel_value (detail/frame/blend.hpp), and what that needs in BlendState
+//   (detail/frame/blend_splat.hpp);
+// - a vector in Frames, in kVectors too, in the order of kImages (render/frames.hpp);
+// - where a pixel has it before the last Gaussian: the transmittance at which, in blend_rules
+//   (detail/render/rules.hpp);
+// - where it is no depth: its rule in HardDepthPixel (detail/frame/composite.hpp);
+// - for tests, its truth in the oracles (detail/eval/oracle_config.hpp, oracle_blend.hpp).
 
 namespace gsnav {
 
