@@ -356,14 +356,14 @@ TEST_CASE("panes: every output alone, batches, and what the frame does not have 
   RenderConfig config;
   config.outputs = kAlpha;
   const GaussianSet set = cloud.set();
-  REQUIRE(render_composite<float>(serial, ws, std::span(&set, 1), {solid.instances, {}}, axis_camera(83),
-                                  config, images)
+  REQUIRE(draw_frame<float>(serial, ws, std::span(&set, 1), {solid.instances, {}}, axis_camera(83),
+                            config, images)
               .ok());
   CHECK(ws.fragments.bytes() == 0);
   // Habitat-GS's rule has one layer a pixel.
   config.composite = Composite::hard_depth;
-  const Status refused = render_composite<float>(serial, ws, std::span(&set, 1), {panes.instances, {}},
-                                                 axis_camera(83), config, images);
+  const Status refused = draw_frame<float>(serial, ws, std::span(&set, 1), {panes.instances, {}},
+                                           axis_camera(83), config, images);
   CHECK(refused.code() == Errc::unsupported);
   CHECK(refused.message().find("MeshAlpha::blend") != std::string::npos);
 }

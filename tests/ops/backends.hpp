@@ -58,9 +58,10 @@ extern template Status render_camera<float, ToyBackend>(ToyBackend&, RenderWorks
                                                         std::span<const GaussianSet>, const Camera&,
                                                         const RenderConfig&, const FrameImages<float>&,
                                                         RenderStats*);
-extern template Status render_composite<float, ToyBackend>(
-    ToyBackend&, RenderWorkspace<float, ToyBackend>&, std::span<const GaussianSet>, const MeshFrame&,
-    const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
+extern template Status draw_frame<float, ToyBackend>(ToyBackend&, RenderWorkspace<float, ToyBackend>&,
+                                                     std::span<const GaussianSet>, const MeshFrame&,
+                                                     const Camera&, const RenderConfig&,
+                                                     const FrameImages<float>&, RenderStats*);
 extern template Status draw_meshes<float, ToyBackend>(ToyBackend&, MeshWorkspace<float, ToyBackend>&,
                                                       std::span<const MeshInstance>, const Camera&,
                                                       const MeshLight&, int, bool, MeshImages<float>,

@@ -76,7 +76,7 @@ std::vector<float> images_of(B& backend, const GaussianSet& set, const MeshFrame
   RenderWorkspace<float, B> ws(backend);
   const Camera camera = mesh_lens(kWidth, kHeight, 50);
   const Status drawn =
-      render_composite<float>(backend, ws, std::span(&set, 1), meshes, camera, config, images);
+      draw_frame<float>(backend, ws, std::span(&set, 1), meshes, camera, config, images);
   REQUIRE_MESSAGE(drawn.ok(), drawn.message());
   return values;
 }

@@ -9,29 +9,28 @@ template Status render_camera<float, SerialBackend>(SerialBackend&,
                                                     std::span<const GaussianSet>, const Camera&,
                                                     const RenderConfig&, const FrameImages<float>&,
                                                     RenderStats*);
-template Status render_composite<float, SerialBackend>(SerialBackend&,
-                                                       RenderWorkspace<float, SerialBackend>&,
-                                                       std::span<const GaussianSet>, const MeshFrame&,
-                                                       const Camera&, const RenderConfig&,
-                                                       const FrameImages<float>&, RenderStats*);
+template Status draw_frame<float, SerialBackend>(SerialBackend&, RenderWorkspace<float, SerialBackend>&,
+                                                 std::span<const GaussianSet>, const MeshFrame&,
+                                                 const Camera&, const RenderConfig&,
+                                                 const FrameImages<float>&, RenderStats*);
 template Status render_camera<double, SerialBackend>(SerialBackend&,
                                                      RenderWorkspace<double, SerialBackend>&,
                                                      std::span<const GaussianSet>, const Camera&,
                                                      const RenderConfig&, const FrameImages<double>&,
                                                      RenderStats*);
-template Status render_composite<double, SerialBackend>(SerialBackend&,
-                                                        RenderWorkspace<double, SerialBackend>&,
-                                                        std::span<const GaussianSet>, const MeshFrame&,
-                                                        const Camera&, const RenderConfig&,
-                                                        const FrameImages<double>&, RenderStats*);
+template Status draw_frame<double, SerialBackend>(SerialBackend&,
+                                                  RenderWorkspace<double, SerialBackend>&,
+                                                  std::span<const GaussianSet>, const MeshFrame&,
+                                                  const Camera&, const RenderConfig&,
+                                                  const FrameImages<double>&, RenderStats*);
 template Status render_camera<float, ToyBackend>(ToyBackend&, RenderWorkspace<float, ToyBackend>&,
                                                  std::span<const GaussianSet>, const Camera&,
                                                  const RenderConfig&, const FrameImages<float>&,
                                                  RenderStats*);
-template Status render_composite<float, ToyBackend>(ToyBackend&, RenderWorkspace<float, ToyBackend>&,
-                                                    std::span<const GaussianSet>, const MeshFrame&,
-                                                    const Camera&, const RenderConfig&,
-                                                    const FrameImages<float>&, RenderStats*);
+template Status draw_frame<float, ToyBackend>(ToyBackend&, RenderWorkspace<float, ToyBackend>&,
+                                              std::span<const GaussianSet>, const MeshFrame&,
+                                              const Camera&, const RenderConfig&,
+                                              const FrameImages<float>&, RenderStats*);
 template Status draw_meshes<float, SerialBackend>(SerialBackend&, MeshWorkspace<float, SerialBackend>&,
                                                   std::span<const MeshInstance>, const Camera&,
                                                   const MeshLight&, int, bool, MeshImages<float>,

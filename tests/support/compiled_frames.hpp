@@ -13,17 +13,21 @@ extern template Status render_camera<float, SerialBackend>(SerialBackend&,
                                                            std::span<const GaussianSet>, const Camera&,
                                                            const RenderConfig&,
                                                            const FrameImages<float>&, RenderStats*);
-extern template Status render_composite<float, SerialBackend>(
-    SerialBackend&, RenderWorkspace<float, SerialBackend>&, std::span<const GaussianSet>,
-    const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
+extern template Status draw_frame<float, SerialBackend>(SerialBackend&,
+                                                        RenderWorkspace<float, SerialBackend>&,
+                                                        std::span<const GaussianSet>, const MeshFrame&,
+                                                        const Camera&, const RenderConfig&,
+                                                        const FrameImages<float>&, RenderStats*);
 extern template Status render_camera<double, SerialBackend>(SerialBackend&,
                                                             RenderWorkspace<double, SerialBackend>&,
                                                             std::span<const GaussianSet>, const Camera&,
                                                             const RenderConfig&,
                                                             const FrameImages<double>&, RenderStats*);
-extern template Status render_composite<double, SerialBackend>(
-    SerialBackend&, RenderWorkspace<double, SerialBackend>&, std::span<const GaussianSet>,
-    const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<double>&, RenderStats*);
+extern template Status draw_frame<double, SerialBackend>(SerialBackend&,
+                                                         RenderWorkspace<double, SerialBackend>&,
+                                                         std::span<const GaussianSet>, const MeshFrame&,
+                                                         const Camera&, const RenderConfig&,
+                                                         const FrameImages<double>&, RenderStats*);
 extern template Status draw_meshes<float, SerialBackend>(SerialBackend&,
                                                          MeshWorkspace<float, SerialBackend>&,
                                                          std::span<const MeshInstance>, const Camera&,

@@ -236,10 +236,10 @@ template Status render_camera<float, CudaBackend>(CudaBackend&, RenderWorkspace<
                                                   std::span<const GaussianSet>, const Camera&,
                                                   const RenderConfig&, const FrameImages<float>&,
                                                   RenderStats*);
-template Status render_composite<float, CudaBackend>(CudaBackend&, RenderWorkspace<float, CudaBackend>&,
-                                                     std::span<const GaussianSet>, const MeshFrame&,
-                                                     const Camera&, const RenderConfig&,
-                                                     const FrameImages<float>&, RenderStats*);
+template Status draw_frame<float, CudaBackend>(CudaBackend&, RenderWorkspace<float, CudaBackend>&,
+                                               std::span<const GaussianSet>, const MeshFrame&,
+                                               const Camera&, const RenderConfig&,
+                                               const FrameImages<float>&, RenderStats*);
 template Status detail::render_frame<float, CudaBackend>(CudaBackend&,
                                                          RenderWorkspace<float, CudaBackend>&,
                                                          std::span<const GaussianSet>, const Camera&,

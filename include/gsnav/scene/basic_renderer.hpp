@@ -12,7 +12,7 @@
 
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/detail/core/guarded.hpp"
-#include "gsnav/detail/render/render_composite.hpp"
+#include "gsnav/detail/render/draw_frame.hpp"
 #include "gsnav/detail/render/thread_frames.hpp"
 #include "gsnav/detail/scene/gaussian_arrays.hpp"
 #include "gsnav/render/frames.hpp"
@@ -187,8 +187,8 @@ class BasicRenderer {
   }
 
   Status draw(const FrameJob<S>& job, RenderStats& stats) {
-    return render_composite<S>(*backend_, workspace_, job.sets, job.meshes, *job.camera, *job.config,
-                               job.images, &stats);
+    return draw_frame<S>(*backend_, workspace_, job.sets, job.meshes, *job.camera, *job.config,
+                         job.images, &stats);
   }
 
   /// Runs what may throw; where memory was missing the error says for what.

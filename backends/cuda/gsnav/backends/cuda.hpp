@@ -13,7 +13,7 @@
 #include "gsnav/detail/frame/cut_depth.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
-#include "gsnav/detail/render/render_composite.hpp"
+#include "gsnav/detail/render/draw_frame.hpp"
 #include "gsnav/detail/sweep/first_impacts.hpp"
 #include "gsnav/render/render.hpp"
 #include "gsnav/skin/skin.hpp"
@@ -148,9 +148,10 @@ extern template Status render_camera<float, CudaBackend>(CudaBackend&,
                                                          std::span<const GaussianSet>, const Camera&,
                                                          const RenderConfig&, const FrameImages<float>&,
                                                          RenderStats*);
-extern template Status render_composite<float, CudaBackend>(
-    CudaBackend&, RenderWorkspace<float, CudaBackend>&, std::span<const GaussianSet>, const MeshFrame&,
-    const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
+extern template Status draw_frame<float, CudaBackend>(CudaBackend&, RenderWorkspace<float, CudaBackend>&,
+                                                      std::span<const GaussianSet>, const MeshFrame&,
+                                                      const Camera&, const RenderConfig&,
+                                                      const FrameImages<float>&, RenderStats*);
 extern template Status detail::render_frame<float, CudaBackend>(
     CudaBackend&, RenderWorkspace<float, CudaBackend>&, std::span<const GaussianSet>, const Camera&,
     const RenderConfig&, const MeshLayer<float>&, const FrameImages<float>&, RenderStats&);

@@ -30,7 +30,7 @@
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/mesh/mesh_shade.hpp"
-#include "gsnav/detail/render/render_composite.hpp"
+#include "gsnav/detail/render/draw_frame.hpp"
 #include "gsnav/detail/sweep/capsule_batch.hpp"
 #include "gsnav/skin/lbs.hpp"
 #include "gsnav/skin/skin.hpp"
@@ -214,17 +214,21 @@ extern template Status render_camera<float, OpenMPBackend>(OpenMPBackend&,
                                                            std::span<const GaussianSet>, const Camera&,
                                                            const RenderConfig&,
                                                            const FrameImages<float>&, RenderStats*);
-extern template Status render_composite<float, OpenMPBackend>(
-    OpenMPBackend&, RenderWorkspace<float, OpenMPBackend>&, std::span<const GaussianSet>,
-    const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<float>&, RenderStats*);
+extern template Status draw_frame<float, OpenMPBackend>(OpenMPBackend&,
+                                                        RenderWorkspace<float, OpenMPBackend>&,
+                                                        std::span<const GaussianSet>, const MeshFrame&,
+                                                        const Camera&, const RenderConfig&,
+                                                        const FrameImages<float>&, RenderStats*);
 extern template Status render_camera<double, OpenMPBackend>(OpenMPBackend&,
                                                             RenderWorkspace<double, OpenMPBackend>&,
                                                             std::span<const GaussianSet>, const Camera&,
                                                             const RenderConfig&,
                                                             const FrameImages<double>&, RenderStats*);
-extern template Status render_composite<double, OpenMPBackend>(
-    OpenMPBackend&, RenderWorkspace<double, OpenMPBackend>&, std::span<const GaussianSet>,
-    const MeshFrame&, const Camera&, const RenderConfig&, const FrameImages<double>&, RenderStats*);
+extern template Status draw_frame<double, OpenMPBackend>(OpenMPBackend&,
+                                                         RenderWorkspace<double, OpenMPBackend>&,
+                                                         std::span<const GaussianSet>, const MeshFrame&,
+                                                         const Camera&, const RenderConfig&,
+                                                         const FrameImages<double>&, RenderStats*);
 extern template Status skin_gaussians<float, OpenMPBackend, float>(OpenMPBackend&,
                                                                    const SkinningArgs<float>&);
 extern template Status skin_all<float, OpenMPBackend, float>(OpenMPBackend&,

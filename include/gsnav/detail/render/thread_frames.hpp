@@ -14,7 +14,7 @@
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/detail/core/guarded.hpp"
-#include "gsnav/detail/render/render_composite.hpp"
+#include "gsnav/detail/render/draw_frame.hpp"
 
 namespace gsnav {
 
@@ -45,7 +45,7 @@ class ThreadFrames {
     return cameras > 1 && cameras >= 2 * concurrency_of(backend);
   }
 
-  /// render_composite() for each of `count` frames; job_of(c) gives the FrameJob of frame c. The first
+  /// draw_frame() for each of `count` frames; job_of(c) gives the FrameJob of frame c. The first
   /// frame's error, by number, is returned; out_of_memory too.
   template <class JobOf>
   Status render(B& backend, std::size_t count, const JobOf& job_of, std::span<RenderStats> stats) {
@@ -58,8 +58,8 @@ class ThreadFrames {
       Worker& worker = take();
       Status s = detail::guarded([&] {
         const FrameJob<S> job = job_of(c);
-        return render_composite<S, B>(worker.backend, worker.workspace, job.sets, job.meshes,
-                                      *job.camera, *job.config, job.images, &stats[c]);
+        return draw_frame<S, B>(worker.backend, worker.workspace, job.sets, job.meshes, *job.camera,
+                                *job.config, job.images, &stats[c]);
       });
       worker.taken.store(false, std::memory_order_release);
       if (s.ok()) return;

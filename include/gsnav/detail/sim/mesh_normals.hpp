@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
+#include "gsnav/detail/render/draw_frame.hpp"
 #include "gsnav/detail/render/draw_meshes.hpp"
-#include "gsnav/detail/render/render_composite.hpp"
 
 namespace gsnav {
 

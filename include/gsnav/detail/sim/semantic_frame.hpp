@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
-#include "gsnav/detail/render/render_composite.hpp"
+#include "gsnav/detail/render/draw_frame.hpp"
 #include "gsnav/detail/sim/semantic.hpp"
 
 namespace gsnav {
@@ -35,8 +35,8 @@ class SemanticFrames {
         alpha_(backend),
         instance_(backend) {}
 
-  /// Sets and meshes as for render_composite, arrays in the backend's memory. Errors: those of
-  /// render_composite.
+  /// Sets and meshes as for draw_frame, arrays in the backend's memory. Errors: those of
+  /// draw_frame.
   Status render(std::span<const GaussianSet> sets, std::span<const MeshInstance> meshes,
                 const Camera& camera, const RenderConfig& config, SemanticFrame& out) {
     if (Status s = validate(camera); !s) return s;
@@ -120,8 +120,8 @@ class SemanticFrames {
     FrameImages<S> images;
     images.rgb = rgb_.data();
     images.alpha = alpha_.data();
-    if (Status s = render_composite<S>(*backend_, workspace_, std::span<const GaussianSet>(colored),
-                                       {black_, {}}, camera, plain, images);
+    if (Status s = draw_frame<S>(*backend_, workspace_, std::span<const GaussianSet>(colored),
+                                 {black_, {}}, camera, plain, images);
         !s) {
       return s;
     }

@@ -16,13 +16,13 @@ struct MeshFrame {
   MeshLight light{};
 };
 
-/// render_camera with meshes among the Gaussians (docs/composition.md); without any it is that. `sets`
-/// may be empty. Errors: those of render_camera and draw_meshes; unsupported, where
-/// Composite::hard_depth meets a mesh that is seen through.
+/// Draws the images of one camera: of Gaussians alone by render_camera, else with meshes among them
+/// (docs/composition.md). `sets` may be empty. Errors: those of render_camera and draw_meshes;
+/// unsupported, where Composite::hard_depth meets a mesh that is seen through.
 template <class S, Backend B>
-Status render_composite(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
-                        const MeshFrame& meshes, const Camera& camera, const RenderConfig& config,
-                        const FrameImages<S>& images, RenderStats* stats = nullptr) {
+Status draw_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
+                  const MeshFrame& meshes, const Camera& camera, const RenderConfig& config,
+                  const FrameImages<S>& images, RenderStats* stats = nullptr) {
   if (meshes.instances.empty())
     return render_camera<S>(backend, ws, sets, camera, config, images, stats);
   if (Status s = validate(config); !s) return s;
