@@ -36,7 +36,8 @@ function(gsnav_executable name)
   target_link_libraries(${name} PRIVATE gsnav ${ARG_LIBS})
 endfunction()
 
-set(GSNAV_BRIEF_TESTS_FLAGS "" CACHE STRING "Further options of the compiler for tests whose time is not in their own code (a list)")
+set(GSNAV_BRIEF_TESTS_FLAGS "" CACHE STRING
+    "Further options of the compiler for tests whose time is not in their own code (a list)")
 
 # gsnav_brief_test(target): its own code takes longer to compile than to run. Sanitizers do not optimise it.
 function(gsnav_brief_test target)
@@ -56,7 +57,8 @@ function(gsnav_test name)
     target_link_libraries(gsnav_test_support PRIVATE gsnav doctest::doctest $<TARGET_NAME_IF_EXISTS:gsnav_openmp>)
     target_include_directories(gsnav_test_support PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   endif()
-  gsnav_executable(test_${name} SOURCES ${ARG_SOURCES} LIBS gsnav_test_support ${ARG_LIBS} gsnav_avatar doctest::doctest)
+  gsnav_executable(test_${name} SOURCES ${ARG_SOURCES} LIBS gsnav_test_support ${ARG_LIBS} gsnav_avatar
+                                        doctest::doctest)
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   target_compile_definitions(test_${name} PRIVATE GSNAV_DATA_DIR="${GSNAV_DATA_DIR}")
   add_test(NAME ${name} COMMAND test_${name})

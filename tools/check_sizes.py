@@ -154,7 +154,8 @@ def self_test():
     for head in ("const int a[] = ", "const std::array<int, f(3)> a", "enum class A : int "):
         if found(head + "{\n" + "  1,\n" * 90 + "};\n"):
             sys.exit(f"taken for a function: {head}")
-    lines, case, helper = "int a;\n" * 400, "TEST_CASE(\"a\") {\n" + "  f();\n" * 100 + "}\n", "int f() {\n" + body + "}\n"
+    lines, helper = "int a;\n" * 400, "int f() {\n" + body + "}\n"
+    case = "TEST_CASE(\"a\") {\n" + "  f();\n" * 100 + "}\n"
     for name, text, expected in (("src/a.cpp", lines, 1), ("tests/a.cpp", lines, 0), ("tests/a.cpp", 2 * lines, 1),
                                  ("src/a.cpp", case, 1), ("tests/a.cpp", case, 0), ("tests/a.cpp", helper, 1)):
         if len(too_long(name, text)) != expected:

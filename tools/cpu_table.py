@@ -70,7 +70,8 @@ def wait_until_quiet(limit_s, what):
     while (busy := busy_share(0.5)) > 0.1 and time.monotonic() < end:
         pass
     if busy > 0.1:
-        print(f"cpu_table.py: warning: {what}: {busy:.0%} of the processor is busy with something else", file=sys.stderr)
+        print(f"cpu_table.py: warning: {what}: {busy:.0%} of the processor is busy with something else",
+              file=sys.stderr)
     return busy
 
 
@@ -164,7 +165,8 @@ def time_gsnav(bench, ply, cameras, size, threads, repeats, cache, judged):
 
 
 def best(rounds):
-    """Of rounds of one measurement the fastest: what disturbs only slows down. Only the first counts floor and error."""
+    """Of rounds of one measurement the fastest: what disturbs only slows down. Only the first counts floor and
+    error."""
     first, fastest = rounds[0], min(rounds, key=lambda r: r.get("median_ms", r.get("ms", 0)))
     out = {**first, **fastest}
     for ratio in {"floor_ratio", "floor_ratio_best"} & first.keys():
@@ -231,7 +233,8 @@ def table(rows, threads, baselines):
 
 def caption(options, baselines):
     model = re.search(r"model name\s*: (.*)", pathlib.Path("/proc/cpuinfo").read_text())
-    text = (f"RGB, medians over all views, on {options.threads[-1]} cores of {model.group(1) if model else 'a processor'}"
+    text = (f"RGB, medians over all views, on {options.threads[-1]} cores of "
+            f"{model.group(1) if model else 'a processor'}"
             f" where nothing else is said; of two numbers the first is `{PROFILES[0]}`, the second `{PROFILES[1]}`."
             " The floor is what a frame's work would take at the measured bandwidth and clock and the best unit costs"
             " known (`bench/floor.hpp`). PSNR: the worst of four views, against float64. Memory: scene and scratch.")

@@ -107,7 +107,8 @@ class Hostile:
 
 def self_test():
     good = {"joint_mats": numpy.tile(numpy.eye(4, dtype=numpy.float32), (5, 24, 1, 1)), "joint_mats_fps": 40.0,
-            "joint_mats_space": "smpl_with_trans", "joint_mats_version": numpy.int64(1), "gender": b"neutral", "nothing": b"",
+            "joint_mats_space": "smpl_with_trans", "joint_mats_version": numpy.int64(1), "gender": b"neutral",
+            "nothing": b"",
             "order": numpy.asfortranarray(numpy.arange(6.0).reshape(2, 3)), "betas": [0.5, 1.0], "none": None}
     with tempfile.TemporaryDirectory() as scratch:
         mark = pathlib.Path(scratch) / "ran"
@@ -121,7 +122,8 @@ def self_test():
                     assert numpy.array_equal(back[key], numpy.asarray(good[key])), key
             bad = [Hostile(open, str(mark), "w"), Hostile(eval, f"open({str(mark)!r}, 'w')"),
                    Hostile(pathlib.Path.touch, mark), Hostile(getattr, "text", "upper"),
-                   {"joint_mats": Hostile(__import__, "os")}, numpy.array([Hostile(open, str(mark), "w")], dtype=object),
+                   {"joint_mats": Hostile(__import__, "os")},
+                    numpy.array([Hostile(open, str(mark), "w")], dtype=object),
                    {"joint_mats": numpy.array([None])}, {"joint_mats": {"a": 1}}, {"joint_mats": 1j}, [1, 2], {1: 2},
                    {"other": 1.0}]
             for number, value in enumerate(bad):

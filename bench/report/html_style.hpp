@@ -7,7 +7,8 @@ namespace gsnav_report {
 inline constexpr const char* kStyleSheet = R"css(
 :root { color-scheme: light; }
 * { box-sizing: border-box; }
-body { margin: 0; background: #fff; color: #1f2730; font: 15px/1.5 system-ui, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif; }
+body { margin: 0; background: #fff; color: #1f2730;
+  font: 15px/1.5 system-ui, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif; }
 main, header > div, footer > div { max-width: 1320px; margin: 0 auto; padding: 0 20px; }
 header { background: #f4f6f9; border-bottom: 1px solid #dde3ea; padding: 26px 0 18px; }
 h1 { font-size: 26px; line-height: 1.25; margin: 0 0 8px; letter-spacing: -0.01em; }
@@ -34,7 +35,8 @@ tbody tr:hover { background: #f8fafc; }
 .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(350px, 100%), 1fr)); gap: 10px 18px; }
 figure { margin: 0; min-width: 0; max-width: 560px; }
 figure svg { width: 100%; height: auto; display: block; }
-.images { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(300px, 100%), 1fr)); gap: 16px; margin: 10px 0; }
+.images { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(300px, 100%), 1fr));
+  gap: 16px; margin: 10px 0; }
 .images img { width: 100%; height: auto; display: block; border: 1px solid #dde3ea; image-rendering: auto; }
 figcaption { font-size: 13px; color: #4a5563; padding: 4px 0 0; overflow-wrap: anywhere; }
 .legend { display: flex; flex-wrap: wrap; gap: 2px 18px; font-size: 13.5px; color: #3c4654; max-width: none; }
@@ -50,7 +52,8 @@ svg text { font-family: system-ui, "Segoe UI", Roboto, "Helvetica Neue", Arial, 
 details { margin: 10px 0; }
 summary { cursor: pointer; color: #0b5c93; }
 footer { color: #6b7684; font-size: 13px; padding: 26px 0 40px; }
-@media (max-width: 600px) { h1 { font-size: 21px; } main, header > div, footer > div { padding: 0 12px; } th, td { padding: 4px 7px; } }
+@media (max-width: 600px) { h1 { font-size: 21px; } main, header > div, footer > div { padding: 0 12px; }
+  th, td { padding: 4px 7px; } }
 @media print { .scroll { overflow: visible; } h2 { break-after: avoid; } figure { break-inside: avoid; } }
 )css";
 

@@ -78,8 +78,8 @@ def main():
     for path in sys.argv[2:]:
         for name in leaks(nm, path):
             failed = True
-            print(f"{path}: defines {name}, which another instruction set's object may define too. Mark it GSNAV_HD, or "
-                  "GSNAV_INLINED if it is a lambda (include/gsnav/config.hpp).")
+            print(f"{path}: defines {name}, which another instruction set's object may define too. "
+                  "Mark it GSNAV_HD, or GSNAV_INLINED if it is a lambda (include/gsnav/config.hpp).")
     sys.exit(1 if failed else 0)
 
 

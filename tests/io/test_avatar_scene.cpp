@@ -68,7 +68,8 @@ TEST_CASE("avatar scene: Habitat-GS's file puts people where its frames say") {
   write_file(folder / "x.scene_instance.json", R"({"time_loop": true, "gaussian_avatars": [
     {"name": "plain", "canonical_gaussians": "a.npz", "driver": "d.pkl", "smpl_type": "smplx", "fps": 40},
     {"canonical_gaussians": "a.npz", "driver": "down.npz", "time_begin": 2, "time_end": 9},
-    {"canonical_gaussians": "a.npz", "driver": {"smpl_params": "down.npz", "trajectory": null}, "coord_system": "opencv"},
+    {"canonical_gaussians": "a.npz", "driver": {"smpl_params": "down.npz", "trajectory": null},
+     "coord_system": "opencv"},
     {"canonical_gaussians": "a.npz", "driver": {"smpl_parms": "d.npz", "trajectory": "t.npz"}},
     {"canonical_gaussians": "a.npz", "driver": "d.npz", "scale": 1.5, "offset_y": 0.1},
     {"canonical_gaussians": "a.npz", "driver": "d.npz",

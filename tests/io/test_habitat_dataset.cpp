@@ -88,9 +88,9 @@ TEST_CASE("a dataset names the files outside of its folder that it uses") {
 
 TEST_CASE("a stage's frame by hand: z up and y ahead becomes y up and -z ahead") {
   const Dataset d;
-  d.write(
-      "configs/stages/playroom.stage_config.json",
-      R"({"render_asset":"a.ply","up":[0,0,1],"front":[0,1,0],"origin":[1,2,3],"units_to_meters":0.5,"scale":[4,4,4]})");
+  d.write("configs/stages/playroom.stage_config.json",
+          R"({"render_asset":"a.ply","up":[0,0,1],"front":[0,1,0],"origin":[1,2,3],
+"units_to_meters":0.5,"scale":[4,4,4]})");
   const Similarity s =
       io::load_stage_config(d.folder / "configs/stages/playroom.stage_config.json")->world_from_asset();
   const auto near = [](const Vec3d& a, const Vec3d& b) { return norm(a - b) < 1e-12; };

@@ -19,7 +19,8 @@ struct Files {
       "# body\nv 0 0 0\nv 1 0 0\nv 1 2 0\nv 0 2 0\nv 0 2 1\nv 5 -9 5\nvt 0 0\n"
       "g helper\nf 1 2 6\ng body\nf 1/1 2/1 3/1 4/1\nf 4 3 5\n";
   std::string skeleton =
-      R"({"bones": {"arm": {"head": "a", "tail": "b", "parent": "base"}, "base": {"head": "b", "tail": "a", "parent": null}},
+      R"({"bones": {"arm": {"head": "a", "tail": "b", "parent": "base"},
+"base": {"head": "b", "tail": "a", "parent": null}},
           "joints": {"a": [2, 3], "b": [5, 0]}, "weights_file": "folder/w.mhw"})";
   std::string weights =
       R"({"weights": {"base": [[0, 1], [1, 0.5], [2, 0.25]], "arm": [[2, 0.5], [3, 0.3], [5, 9]]}})";

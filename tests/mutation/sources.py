@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds code by the function that it stands in and by its tokens: moved files, line breaks and comments do not matter."""
+"""Finds code by the function that it stands in and by its tokens: moved files, line breaks and comments do not
+matter."""
 from __future__ import annotations
 
 import bisect
@@ -43,8 +44,8 @@ class Tokens:
         return len(self.words)
 
     def bodies(self, name: str):
-        """(first, last) tokens of each definition of a function, struct, enum or constant of this name: from its name to
-        the closing brace or semicolon."""
+        """(first, last) tokens of each definition of a function, struct, enum or constant of this name: from its
+        name to the closing brace or semicolon."""
         for i in self.places.get(name, ()):
             before = self.words[i - 1] if i else ""
             j = i + 1

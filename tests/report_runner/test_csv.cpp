@@ -78,7 +78,8 @@ TEST_CASE("csv: rows completed later are saved") {
 
 TEST_CASE("kernels: benchmarks with their counters") {
   const std::string json = R"({"context": {}, "benchmarks": [
-    {"name": "project<float, OpenMPBackend>/degree:3/threads:12/real_time", "run_type": "iteration", "iterations": 9, "real_time": 2500.0,
+    {"name": "project<float, OpenMPBackend>/degree:3/threads:12/real_time", "run_type": "iteration",
+     "iterations": 9, "real_time": 2500.0,
      "cpu_time": 1, "time_unit": "us", "items_per_second": 4e7, "rgb_max": 1.5e-7, "mean_px_max": 0.25},
     {"name": "skin", "run_type": "iteration", "real_time": 7.0, "time_unit": "ms"}]})";
   const auto rows = parse_benchmarks(json, "f").value();

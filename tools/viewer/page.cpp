@@ -10,7 +10,8 @@ constexpr std::string_view kPage = R"html(<!doctype html>
 :root{color-scheme:dark;--line:#30343c;--dim:#9aa3b2;--gap:12px}
 *{box-sizing:border-box}
 body{margin:0;background:#14161a;color:#e8eaee;font:14px/1.35 system-ui,sans-serif}
-header{display:flex;flex-wrap:wrap;gap:0 1em;align-items:baseline;padding:.5em var(--gap);border-bottom:1px solid var(--line)}
+header{display:flex;flex-wrap:wrap;gap:0 1em;align-items:baseline;padding:.5em var(--gap);
+  border-bottom:1px solid var(--line)}
 h1{font-size:1rem;margin:0}header span,figcaption,dt,kbd,#help{color:var(--dim)}#speed{margin-left:auto}
 main{padding:var(--gap);max-width:140em;margin:auto}
 #panels{display:grid;grid-template-columns:repeat(3,minmax(0,max-content));gap:var(--gap);justify-content:center}
@@ -18,18 +19,21 @@ figure{margin:0;min-width:0;position:relative}canvas{display:block;max-width:100
 #color{cursor:grab;touch-action:none}#color:active{cursor:grabbing}
 figcaption{display:flex;gap:.6em;align-items:center;padding:.25em 0;min-height:1.9em}
 #scale{flex:1;height:.7em;border-radius:3px;min-width:3em}
-#news{position:absolute;left:8px;right:8px;top:8px;padding:.5em .8em;border-radius:6px;background:#000c;text-align:center}
+#news{position:absolute;left:8px;right:8px;top:8px;padding:.5em .8em;border-radius:6px;
+  background:#000c;text-align:center}
 #news:empty{display:none}
 #bar{display:flex;flex-wrap:wrap;gap:.4em .9em;align-items:center;margin:.4em 0 .7em}
 #bar input[type=range]{flex:1 1 12em;min-width:8em}
-button{background:#262a32;color:inherit;border:1px solid var(--line);border-radius:6px;padding:.3em .9em;font:inherit;cursor:pointer}
+button{background:#262a32;color:inherit;border:1px solid var(--line);border-radius:6px;
+  padding:.3em .9em;font:inherit;cursor:pointer}
 button:hover{background:#323844}:focus-visible{outline:2px solid #7aa7ff;outline-offset:2px}
 dl{display:grid;grid-template-columns:repeat(auto-fit,minmax(7.6em,1fr));gap:.4em;margin:0}
 dl div{border:1px solid var(--line);border-radius:6px;padding:.25em .6em}dt{font-size:.85em}
 dd{margin:0;font-variant-numeric:tabular-nums;font-size:1.1em}
 kbd{border:1px solid var(--line);border-radius:4px;padding:0 .35em;font:inherit}
 #help{margin:.7em 0 0}output{font-variant-numeric:tabular-nums;min-width:4em}
-#pad{display:none;grid-template-columns:repeat(3,3.4em);grid-auto-rows:3em;gap:.35em;user-select:none;-webkit-user-select:none}
+#pad{display:none;grid-template-columns:repeat(3,3.4em);grid-auto-rows:3em;gap:.35em;
+  user-select:none;-webkit-user-select:none}
 #pad button{touch-action:none;padding:0;font-size:1.2em}
 @media (pointer:coarse),(max-width:700px){#pad{display:grid}#help{display:none}}
 @media (max-width:700px){
@@ -50,17 +54,22 @@ kbd{border:1px solid var(--line);border-radius:4px;padding:0 .35em;font:inherit}
 </div>
 <div id="bar">
 <div id="pad"><span></span><button data-key="KeyW" aria-label="walk forward">&#9650;</button><span></span>
-<button data-key="KeyA" aria-label="step to the left">&#9664;</button><button data-key="KeyS" aria-label="walk back">&#9660;</button>
+<button data-key="KeyA" aria-label="step to the left">&#9664;</button><button
+ data-key="KeyS" aria-label="walk back">&#9660;</button>
 <button data-key="KeyD" aria-label="step to the right">&#9654;</button></div>
 <button id="paused" aria-keyshortcuts="Space">pause</button>
-<input id="time" type="range" min="0" max="120" step="0.05" aria-label="time, seconds"><output id="clock" for="time"></output>
+<input id="time" type="range" min="0" max="120" step="0.05"
+ aria-label="time, seconds"><output id="clock" for="time"></output>
 <label><input type="checkbox" id="people" aria-keyshortcuts="P" checked> people</label>
 <label><input type="checkbox" id="capsules" aria-keyshortcuts="C"> capsules</label>
 <label><input type="checkbox" id="navmesh" aria-keyshortcuts="M"> NavMesh</label>
-<button id="stop" aria-keyshortcuts="X">stop here</button><button id="next" aria-keyshortcuts="N">next episode</button></div>
+<button id="stop" aria-keyshortcuts="X">stop here</button><button
+ id="next" aria-keyshortcuts="N">next episode</button></div>
 <dl id="metrics"></dl>
-<p id="help"><kbd>W</kbd> <kbd>A</kbd> <kbd>S</kbd> <kbd>D</kbd> walk, drag or <kbd>&larr;</kbd> <kbd>&rarr;</kbd> <kbd>&uarr;</kbd>
-<kbd>&darr;</kbd> look, <kbd>space</kbd> pause, <kbd>,</kbd> <kbd>.</kbd> time, <kbd>P</kbd> people, <kbd>C</kbd> capsules,
+<p id="help"><kbd>W</kbd> <kbd>A</kbd> <kbd>S</kbd> <kbd>D</kbd>
+walk, drag or <kbd>&larr;</kbd> <kbd>&rarr;</kbd> <kbd>&uarr;</kbd>
+<kbd>&darr;</kbd> look, <kbd>space</kbd> pause, <kbd>,</kbd> <kbd>.</kbd> time,
+<kbd>P</kbd> people, <kbd>C</kbd> capsules,
 <kbd>M</kbd> NavMesh, <kbd>X</kbd> stop here, <kbd>N</kbd> next episode.</p>
 </main><script>
 "use strict";
@@ -75,8 +84,10 @@ function show(s) {
   state = s;
   say("scene", s.scene);
   say("episode", "episode " + s.episode + " of " + s.episodes);
-  say("news", !s.done ? "" : (s.success ? "Reached the goal." : "Stopped away from the goal.") + " N or \u201cnext episode\u201d begins the next one.");
-  say("speed", number(s.rate, 1, " frames/s, ") + number(s.frame_ms, 1, " ms a frame, ") + s.visible.toLocaleString("en") + " Gaussians in view");
+  say("news", !s.done ? "" : (s.success ? "Reached the goal." : "Stopped away from the goal.") +
+      " N or \u201cnext episode\u201d begins the next one.");
+  say("speed", number(s.rate, 1, " frames/s, ") + number(s.frame_ms, 1, " ms a frame, ") +
+      s.visible.toLocaleString("en") + " Gaussians in view");
   say("paused", s.paused ? "play" : "pause");
   for (const id of boxes) { if (!(id in once)) $(id).checked = s[id]; }  // another tab may have changed them
   say("near", s.depth.near + " m"); say("far", s.depth.far + " m");
@@ -88,7 +99,8 @@ function show(s) {
     ["distance to goal", number(m.distance_to_goal, 2, " m")], ["path", number(m.path_length, 2, " m")],
     ["shortest way", number(m.shortest_path, 2, " m")], ["SPL", number(m.spl, 3, "")],
     ["SoftSPL", number(m.soft_spl, 3, "")], ["nearest person", number(m.clearance, 2, " m")],
-    ["collisions (CR)", number(m.collision_rate, 3, "")], ["intrusion (PSI)", number(m.psi, 3, "")], ["compliance (PSC)", number(m.psc, 3, "")],
+    ["collisions (CR)", number(m.collision_rate, 3, "")], ["intrusion (PSI)", number(m.psi, 3, "")],
+    ["compliance (PSC)", number(m.psc, 3, "")],
     ["wall collisions", number(m.collisions, 0, "")], ["actions", number(m.steps, 0, "")]];
   $("metrics").replaceChildren(...cards.map(([name, value]) => {
     const card = document.createElement("div"), dt = document.createElement("dt"), dd = document.createElement("dd");
@@ -163,7 +175,10 @@ addEventListener("keydown", e => {
   if (looks.includes(e.code) && on.matches("input[type=range]")) return;
   if (e.code === "Space" && on.matches("button,input[type=checkbox]")) return;
   if (walks.includes(e.code) || looks.includes(e.code)) { held.add(e.code); hurry(); e.preventDefault(); return; }
-  if (commands[e.code] && (!e.repeat || e.code === "Comma" || e.code === "Period")) { commands[e.code](); e.preventDefault(); }
+  if (commands[e.code] && (!e.repeat || e.code === "Comma" || e.code === "Period")) {
+    commands[e.code]();
+    e.preventDefault();
+  }
 });
 addEventListener("keyup", e => held.delete(e.code));
 addEventListener("blur", () => held.clear());

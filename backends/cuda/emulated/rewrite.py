@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Device code as C++: launches become calls, and shared memory of a launch's size a pointer. Lines stay where they are."""
+"""Device code as C++: launches become calls, and shared memory of a launch's size a pointer. Lines stay
+where they are."""
 import argparse
 import pathlib
 import re

@@ -5,7 +5,8 @@ from . import fault
 TEST = "tests/nav/test_sweep_long.cpp"
 
 FAULTS = [
-    fault("pushed_agent_unwatched", "sweep_steps", "const auto wrong = active && looking && agent_closes && (gap < floor - tolerance);",
+    fault("pushed_agent_unwatched", "sweep_steps",
+          "const auto wrong = active && looking && agent_closes && (gap < floor - tolerance);",
           "const auto wrong = nowhere;", TEST, "sweep: long and growing*",
           why="a push by a body would let the agent go on into it until the next look"),
     fault("few_evaluations", "SweepRules", "int max_iterations = sizeof(S) > 4 ? 512 : 64;", "int max_iterations = 64;",

@@ -66,7 +66,8 @@ FAULTS = [
           "  return {delta64, mean + row.rounded_offset(offset), static_cast<F>(depth_key(camera, delta64))};\n",
           "  const Mat3<float> r = mat_cast<float>(camera.rotation);\n"
           "  const Vec3<F> delta = mean + row.rounded_offset(offset);\n"
-          "  const F z = dot(Vec3<F>{F(r(2, 0)), F(r(2, 1)), F(r(2, 2))}, delta) * F(static_cast<float>(camera.scale));\n"
+          "  const F z = dot(Vec3<F>{F(r(2, 0)), F(r(2, 1)), F(r(2, 2))}, delta) * "
+          "F(static_cast<float>(camera.scale));\n"
           "  return {delta64, delta, z};\n",
           ORDER, "N77_quantised_capture*", "N79_near_ties*", why="the chain in float32 swaps near ties"),
     fault("reference_key_in_float", "project_row",
@@ -91,7 +92,8 @@ FAULTS = [
           ORDER, "N21_depth_tie_stack", "N22_depth_tie_grid"),
     fault("ties_dropped", "for_each",
           "        for (std::uint32_t i = 0; i < n; ++i) f(k[i] - base, slot + i);",
-          "        for (std::uint32_t i = 0; i < n; ++i) f(i > 0 && k[i] == k[i - 1] ? 0xffffffffu : k[i] - base, slot + i);",
+          "        for (std::uint32_t i = 0; i < n; ++i) f(i > 0 && k[i] == k[i - 1] ? 0xffffffffu : k[i] - "
+          "base, slot + i);",
           ORDER, "N22_depth_tie_grid"),
     fault("last_tile_of_a_row_lost", "of",
           "tile_of(box.x1 - one)", "tile_of(box.x1 - one - one)",

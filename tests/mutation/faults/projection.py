@@ -30,7 +30,8 @@ FAULTS = [
     fault("exponent_from_the_corner", "column_exponent", "const L w2 = fma(py - ref_y, b, terms.w2);",
           "const L w2 = fma(py, b, fma(-ref_y, b, terms.w2));",
           EXPONENT, "N07_alpha_long_needle", why="offsets from the image's corner cancel"),
-    fault("response_ignored", "splat_exponent", "if (along_rays) return perspective_exponent", "if (false) return perspective_exponent",
+    fault("response_ignored", "splat_exponent", "if (along_rays) return perspective_exponent",
+          "if (false) return perspective_exponent",
           RESPONSE, "N02_exact_ray_grid", why="the ellipse of the linearised response"),
     fault("needles_in_float", "needs_double",
           "  return (fma(abs(p.k), length_x, p.b * length_y) > L(S(512))) ||\n"

@@ -6,7 +6,8 @@ ROWS = "tests/hard_cases/test_rows.cpp"
 WORLD = "tests/hard_cases/test_world.cpp"
 PLY_TEST = "tests/io/test_ply.cpp"
 PLY_COLUMNS = "src/io/ply_columns.cpp"
-PLY_READER = ("src/io/ply.cpp", PLY_COLUMNS, "src/io/ply_body.cpp", "src/io/ply_header.cpp", "src/io/ply_compressed.cpp",
+PLY_READER = ("src/io/ply.cpp", PLY_COLUMNS, "src/io/ply_body.cpp", "src/io/ply_header.cpp",
+              "src/io/ply_compressed.cpp",
               "src/io/ply_points.cpp", "src/io/neighbours.cpp", "src/io/file.cpp")
 
 FINITE = "  bool finite = is_finite(raw.mean) && !std::isnan(raw.opacity_logit);\n"

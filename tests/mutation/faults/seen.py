@@ -16,7 +16,8 @@ FAULTS = [
           VISIBLE_TEST, DRAWN),
     fault("second_half_of_a_part_forgotten", "any_of_part",
           "return (word(2 * part) | word(2 * part + 1)) != 0;", "return word(2 * part) != 0;", VISIBLE_TEST, DRAWN),
-    fault("rows_by_themselves", "seen_rows", "    if (any) continue;\n    for (std::size_t r = first; r < first + run; ++r) out",
+    fault("rows_by_themselves", "seen_rows",
+          "    if (any) continue;\n    for (std::size_t r = first; r < first + run; ++r) out",
           "    for (std::size_t r = first; r < first + run; ++r)\n      if (begin + r >= most.size() || "
           "!(static_cast<double>(most[begin + r]) > settings.min_weight)) out",
           VISIBLE_TEST, RUNS, why="what lies together is seen together"),
