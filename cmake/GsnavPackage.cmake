@@ -16,7 +16,8 @@ install(FILES "${PROJECT_SOURCE_DIR}/cmake/packaging/copyright" "${PROJECT_SOURC
 set(CPACK_PACKAGE_NAME gsnav)
 set(CPACK_PACKAGE_VERSION "${PROJECT_VERSION}")
 set(CPACK_PACKAGE_VENDOR "gsnav")
-set(CPACK_PACKAGE_CONTACT "gsnav maintainers <maintainers@gsnav.invalid>" CACHE STRING "Maintainer of the package that cpack makes")
+set(CPACK_PACKAGE_CONTACT "gsnav maintainers <maintainers@gsnav.invalid>" CACHE STRING
+    "Maintainer of the package that cpack makes")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "Gaussian splatting and navigation simulation for C++20")
 set(_gpu)
 if(TARGET gsnav_cuda)

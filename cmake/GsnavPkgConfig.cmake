@@ -61,6 +61,7 @@ function(_gsnav_pc_component target name links namespaces)
   set(GSNAV_PC_COMPONENT "${name}")
   set(_pc_dir "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
   _gsnav_pc_folders("${_pc_dir}")
-  configure_file("${PROJECT_SOURCE_DIR}/cmake/gsnav-component.pc.in" "${PROJECT_BINARY_DIR}/cmake/gsnav-${name}.pc" @ONLY)
+  configure_file("${PROJECT_SOURCE_DIR}/cmake/gsnav-component.pc.in"
+                 "${PROJECT_BINARY_DIR}/cmake/gsnav-${name}.pc" @ONLY)
   install(FILES "${PROJECT_BINARY_DIR}/cmake/gsnav-${name}.pc" DESTINATION "${_pc_dir}")
 endfunction()

@@ -25,7 +25,10 @@ for name in apt-get cmake ninja sudo; do
 done
 printf '#!/bin/sh\nexit 9\n' > "$work/bin/nvidia-smi"
 chmod +x "$work"/bin/*
-demo() { status=0; PATH=$work/bin:$PATH "$source/tools/run_demo.sh" "$@" > "$work/out.txt" 2> "$work/err.txt" || status=$?; }
+demo() {
+  status=0
+  PATH=$work/bin:$PATH "$source/tools/run_demo.sh" "$@" > "$work/out.txt" 2> "$work/err.txt" || status=$?
+}
 
 for help in --help -h "--episodes 3 --help"; do
   # shellcheck disable=SC2086

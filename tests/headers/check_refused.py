@@ -22,7 +22,8 @@ MOST_LINES = 25  # of a message that is read
 
 def compile_header(compiler, header, *options):
     """The compiler's messages, empty where it takes the header."""
-    command = [compiler, "-fsyntax-only", "-fno-diagnostics-color", *options, *(f"-I{d}" for d in FOLDERS), "-x", "c++", "-"]
+    command = [compiler, "-fsyntax-only", "-fno-diagnostics-color", *options, *(f"-I{d}" for d in FOLDERS),
+               "-x", "c++", "-"]
     run = subprocess.run(command, input=f'#include "{header}"\n', stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                          text=True, check=False)
     return run.stdout if run.returncode != 0 else ""

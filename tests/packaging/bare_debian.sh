@@ -37,7 +37,8 @@ programs() {  # of the prefix $1: each says what it is, and one plays an episode
     inside "$1/bin/gsnav-$program" --help > "$work/help.txt"
     grep -q -- "--help" "$work/help.txt" || { echo "FAILED: gsnav-$program --help"; cat "$work/help.txt"; exit 1; }
     if grep -q -- "--version" "$work/help.txt"; then
-      inside "$1/bin/gsnav-$program" --version | grep -qF "$version" || { echo "FAILED: gsnav-$program --version"; exit 1; }
+      inside "$1/bin/gsnav-$program" --version | grep -qF "$version" ||
+        { echo "FAILED: gsnav-$program --version"; exit 1; }
     fi
   done
   inside "$1/bin/gsnav-eval" --episodes 1 --avatars 1 --out "/root/out$1" > "$work/eval.log" 2>&1 ||

@@ -52,7 +52,8 @@ for list in "${lists[@]}"; do
               share/pkgconfig/gsnav.pc share/doc/gsnav/copyright share/doc/gsnav/LICENSE; do
     grep -qx "$path" "$list" || fail "$(basename "$list" .txt): no $path"
   done
-  grep -E '(^|/)(test_|bench_)|\.(o|cpp|cu)$' "$list" && fail "$(basename "$list" .txt): the paths above are no part of a package"
+  grep -E '(^|/)(test_|bench_)|\.(o|cpp|cu)$' "$list" &&
+    fail "$(basename "$list" .txt): the paths above are no part of a package"
 done
 [[ $failed -eq 0 ]] && echo "$(wc -l < "$out/archive.txt") paths in each package: as they should be"
 exit $failed

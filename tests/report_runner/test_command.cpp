@@ -84,7 +84,8 @@ TEST_CASE("report: a tiny scene from nothing, again from the cache, and resumed"
   const std::string out = (folder / "out").string();
   const std::string arguments =
       tiny_scene(folder) + " --views 2 --sizes 48x32 --knob-size 48x32 --runs 1 --kinds " +
-      "render,ledger --knobs response,storage --threads 2 --commit c1 --out \"" + out + "\"";
+      "render,ledger --knobs response,storage --threads 2 --commit c1 --acceptance --out \"" + out +
+      "\"";
   Outcome first = run(folder, arguments);
   CAPTURE(first.text);
   REQUIRE(first.ok);

@@ -7,14 +7,14 @@ using namespace gsnav_viewer;
 
 TEST_CASE("messages change what they mention; turns add up and commands are once") {
   Controls c;
-  REQUIRE(apply("forward=1&turn=0.25&paused=1", c).ok());
-  REQUIRE(apply("turn=-0.5&tilt=0.1&time=12.5", c).ok());
+  REQUIRE(gsnav_viewer::apply("forward=1&turn=0.25&paused=1", c).ok());
+  REQUIRE(gsnav_viewer::apply("turn=-0.5&tilt=0.1&time=12.5", c).ok());
   CHECK(c.forward == 1.0);
   CHECK(c.turn == -0.25);
   CHECK(c.tilt == 0.1);
   CHECK(c.paused);
   CHECK(c.time == 12.5);
-  REQUIRE(apply("", c).ok());
+  REQUIRE(gsnav_viewer::apply("", c).ok());
   c.forget_commands();
   CHECK(c.forward == 1.0);
   CHECK(c.paused);
@@ -28,7 +28,7 @@ TEST_CASE("a bad message names its field and changes nothing") {
                               "fly=1", "forward=1 ", "forward=0x1", "paused=0.5"}) {
     Controls c;
     CAPTURE(message);
-    const auto s = apply(std::string("left=1&") + message, c);
+    const auto s = gsnav_viewer::apply(std::string("left=1&") + message, c);
     CHECK(s.code() == gsnav::Errc::invalid_argument);
     CHECK(s.message().find(std::string(message).substr(0, std::string(message).find_first_of("=&"))) !=
           std::string::npos);
