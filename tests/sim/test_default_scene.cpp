@@ -64,7 +64,7 @@ double covered_area(const GaussianCloud& c) {
 TEST_CASE("the flat has exactly as many Gaussians as asked for, which cover its surfaces") {
   const double area = covered_area(make_default_scene(1.0).value().cloud);
   SceneSampling sampling;
-  for (const std::size_t n : {10000, 54321, 200000, 700001}) {
+  for (const std::size_t n : {10000U, 54321U, 200000U, 700001U}) {
     CAPTURE(n);
     sampling.gaussians = n;
     const DefaultScene scene = make_default_scene(sampling).value();
