@@ -111,9 +111,9 @@ struct DeviceImages {
 };
 
 void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Frames<double>& truth,
-         std::size_t count, Exponential profile) {
+         std::size_t count, Quality quality) {
   RenderConfig config;
-  config.quality.exponential = profile;
+  config.quality = quality;
   CudaBatchRenderer renderer(cuda, config);
   const std::size_t pixels = static_cast<std::size_t>(g_width) * static_cast<std::size_t>(g_height);
   DeviceImages out(cuda, count * pixels);
@@ -165,7 +165,7 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
                                       truth.rgb.begin() + static_cast<std::ptrdiff_t>(rgb.size()));
   const gsnav_bench::Error e = gsnav_bench::error_of(rgb, rgb_truth);
   std::printf("%-6s %5zu  %9.4f %9.4f %9.0f   %.1e  %.1e  %6.1f  %.1e  %9.0f  %8.1f  %7.1f\n",
-              profile == Exponential::fast ? "fast" : "exact", count, gsnav_bench::median(ms),
+              quality == Quality::fast() ? "fast" : "exact", count, gsnav_bench::median(ms),
               gsnav_bench::quantile(ms, 0.9), 1000.0 / gsnav_bench::median(ms), e.max, e.p999, e.psnr,
               g_rgb_alone ? std::numeric_limits<double>::quiet_NaN()
                           : gsnav_bench::error_of(depth_seen, depth_truth).p99,
@@ -290,7 +290,7 @@ int main(int argc, char** argv) {
       "profile batch  ms/frame       p90  frames/s   rgb max  p99.9  psnr dB  depth p99     pairs  "
       "scratch MB  host us\n");
   if (counts.empty()) counts = {1, 8, 64, 256, 512};
-  for (const Exponential profile : {Exponential::fast, Exponential::exact}) {
-    for (const std::size_t count : counts) row(cuda, arrays, truth, count, profile);
+  for (const Quality& quality : {Quality::fast(), Quality::exact()}) {
+    for (const std::size_t count : counts) row(cuda, arrays, truth, count, quality);
   }
 }

@@ -277,7 +277,7 @@ struct BinBody {
 };
 
 struct BlendBody {
-  Exponential profile;
+  Quality quality;
   template <class S, class B>
   void operator()(benchmark::State& state, B& backend) const {
     const GaussianCloud cloud = wall(100000, 0);
@@ -285,7 +285,7 @@ struct BlendBody {
     SerialBackend serial;
     FrameStages<double, SerialBackend> truth(serial, cloud, front_camera(), config);
     truth.blend();
-    config.quality.exponential = profile;
+    config.quality = quality;
     FrameStages<S, B> stages(backend, cloud, front_camera(), config);
     for (auto _ : state) stages.blend();
     const Error e = error_of(stages.image(), truth.image());
@@ -321,10 +321,10 @@ void register_frame_kernels() {
   }
   add_cpu_rows("bin", "", BinBody{});
   add_cuda_row("bin", "", BinBody{});
-  add_cpu_rows("blend", "exact", BlendBody{Exponential::exact});
-  add_cuda_row("blend", "exact", BlendBody{Exponential::exact});
-  add_openmp_rows("blend", "fast", "float", BlendBody{Exponential::fast});
-  add_cuda_row("blend", "fast", BlendBody{Exponential::fast});
+  add_cpu_rows("blend", "exact", BlendBody{Quality::exact()});
+  add_cuda_row("blend", "exact", BlendBody{Quality::exact()});
+  add_openmp_rows("blend", "fast", "float", BlendBody{Quality::fast()});
+  add_cuda_row("blend", "fast", BlendBody{Quality::fast()});
 }
 
 }  // namespace gsnav_bench

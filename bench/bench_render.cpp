@@ -45,7 +45,7 @@ namespace {
 struct Variant {
   const char* name;
   unsigned outputs;
-  Exponential profile;
+  Quality quality;
   bool base_color = false;  ///< of a scene of SH degree 0
   bool axes =
       false;  ///< with axes computed beforehand in place of quaternions and scales (processors only)
@@ -56,20 +56,20 @@ struct Variant {
   RenderConfig config() const {
     RenderConfig c;
     c.outputs = outputs;
-    c.quality.exponential = profile;
+    c.quality = quality;
     return c;
   }
 };
 
-constexpr Variant kVariants[] = {{"rgbd/exact", kRgb | kAlpha | kMedianDepth, Exponential::exact},
-                                 {"rgbd/fast", kRgb | kAlpha | kMedianDepth, Exponential::fast},
-                                 {"rgb/exact", kRgb, Exponential::exact},
-                                 {"rgb/fast", kRgb, Exponential::fast},
-                                 {"rgb_sh0/fast", kRgb, Exponential::fast, true},
-                                 {"rgb_axes/fast", kRgb, Exponential::fast, false, true},
-                                 {"depth/exact", kMedianDepth, Exponential::exact},
-                                 {"depth/fast", kMedianDepth, Exponential::fast},
-                                 {"alpha/fast", kAlpha, Exponential::fast}};
+constexpr Variant kVariants[] = {{"rgbd/exact", kRgb | kAlpha | kMedianDepth, Quality::exact()},
+                                 {"rgbd/fast", kRgb | kAlpha | kMedianDepth, Quality::fast()},
+                                 {"rgb/exact", kRgb, Quality::exact()},
+                                 {"rgb/fast", kRgb, Quality::fast()},
+                                 {"rgb_sh0/fast", kRgb, Quality::fast(), true},
+                                 {"rgb_axes/fast", kRgb, Quality::fast(), false, true},
+                                 {"depth/exact", kMedianDepth, Quality::exact()},
+                                 {"depth/fast", kMedianDepth, Quality::fast()},
+                                 {"alpha/fast", kAlpha, Quality::fast()}};
 
 /// The workload's axes: what a static scene could keep in place of quaternions and scales.
 const std::vector<float>* axes_of_workload() {
@@ -265,7 +265,7 @@ void register_all() {
           OpenMPBackend backend(threads);
           render_frames(state, backend, v, w, h, threads);
         }));
-        if (w == 256 && v.profile == Exponential::fast && !v.base_color && !v.axes) {
+        if (w == 256 && v.quality == Quality::fast() && !v.base_color && !v.axes) {
           add_row("openmp" + std::to_string(threads) + "/batch64/" + suffix,
                   [=](benchmark::State& state) {
                     OpenMPBackend backend(threads);

@@ -31,17 +31,17 @@ namespace {
 struct Variant {
   const char* name;
   unsigned outputs;
-  Exponential profile;
+  Quality quality;
   bool base_color;  ///< of a scene of SH degree 0
 };
 
 constexpr Variant kVariants[] = {
-    {"rgb exact", kRgb, Exponential::exact, false},
-    {"rgb fast", kRgb, Exponential::fast, false},
-    {"rgb fast, SH 0", kRgb, Exponential::fast, true},
-    {"rgb+alpha+depth", kRgb | kAlpha | kMedianDepth, Exponential::fast, false},
-    {"depth", kMedianDepth, Exponential::fast, false},
-    {"alpha", kAlpha, Exponential::fast, false},
+    {"rgb exact", kRgb, Quality::exact(), false},
+    {"rgb fast", kRgb, Quality::fast(), false},
+    {"rgb fast, SH 0", kRgb, Quality::fast(), true},
+    {"rgb+alpha+depth", kRgb | kAlpha | kMedianDepth, Quality::fast(), false},
+    {"depth", kMedianDepth, Quality::fast(), false},
+    {"alpha", kAlpha, Quality::fast(), false},
 };
 
 constexpr int kRepeats = 3;
@@ -55,7 +55,7 @@ struct Measured {
 Measured measure(const Variant& v, const std::vector<Camera>& cameras, int threads) {
   RenderConfig config;
   config.outputs = v.outputs;
-  config.quality.exponential = v.profile;
+  config.quality = v.quality;
   const GaussianSet set = (v.base_color ? base_color_cloud() : workload().cloud).set();
   OpenMPBackend plain_backend(threads);
   TimedBackend<OpenMPBackend> timed_backend(threads);

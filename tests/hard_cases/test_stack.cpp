@@ -110,6 +110,42 @@ TEST_CASE("N42_saturation_stop") {
   MESSAGE("colour and transmittance are off by " << worst);
 }
 
+TEST_CASE("normalize_closed: a closed pixel is divided by its alpha, an open one is not") {
+  struct Row {
+    std::vector<double> opacities;
+    bool closes;  // at a transmittance of 0.1
+  };
+  for (const Row& row :
+       {Row{{0.6, 0.6, 0.6, 0.9}, true}, Row{{0.95, 0.9}, true}, Row{{0.6, 0.7}, false}}) {
+    const GaussianCloud cloud = layers(row.opacities, 421);
+    const Blend truth(cloud, 0.99, 0.1, false);
+    REQUIRE((truth.transmittance < 0.1L) == row.closes);
+    const Real scale = row.closes ? 1 / (1 - truth.transmittance) : 1;
+    const Real through = row.closes ? 0 : truth.transmittance;
+    RenderConfig config = all_outputs();
+    config.quality.transmittance_min = 0.1;
+    config.quality.normalize_closed = true;
+    config.background = {0.7, 0.7, 0.7};
+    render_everywhere({&cloud}, axis_camera(kSize, 64), config, [&](const auto& f, const auto&) {
+      const auto off = [](auto seen, Real expected) {
+        return std::abs(static_cast<double>(seen) - static_cast<double>(expected));
+      };
+      CHECK(off(f.alpha[kMiddle], 1 - through) < 1e-6);
+      CHECK(off(f.rgb[3 * kMiddle], scale * truth.red + 0.7L * through) < 1e-6);
+      CHECK(off(f.accumulated_depth[kMiddle], scale * truth.depth) < 1e-5);
+      CHECK(off(f.expected_depth[kMiddle], truth.depth / (1 - truth.transmittance)) < 1e-5);
+    });
+    // The rules of other renderers have no such step.
+    config.compat = Compat::inria;
+    config.background = {};
+    const Blend theirs(cloud, 0.99, 0.1, true);
+    on_axis(cloud, config, [&](double alpha, double red, const auto&) {
+      CHECK(std::abs(alpha - static_cast<double>(1 - theirs.transmittance)) < 1e-6);
+      CHECK(std::abs(red - static_cast<double>(theirs.red)) < 1e-6);
+    });
+  }
+}
+
 TEST_CASE("N43_faint_fog") {
   const auto nothing = [](double alpha, double red, const auto&) {
     CHECK(alpha == 0);

@@ -107,6 +107,7 @@ __device__ void write(const BlendArgs& b, std::size_t pixel,
     state = {blended, {__uint_as_float(median)}};
   }
   if constexpr (Mesh) close_by_mesh<Color>(state, b.raster.rules, b.raster.mesh, pixel);
+  state = finished(b.raster.rules, state);
   for_each_image<D>(b.raster.images, [&]<Output O>(float* image) {
     if constexpr (O == kRgb) {
       if (b.rgb == nullptr && b.rgb8 == nullptr) return;

@@ -54,6 +54,7 @@ inline RenderConfig lod_config(RenderConfig config, const LodStats& stats = {}) 
   config.quality.exponential = Exponential::fast;
   if (stats.shown > 0 && 2 * stats.merged >= stats.shown) {
     config.quality.transmittance_min = std::max(config.quality.transmittance_min, 0.001);
+    config.quality.normalize_closed = true;
   }
   return config;
 }

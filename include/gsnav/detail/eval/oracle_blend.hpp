@@ -87,12 +87,14 @@ struct OraclePixel {
   }
 
   void write(const OracleRules& rules, OracleFrames& out, std::size_t pixel) const noexcept {
-    const Vec3d rgb = color + rules.background * transmittance;
+    const bool opaque = closed && rules.normalize_closed && transmittance < 1;
+    const double scale = opaque ? 1 / (1 - transmittance) : 1, through = opaque ? 0 : transmittance;
+    const Vec3d rgb = color * scale + rules.background * through;
     for (int c = 0; c < 3; ++c) out.rgb[3 * pixel + static_cast<std::size_t>(c)] = rgb[c];
-    out.alpha[pixel] = 1 - transmittance;
+    out.alpha[pixel] = 1 - through;
     out.median_depth[pixel] = median;
     out.expected_depth[pixel] = weights > 0 ? accumulated / weights : 0;
-    out.accumulated_depth[pixel] = accumulated;
+    out.accumulated_depth[pixel] = accumulated * scale;
     out.first_hit_depth[pixel] = first_hit;
     out.undecided[pixel] = undecided ? 1 : 0;
     out.undecided_depth[pixel] = undecided_depth ? 1 : 0;

@@ -32,6 +32,7 @@ struct OracleRecord {
 /// The rules of blending, limits in the form they are compared in.
 struct OracleRules {
   double log2_alpha_min, max_alpha, transmittance_min, first_hit_tau;
+  bool normalize_closed;
   Vec3d background;
 };
 
@@ -108,8 +109,12 @@ OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> ga
   const bool truncated = config.kind != OracleKind::untruncated;
   const double infinity = std::numeric_limits<double>::infinity();
   OracleScene<Model> scene;
-  scene.rules = {truncated ? std::log2(c.quality.alpha_min) : -infinity, c.quality.max_alpha,
-                 truncated ? c.quality.transmittance_min : 0.0, c.first_hit_tau, c.background};
+  scene.rules = {truncated ? std::log2(c.quality.alpha_min) : -infinity,
+                 c.quality.max_alpha,
+                 truncated ? c.quality.transmittance_min : 0.0,
+                 c.first_hit_tau,
+                 c.quality.normalize_closed,
+                 c.background};
   scene.rect = oracle_rect(config, camera);
   scene.boxed = config.boxed;
   scene.mesh = config.mesh;

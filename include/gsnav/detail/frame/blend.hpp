@@ -54,6 +54,23 @@ struct RasterArgs {
   }
 };
 
+/// Applies BlendRules::normalize_closed to a finished pixel (or a pack of them): a closed pixel becomes
+/// opaque, and its sums are divided by the alpha that it had.
+template <class State, class S>
+GSNAV_HD State finished(const BlendRules<S>& rules, State state) noexcept {
+  if (!rules.normalize_closed) return state;
+  using L = decltype(state.transmittance);
+  const L one(S(1)), t = state.transmittance;
+  const auto open = state.open(rules);
+  const L scale = select(open, one, one / (one - t));
+  state.r = state.r * scale;
+  state.g = state.g * scale;
+  state.b = state.b * scale;
+  if constexpr (requires { state.accumulated; }) state.accumulated = state.accumulated * scale;
+  state.transmittance = select(open, t, L(S(0)));
+  return state;
+}
+
 /// What a pixel (or a pack of them) ends as.
 template <class S, class L>
 GSNAV_HD Vec3<L> pixel_color(const RasterArgs<S>& args, const BlendColor<L>& state) noexcept {
@@ -99,7 +116,8 @@ GSNAV_HD auto pixel_value(const RasterArgs<S>& args, const State& state) noexcep
 /// Writes a finished pixel.
 template <class S, DepthMode D>
 GSNAV_HD void write_pixel(const RasterArgs<S>& args, std::size_t pixel,
-                          const BlendState<S, D>& state) noexcept {
+                          const BlendState<S, D>& blended) noexcept {
+  const BlendState<S, D> state = finished(args.rules, blended);
   for_each_image<D>(args.images, [&]<Output O>(S* image) GSNAV_INLINED {
     if (image == nullptr) return;
     const auto value = pixel_value<O>(args, state);

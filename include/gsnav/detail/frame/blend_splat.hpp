@@ -20,8 +20,9 @@ struct BlendRules {
   S transmittance_min{S(1e-4)};  ///< a pixel is closed by the Gaussian that takes T below this
   S first_hit_tau{S(0.5)};
   S log2_alpha_min{S(-7.9943534368588579)};  ///< log2 of the smallest alpha that is blended
-  S return_alpha{S(0)};         ///< expected depth has no return where alpha is not above this
-  bool exclusive_stop = false;  ///< the Gaussian that closes a pixel is not blended (Compat)
+  S return_alpha{S(0)};           ///< expected depth has no return where alpha is not above this
+  bool exclusive_stop = false;    ///< the Gaussian that closes a pixel is not blended (Compat)
+  bool normalize_closed = false;  ///< a closed pixel counts as opaque: its sums are divided by 1 - T
 };
 
 /// Transmittance of a pixel (or a pack of them) before and after a splat or a surface, and the weight

@@ -111,7 +111,9 @@ class TilePixels {
         // Where a tile has fewer blocks in a row, any block fills the pack.
         const auto block = [&](int i) { return row + (x / kBlockWidth + i) % blocks; };
         for_each_image<D>(args_.images, [&]<Output O>(float* image) {
-          const auto value = [&](int i) { return pixel_value<O>(args_, whole_state(block(i))); };
+          const auto value = [&](int i) {
+            return pixel_value<O>(args_, finished(args_.rules, whole_state(block(i))));
+          };
           if constexpr (O != kRgb) {
             write_plane(place, image, value);
           } else if constexpr (Color) {

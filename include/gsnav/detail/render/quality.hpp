@@ -21,17 +21,23 @@ struct Quality {
   Exponential exponential = Exponential::exact;
   /// In (0, 1): a Gaussian is not blended where its alpha is lower. Below 2^-126 it is 2^-126.
   double alpha_min = 1.0 / 255;
-  double max_alpha = 0.99;           ///< in (0, 1]: upper limit of a Gaussian's alpha
-  double transmittance_min = 1e-4;   ///< in [0, 1): a pixel is closed once its transmittance is lower
+  double max_alpha = 0.99;          ///< in (0, 1]: upper limit of a Gaussian's alpha
+  double transmittance_min = 1e-4;  ///< in [0, 1): a pixel is closed once its transmittance is lower
+  /// Divides the colour and the accumulated depth of a closed pixel by its alpha, and makes its alpha 1:
+  /// the transmittance at which blending stopped shows no background. Has no effect with a Compat.
+  bool normalize_closed = false;
   int max_sh_degree = kMaxShDegree;  ///< in [0, 3]: SH bands above it are left out
   int key_bits = 32;                 ///< in [8, 32]: bits of the sort key that are compared
 
   /// The contract; float32 rounding is the only error.
   static constexpr Quality exact() noexcept { return {}; }
-  /// `exact` with Exponential::fast.
+  /// A cheaper exponential; blending stops at a transmittance of 1/1000, and closed pixels are
+  /// normalized.
   static constexpr Quality fast() noexcept {
     Quality q;
     q.exponential = Exponential::fast;
+    q.transmittance_min = 1e-3;
+    q.normalize_closed = true;
     return q;
   }
   bool operator==(const Quality&) const = default;

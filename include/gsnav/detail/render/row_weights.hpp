@@ -81,9 +81,9 @@ struct RowWeightsWorkspace {
 };
 
 /// Draws a set and raises `most` [rows] to the largest part of a pixel's light, alpha times
-/// transmittance, that each Gaussian takes anywhere in the image. By the rules of Quality::fast(), those
-/// of one depth in row order. The same bits for any number of threads. Errors: those of render_camera;
-/// unsupported (a response other than Response::ewa).
+/// transmittance, that each Gaussian takes anywhere in the image. By the contract with
+/// Exponential::fast, those of one depth in row order. The same bits for any number of threads. Errors:
+/// those of render_camera; unsupported (a response other than Response::ewa).
 template <Backend B>
 requires is_host_backend<B> Status add_row_weights(B& backend, RowWeightsWorkspace<B>& ws,
                                                    GaussianSet set, const Camera& camera,
@@ -93,7 +93,7 @@ requires is_host_backend<B> Status add_row_weights(B& backend, RowWeightsWorkspa
                                         " values for " + std::to_string(set.gaussians.size()) + " rows"};
   }
   RenderConfig config;
-  config.quality = Quality::fast();
+  config.quality.exponential = Exponential::fast;
   config.outputs = kAlpha;
   config.tuning.tile_size = detail::WeighTile::kSide;
   config.tuning.depth_slices = 1;  // the lists of a whole frame are read

@@ -61,6 +61,7 @@ BlendRules<S> blend_rules(const RenderConfig& c) noexcept {
   r.transmittance_min = static_cast<S>(c.quality.transmittance_min);
   r.first_hit_tau = static_cast<S>(c.first_hit_tau);
   r.log2_alpha_min = static_cast<S>(log2_alpha_min(c.quality));
+  r.normalize_closed = c.quality.normalize_closed && c.compat == Compat::none;
   detail::follow(c.compat, r);
   return r;
 }
