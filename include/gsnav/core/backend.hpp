@@ -13,7 +13,12 @@ namespace gsnav {
 struct HostSpace {};
 
 /// Source and destination of a copy: host or device memory.
-enum class CopyKind { host_to_host, host_to_device, device_to_host, device_to_device };
+enum class CopyKind {
+  host_to_host,     ///< within host memory
+  host_to_device,   ///< from host memory to the backend's memory
+  device_to_host,   ///< from the backend's memory to host memory
+  device_to_device  ///< within the backend's memory
+};
 
 namespace detail {
 // Stands for any kernel in the concept Backend.

@@ -29,7 +29,7 @@ struct RenderOptions {
 ///
 /// The renderer keeps the scene in the device's memory, and its scratch memory between calls. It owns or
 /// shares all that it needs, so arguments need not outlive a call (docs/ownership.md). Images have the
-/// same bits as those of BasicRenderer<float, B>, where B is the device's backend. Not thread-safe:
+/// same bits as those of `BasicRenderer<float, B>`, where B is the device's backend. Not thread-safe:
 /// calls of one renderer must not overlap. After a move, the old object returns invalid_argument.
 ///
 /// @code

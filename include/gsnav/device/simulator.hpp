@@ -26,7 +26,7 @@ class SimulatorEngine;
 
 /// Navigation simulator for one agent on any device: scene, avatars, sensors and the PointNav task.
 ///
-/// It is BasicSimulator<B>, compiled for the device's backend B: the same calls return the same bits.
+/// It is `BasicSimulator<B>`, compiled for the device's backend B: the same calls return the same bits.
 /// After a move, calls of the old object that can fail return invalid_argument; do not make others.
 ///
 /// @code
@@ -116,7 +116,7 @@ class Simulator {
 
 /// Navigation simulator for N environments over M scenes on any device, stepped by one call.
 ///
-/// It is BasicBatchSimulator<B>, compiled for the device's backend B. After an error, call reset() to
+/// It is `BasicBatchSimulator<B>`, compiled for the device's backend B. After an error, call reset() to
 /// start again. After a move, the old object has no environments and returns invalid_argument.
 ///
 /// @code

@@ -32,15 +32,17 @@ inline constexpr std::size_t kChunkPart = 64;
 
 /// Bounds of all Gaussians of a chunk, in the asset's frame.
 struct ChunkBounds {
-  Vec3d low{}, high{};    ///< box of the means, metres
+  Vec3d low{},            ///< smallest coordinates of the means, metres
+      high{};             ///< largest coordinates of the means, metres
   float scale_max = 0;    ///< largest standard deviation, metres
   float opacity_max = 0;  ///< in [0, 1]
 };
 
 /// Constants that decode the packed rows of one chunk (detail/frame/set_rows.hpp).
 struct PackedChunk {
-  Vec3<float> low{}, step{};  ///< A mean's offset is low + step * code, metres.
-  float scale_step = 0;       ///< The square root of a standard deviation is scale_step * code.
+  Vec3<float> low{},     ///< offset of a mean with code 0, metres
+      step{};            ///< a mean's offset is low + step * code, metres
+  float scale_step = 0;  ///< The square root of a standard deviation is scale_step * code.
   float sh_steps[3]{};  ///< A coefficient of band 1, 2 or 3 is its step * code, if bands are stored as 8
                         ///< bits.
 };
@@ -86,8 +88,11 @@ struct ShapeRows {
   View<const std::uint16_t> codes;
   View<const PackedChunk> chunks;  ///< constants that decode `codes`, [ceil(N / kProjectChunk)]
 
-  /// First planes of `codes` by content, and the number of planes.
-  static constexpr int kScales = 0, kQuats = 3, kOpacity = 6, kMeans = 7, kCodePlanes = 10;
+  static constexpr int kScales = 0,  ///< first plane of `codes` with scales
+      kQuats = 3,                    ///< first plane with rotations
+      kOpacity = 6,                  ///< plane with opacities
+      kMeans = 7,                    ///< first plane with means
+      kCodePlanes = 10;              ///< number of planes
 
   /// True if shapes and opacities are packed. Always false in device code.
   GSNAV_HD bool packed() const noexcept { return GSNAV_DEVICE_CODE == 0 && !codes.empty(); }

@@ -11,11 +11,14 @@ namespace gsnav {
 /// its centre at (j + 0.5, i + 0.5); row 0 is the top. All values are double; kernels convert them to
 /// their scalar type.
 struct Camera {
-  Affine3<double> viewmat{};      ///< world to camera, rigid, metres
-  double fx = 128, fy = 128;      ///< focal lengths in pixels, > 0
-  double cx = 128, cy = 128;      ///< principal point in pixels; may be off-centre
-  int width = 256, height = 256;  ///< image size in pixels
-  double near_plane = 0.2;        ///< Metres. A Gaussian whose centre has z <= near_plane is not drawn.
+  Affine3<double> viewmat{};  ///< world to camera, rigid, metres
+  double fx = 128,            ///< horizontal focal length in pixels, > 0
+      fy = 128;               ///< vertical focal length in pixels, > 0
+  double cx = 128,            ///< column of the principal point in pixels; may be off-centre
+      cy = 128;               ///< row of the principal point in pixels; may be off-centre
+  int width = 256,            ///< image width in pixels
+      height = 256;           ///< image height in pixels
+  double near_plane = 0.2;    ///< Metres. A Gaussian whose centre has z <= near_plane is not drawn.
   /// Also skip a Gaussian whose centre has z <= near_sigma times its standard deviation along the view
   /// axis. Use 0 for tools, and 1 for simulator sensors, whose near plane is close to zero.
   double near_sigma = 0.0;

@@ -11,14 +11,16 @@ namespace gsnav {
 /// (radius 0) are valid.
 template <class L>
 struct Capsule {
-  Vec3<L> p0{}, p1{};  ///< ends of the segment, metres
-  L radius{};          ///< metres, >= 0
+  Vec3<L> p0{},  ///< first end of the segment, metres
+      p1{};      ///< second end of the segment, metres
+  L radius{};    ///< metres, >= 0
 };
 
 /// A capsule whose endpoints and radius move linearly from `begin` to `end` during one tick.
 template <class L>
 struct MovingCapsule {
-  Capsule<L> begin{}, end{};  ///< at the start and at the end of the tick
+  Capsule<L> begin{},  ///< capsule at the start of the tick
+      end{};           ///< capsule at the end of the tick
 };
 
 /// A moving capsule in the world (metres, Y up), with the avatar that it belongs to.

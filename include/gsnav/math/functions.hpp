@@ -214,7 +214,11 @@ GSNAV_HD bool is_finite(long double a) noexcept {
 /// Method of exp2 in float. Relative errors over [-126, 126]: 1.7e-7 for degree5 (half of it rounding),
 /// 1.0e-4 for degree3. `hardware` is a GPU's ex2.approx instruction with 1.8e-7 (PTX ISA); on a CPU it
 /// is degree5.
-enum class Exp2 { degree5, degree3, hardware };
+enum class Exp2 {
+  degree5,  ///< polynomial of degree 5
+  degree3,  ///< polynomial of degree 3
+  hardware  ///< a GPU's own instruction
+};
 
 namespace detail {
 

@@ -9,7 +9,10 @@ namespace gsnav {
 /// xyzw are converted in io and interop.
 template <class L>
 struct Quat {
-  L w{1}, x{0}, y{0}, z{0};  ///< real part, then the imaginary parts
+  L w{1},    ///< real part
+      x{0},  ///< coefficient of i
+      y{0},  ///< coefficient of j
+      z{0};  ///< coefficient of k
 };
 
 using Quatf = Quat<float>;   ///< quaternion of floats

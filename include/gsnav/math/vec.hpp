@@ -9,13 +9,16 @@ namespace gsnav {
 /// Vector of two components. `L` is a scalar (float, double) or a SIMD pack.
 template <class L>
 struct Vec2 {
-  L x{}, y{};  ///< components
+  L x{},    ///< first component
+      y{};  ///< second component
 };
 
 /// Vector of three components. `L` is a scalar (float, double) or a SIMD pack.
 template <class L>
 struct Vec3 {
-  L x{}, y{}, z{};  ///< components
+  L x{},    ///< first component
+      y{},  ///< second component
+      z{};  ///< third component
 
   /// Component i: 0 is x, 1 is y, 2 is z.
   GSNAV_HD constexpr L& operator[](int i) noexcept { return i == 0 ? x : (i == 1 ? y : z); }

@@ -32,14 +32,16 @@ struct RenderStats {
 /// requested are empty.
 template <class S>
 struct Frames {
-  std::size_t cameras = 0, height = 0, width = 0;  ///< C, H, W
-  std::vector<S> rgb;                              ///< [C][H][W][3]
-  std::vector<S> alpha;                            ///< [C][H][W]
-  std::vector<S> median_depth;                     ///< [C][H][W] metres; 0 where the ray hits nothing
-  std::vector<S> expected_depth;                   ///< [C][H][W] metres
-  std::vector<S> accumulated_depth;                ///< [C][H][W] metres
-  std::vector<S> first_hit_depth;                  ///< [C][H][W] metres
-  std::vector<RenderStats> stats;                  ///< [C]
+  std::size_t cameras = 0,           ///< number of cameras, C
+      height = 0,                    ///< rows of an image, H
+      width = 0;                     ///< columns of an image, W
+  std::vector<S> rgb;                ///< [C][H][W][3]
+  std::vector<S> alpha;              ///< [C][H][W]
+  std::vector<S> median_depth;       ///< [C][H][W] metres; 0 where the ray hits nothing
+  std::vector<S> expected_depth;     ///< [C][H][W] metres
+  std::vector<S> accumulated_depth;  ///< [C][H][W] metres
+  std::vector<S> first_hit_depth;    ///< [C][H][W] metres
+  std::vector<RenderStats> stats;    ///< [C]
 
   /// Pointer to the vector of one image.
   using VectorPointer = std::vector<S> Frames::*;

@@ -231,9 +231,10 @@ GSNAV_HD auto blend_influences(const Joint& joint, const Weight& weight) noexcep
 /// Inputs of skinning for one Gaussian.
 template <int K>
 struct SkinRow {
-  std::uint16_t joints[K], parts[K];  ///< joint indices, and weights in parts of kWeightParts
-  Vec3<float> mean;                   ///< canonical position, metres
-  Quat<float> quat;                   ///< canonical orientation
+  std::uint16_t joints[K],  ///< joint indices
+      parts[K];             ///< weights, in parts of kWeightParts
+  Vec3<float> mean;         ///< canonical position, metres
+  Quat<float> quat;         ///< canonical orientation
 };
 
 /// Reads the inputs of Gaussian i.
@@ -249,7 +250,7 @@ GSNAV_HD SkinRow<K> read_skin_row(const SkinningArgs<S, Out>& args, std::size_t 
   return row;
 }
 
-/// Skins one Gaussian. `joint_at(index)` returns a joint as Affine3<S>, or a reference to it.
+/// Skins one Gaussian. `joint_at(index)` returns a joint as `Affine3<S>`, or a reference to it.
 template <class S, int K, class JointAt>
 GSNAV_HD Skinned<S> skin_row(const SkinRow<K>& row, const JointAt& joint_at, bool rotation) noexcept {
   const auto joint = [&](int k) GSNAV_INLINED -> decltype(auto) { return joint_at(row.joints[k]); };

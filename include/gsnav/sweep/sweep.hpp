@@ -58,12 +58,14 @@ GSNAV_HD bool id_less(std::uint32_t avatar_a, std::uint32_t bone_a, std::uint32_
 /// The first body that an agent's motion runs into.
 template <class S>
 struct FirstImpact {
-  SweepResult<S> sweep{};              ///< Relative to the swept interval. Valid if `hit`.
-  bool hit = false;                    ///< true if the agent must stop
-  std::uint32_t avatar = 0, bone = 0;  ///< the body that was hit, if `hit`
-  bool started_overlapping = false;    ///< true if some body overlapped the agent at the start
-  bool pushed = false;                 ///< true if some body in contact came closer by its own motion
-  std::uint32_t pushed_avatar = 0, pushed_bone = 0;  ///< the smallest (avatar, bone) of those bodies
+  SweepResult<S> sweep{};            ///< Relative to the swept interval. Valid if `hit`.
+  bool hit = false;                  ///< true if the agent must stop
+  std::uint32_t avatar = 0,          ///< avatar that was hit, if `hit`
+      bone = 0;                      ///< index of the capsule within the avatar
+  bool started_overlapping = false;  ///< true if some body overlapped the agent at the start
+  bool pushed = false;               ///< true if some body in contact came closer by its own motion
+  std::uint32_t pushed_avatar = 0,   ///< smallest avatar of those bodies, if `pushed`
+      pushed_bone = 0;               ///< smallest capsule of that avatar
 };
 
 /// Sweeps `agent` against the part [u0, u1] of the bodies' motion and merges the result into `best`.
@@ -107,9 +109,11 @@ GSNAV_HD void first_impact(const MovingCapsule<double>& agent, View<const Dynami
 struct Clearance {
   /// Metres. Negative: depth of overlap. Infinite: no body.
   double distance = std::numeric_limits<double>::infinity();
-  std::uint32_t avatar = 0, bone = 0;  ///< the body, if distance is finite
-  Vec3d on_agent{}, on_body{};         ///< closest points of the two surfaces, world frame
-  Vec3d normal{};                      ///< unit vector from the body to the agent
+  std::uint32_t avatar = 0,  ///< avatar of the body, if distance is finite
+      bone = 0;              ///< index of the capsule within the avatar
+  Vec3d on_agent{},          ///< closest point of the agent's surface, world frame
+      on_body{};             ///< closest point of the body's surface, world frame
+  Vec3d normal{};            ///< unit vector from the body to the agent
 };
 
 /// Computes the signed gap between a standing agent and the nearest body, and merges it into `best`. The
