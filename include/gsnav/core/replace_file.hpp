@@ -40,7 +40,7 @@ inline std::filesystem::path link_target(std::filesystem::path path) {
   for (int i = 0; i < kMostLinks && std::filesystem::is_symlink(path, error); ++i) {
     const std::filesystem::path to = std::filesystem::read_symlink(path, error);
     if (error) break;
-    path = path.parent_path() / to;  // // `to` itself if it is absolute
+    path = path.parent_path() / to;  // `to` itself if it is absolute
   }
   return path;
 }
@@ -165,7 +165,7 @@ class OutputFile {
       fd = open_aside();
     }
     if (fd < 0) return unwritable(path, errno);
-    // // Best effort: without the rights, the file keeps our owner and mode.
+    // Best effort: without the rights, the file keeps our owner and mode.
     if (exists && !in_place_) {
       [[maybe_unused]] const int owner = ::fchown(fd, old.st_uid, old.st_gid);
       [[maybe_unused]] const int mode = ::fchmod(fd, old.st_mode & 0777);
@@ -224,7 +224,7 @@ class OutputFile {
   /// A name in the target's folder that no other thread or process uses.
   std::filesystem::path unique_name() const {
     static std::atomic<unsigned> next{0};
-    constexpr std::size_t kLongest = 200;  // // a name has at most 255 bytes; the suffix needs the rest
+    constexpr std::size_t kLongest = 200;  // a name has at most 255 bytes; the suffix needs the rest
     const std::string name = target_.filename().string().substr(0, kLongest);
     return target_.parent_path() /
            (name + "." + std::to_string(::getpid()) + "-" + std::to_string(next++) + ".part");
@@ -233,7 +233,7 @@ class OutputFile {
   /// Calls make(name) with unique names until one is free. Returns the result of the last call.
   template <class F>
   int with_unique_name(const F& make) {
-    constexpr int kMostTries = 100;  // // killed processes with the same id may have left files
+    constexpr int kMostTries = 100;  // killed processes with the same id may have left files
     int made = -1;
     for (int i = 0; i < kMostTries; ++i) {
       aside_ = unique_name();

@@ -94,7 +94,7 @@ Mat3<S> from_glm(const GlmMat3<S>& m) noexcept {
 /// Copy of a quaternion.
 template <class S>
 GlmQuat<S> to_glm(const Quat<S>& q) noexcept {
-  GlmQuat<S> r;  // // set by name: the order of the constructor's arguments depends on GLM's version
+  GlmQuat<S> r;  // set by name: the order of the constructor's arguments depends on GLM's version
   r.w = q.w, r.x = q.x, r.y = q.y, r.z = q.z;
   return r;
 }

@@ -117,7 +117,7 @@ GSNAV_HD float sqrt_above(float a) noexcept {
 #if defined(__CUDA_ARCH__)
   float y;
   asm("sqrt.approx.ftz.f32 %0, %1;" : "=f"(y) : "f"(a));
-  // // The instruction gives 0 for subnormal input; the constant covers it.
+  // The instruction gives 0 for subnormal input; the constant covers it.
   return ::fmaf(y, 1.000001f, 2e-19f);
 #else
   return sqrt(a);

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The compiled component gsnav::openmp has the lane kernels for SSE2, AVX2 and AVX-512 and chooses at
-// run time. CMake's target sets GSNAV_OPENMP_COMPILED. Header-only use is possible, but must be asked
-// for: every translation unit then compiles the kernels itself (about a minute and 1 GB), for the one
-// instruction set of its own flags (-march=...), and without optimisation they are many times slower.
+// The compiled component gsnav::openmp has SIMD kernels for SSE2, AVX2 and AVX-512 and chooses at run
+// time. Its CMake target sets GSNAV_OPENMP_COMPILED.
+//
+// Header-only use must be requested with GSNAV_OPENMP_HEADER_ONLY. Every translation unit then compiles
+// the kernels itself (about a minute and 1 GB), for the instruction set of its own flags (-march=...).
+// Without optimisation they are many times slower.
 #if defined(GSNAV_OPENMP_HEADER_ONLY)
 #undef GSNAV_OPENMP_COMPILED
 #elif !defined(GSNAV_OPENMP_COMPILED)
@@ -41,13 +43,13 @@
 namespace gsnav {
 
 #if !defined(GSNAV_OPENMP_COMPILED)
-// Names of its own for each instruction set: a program may link units that were compiled for several of
-// them, and others that use the component.
+// A namespace per instruction set, so that a program may link units compiled for several sets, and
+// others that use the component.
 inline namespace GSNAV_LANES_TAG {
 #endif
 
-/// The lane kernels of one instruction set: Gaussians, meshes (which a frame draws first), skinning and
-/// capsules. lanes::kernel_table fills it.
+/// SIMD kernels of one instruction set, for Gaussians, meshes, skinning and capsules.
+/// lanes::kernel_table fills it.
 struct LaneKernels {
   const char* name;
   int width;
@@ -72,24 +74,26 @@ struct LaneKernels {
 };
 
 #if defined(GSNAV_OPENMP_COMPILED)
-/// The widest lane kernels in gsnav::openmp that this processor runs (baseline, AVX2, AVX-512). The
-/// environment variable GSNAV_ISA=baseline|avx2|avx512 lowers the choice.
+/// Kernels of gsnav::openmp for the widest instruction set that this processor supports (baseline, AVX2,
+/// AVX-512). The environment variable GSNAV_ISA=baseline|avx2|avx512 can lower the choice.
 const LaneKernels& lane_kernels() noexcept;
 #else
-/// Header only: the lane kernels that this translation unit's flags give.
+/// Kernels for this translation unit's flags (header-only use).
 inline const LaneKernels& lane_kernels() noexcept {
   static constexpr LaneKernels k = lanes::kernel_table<LaneKernels>("native");
   return k;
 }
 #endif
 
-/// Runs on the processor's cores. float32 frames go through lane kernels; every other scalar through
-/// the generic ones. Results do not depend on the number of threads. The threads are a pool of the
-/// backend's own, which copies share (detail/core/thread_pool.hpp says what holds for them): OpenMP only
-/// tells how many.
+/// Backend for all CPU cores. float32 frames use SIMD kernels; other scalars use the generic ones.
+/// Results do not depend on the number of threads.
+///
+/// Threads are a pool that the backend owns and its copies share (see detail/core/thread_pool.hpp).
+/// OpenMP only determines the default number.
 class OpenMPBackend : public HostMemory {
  public:
-  /// `threads` = 0 takes OpenMP's default (OMP_NUM_THREADS), without OpenMP the number of cores.
+  /// @param threads number of threads. 0: OpenMP's default (OMP_NUM_THREADS), or without OpenMP the
+  ///   number of cores.
   explicit OpenMPBackend(int threads = 0)
       : threads_(threads > 0 ? threads : default_threads()),
         pool_(threads_ > 1 ? std::make_shared<ThreadPool>(threads_) : nullptr) {}
@@ -97,17 +101,18 @@ class OpenMPBackend : public HostMemory {
   int threads() const noexcept { return threads_; }
   std::size_t concurrency() const noexcept { return static_cast<std::size_t>(threads_); }
 
-  /// Optional member: batches of cameras go by whole frames, each on one thread.
+  /// Backend for one thread. With it, batches of cameras run one frame per thread.
   OpenMPBackend one_thread() const { return OpenMPBackend(1); }
 
-  /// An exception that leaves f on more than one thread ends the process.
+  /// Calls f(i) for i in [0, n), in any order. An exception that leaves f terminates the process if
+  /// there is more than one thread.
   template <class F>
   void parallel_for(std::size_t n, const F& f) {
     if (threads_ < 2 || n < 2) {
       for (std::size_t i = 0; i < n; ++i) f(i);
       return;
     }
-    // Pieces are handed out as threads come free: work items differ in cost.
+    // More pieces than threads, because work items differ in cost.
     const std::size_t piece = n / (concurrency() * 32) + 1;
     pool_->run(static_cast<std::uint32_t>((n + piece - 1) / piece), [&f, n, piece](std::uint32_t p) {
       const std::size_t begin = p * piece, end = std::min(n, begin + piece);
@@ -116,12 +121,12 @@ class OpenMPBackend : public HostMemory {
   }
   Status synchronize() { return {}; }
 
-  // Stages in lanes (core/stages.hpp).
+  // Stages with SIMD kernels (core/stages.hpp).
   void run(stage::Project, const ViewedSet<float>& args, const ProjectOutputs<float>& out) {
     const auto kernel = lane_kernels().project_chunk;
     parallel_for(args.chunk_count(), [&args, &out, kernel](std::size_t c) { kernel(args, out, c); });
   }
-  /// Some of the chunks. Leaves out what reaches no open cell (ProjectOutputs::open).
+  /// Projects the listed chunks. Skips splats that reach no open cell (ProjectOutputs::open).
   void run(stage::Project, const ViewedSet<float>& args, const ProjectOutputs<float>& out,
            View<const std::uint32_t> chunks) {
     const auto kernel = lane_kernels().project_chunk;
@@ -171,7 +176,7 @@ class OpenMPBackend : public HostMemory {
   }
 
  private:
-  /// A kernel as it was compiled for the processor's lanes.
+  /// A kernel compiled for the processor's lanes, with its arguments.
   template <class Args>
   struct Compiled {
     const Args& args;
@@ -181,7 +186,7 @@ class OpenMPBackend : public HostMemory {
   template <class Args>
   Compiled(const Args&, void (*)(const Args&, std::size_t) noexcept) -> Compiled<Args>;
 
-  /// kernel(args, begin, end) over all of args.size().
+  /// Calls kernel(args, begin, end) for ranges that cover [0, args.size()).
   template <class Args>
   void in_ranges(const Args& args, void (*kernel)(const Args&, std::size_t, std::size_t) noexcept) {
     constexpr std::size_t kRange = 1024;
@@ -208,7 +213,7 @@ static_assert(Backend<OpenMPBackend>);
 #if !defined(GSNAV_OPENMP_COMPILED)
 }  // namespace GSNAV_LANES_TAG
 #else
-// Compiled in gsnav::openmp: whoever renders or skins need not.
+// Compiled in gsnav::openmp, so that users need not compile them.
 extern template Status render_camera<float, OpenMPBackend>(OpenMPBackend&,
                                                            RenderWorkspace<float, OpenMPBackend>&,
                                                            std::span<const GaussianSet>, const Camera&,

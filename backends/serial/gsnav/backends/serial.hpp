@@ -8,8 +8,8 @@
 
 namespace gsnav {
 
-/// Runs everything in order on the calling thread, by the generic kernels, in any scalar. In double it
-/// is the reference that every other backend is measured against.
+/// Backend that runs everything in order on the calling thread, with the generic kernels, in any scalar.
+/// In double it is the reference for all other backends.
 class SerialBackend : public HostMemory {
  public:
   template <class F>

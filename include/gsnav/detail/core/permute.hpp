@@ -19,7 +19,7 @@ template <Backend B, class T>
 void permute_rows(B& backend, std::span<const std::uint32_t> order, std::size_t stride,
                   std::vector<T>& values, std::vector<T>& room) {
   static_assert(is_host_backend<B>);
-  constexpr std::size_t kColumns = 9;  // // a fifth of the SH coefficients of degree 3
+  constexpr std::size_t kColumns = 9;  // a fifth of the SH coefficients of degree 3
   if (values.empty()) return;
   const std::size_t width = std::min(stride, kColumns), n = order.size();
   if (room.empty()) {

@@ -64,7 +64,7 @@ class SmallVector {
     capacity_ = n;
   }
   void push_back(const T& value) {
-    const T copy = value;  // // `value` may be an element of this vector
+    const T copy = value;  // `value` may be an element of this vector
     if (size_ == capacity_) reserve(2 * capacity_);
     std::construct_at(data() + size_++, copy);
   }

@@ -107,7 +107,7 @@ class ThreadPool {
       workers_.reserve(static_cast<std::size_t>(threads_ - 1));
       for (int i = 1; i < threads_; ++i) workers_.emplace_back([this, seen] { work(seen); });
 #if defined(__cpp_exceptions)
-    } catch (const std::exception&) {  // // continue with the threads that the system gave
+    } catch (const std::exception&) {  // continue with the threads that the system gave
     }
 #endif
   }
@@ -137,7 +137,7 @@ class ThreadPool {
 
   void announce(std::uint32_t epoch) noexcept {
     epoch_.store(epoch, std::memory_order_seq_cst);
-    epoch_.notify_all();  // // makes a system call only if a thread sleeps
+    epoch_.notify_all();  // makes a system call only if a thread sleeps
   }
 
   /// Runs pieces of the current job until none is left. Returns the number of pieces run.

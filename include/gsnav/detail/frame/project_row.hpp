@@ -152,7 +152,7 @@ GSNAV_HD void pixel_range(L center, L half, int size, L& low, L& high) noexcept 
   const L one(S(1)), end(static_cast<S>(size));
   const L first = clamp(center - half - L(S(0.5)), -one, end);
   const L last = clamp(center + half - L(S(0.5)), -one, end);
-  // // truncated() rounds toward zero. Correct it to ceil for the first pixel and floor for the last.
+  // truncated() rounds toward zero. Correct it to ceil for the first pixel and floor for the last.
   const L f = truncated(first), l = truncated(last);
   low = max(select(f < first, f + one, f), L(S(0)));
   high = min(select(l > last, l - one, l) + one, end);

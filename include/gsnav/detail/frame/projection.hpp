@@ -219,7 +219,7 @@ GSNAV_HD Projected<L> project(const ProjectionCamera<scalar_of<L>>& camera, cons
     detail::add_perspective(camera, axes, u, v, out);
   }
 
-  const L huge(S(3e38));  // // finite in float: Gaussians that overflow are culled, never drawn as NaN
+  const L huge(S(3e38));  // finite in float: Gaussians that overflow are culled, never drawn as NaN
   const L half(S(0.5));
   out.visible = (key_z > F(camera.near_plane)) && (out.s_max >= L(S(0))) && (det <= huge) &&
                 (big_a <= huge) && (abs(out.mean_x) <= huge) && (abs(out.mean_y) <= huge) &&

@@ -16,7 +16,7 @@ inline constexpr float kLargestHalf = 65504.0f;
 GSNAV_HD float half_to_float(std::uint16_t half) noexcept {
 #if defined(__CUDA_ARCH__)
   float value;
-  asm("cvt.f32.f16 %0, %1;" : "=f"(value) : "h"(half));  // // one instruction, same value
+  asm("cvt.f32.f16 %0, %1;" : "=f"(value) : "h"(half));  // one instruction, same value
   return value;
 #else
   const std::uint32_t bits = half;

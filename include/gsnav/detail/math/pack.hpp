@@ -99,7 +99,7 @@ GSNAV_HD Pack<float, N> select(Mask<N> m, Pack<float, N> a, Pack<float, N> b) no
 template <int N>
 GSNAV_HD Pack<float, N> min(Pack<float, N> a, Pack<float, N> b) noexcept {
 #if defined(__AVX512F__)
-  if constexpr (N == 16) {  // // g++ does not fuse comparison and selection into one instruction
+  if constexpr (N == 16) {  // g++ does not fuse comparison and selection into one instruction
     return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(_mm512_maskz_min_ps(
         static_cast<__mmask16>(-1), reinterpret_cast<__m512>(a.v), reinterpret_cast<__m512>(b.v))));
   } else
@@ -238,14 +238,14 @@ GSNAV_HD Pack<float, N> sqrt_above(Pack<float, N> a) noexcept {
   using V = typename Pack<float, N>::vector;
   const Pack<float, N> positive = max(a, Pack<float, N>(1e-30f));
 #if defined(__AVX512F__)
-  if constexpr (N == 16) {  // // error of rsqrt14: 2^-14
+  if constexpr (N == 16) {  // error of rsqrt14: 2^-14
     const Pack<float, N> r(reinterpret_cast<V>(
         _mm512_maskz_rsqrt14_ps(static_cast<__mmask16>(-1), reinterpret_cast<__m512>(positive.v))));
     return positive * (r * Pack<float, N>(1.0001f));
   }
 #endif
 #if defined(__AVX__)
-  if constexpr (N == 8) {  // // error of rsqrtps: 1.5 * 2^-12
+  if constexpr (N == 8) {  // error of rsqrtps: 1.5 * 2^-12
     return positive *
            (Pack<float, N>(reinterpret_cast<V>(_mm256_rsqrt_ps(reinterpret_cast<__m256>(positive.v)))) *
             Pack<float, N>(1.0004f));

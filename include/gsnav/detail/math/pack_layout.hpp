@@ -67,7 +67,7 @@ namespace detail {
 /// pack a, the second from pack b. Of each, the chunks first, first + every, ... are taken.
 template <int W, int N>
 constexpr int chunk_lane(int l, int first, int every) noexcept {
-  constexpr int kHalf = N / W / 2;  // // chunks of the result that come from a
+  constexpr int kHalf = N / W / 2;  // chunks of the result that come from a
   const int chunk = l / W;
   return (chunk >= kHalf ? N : 0) + (first + every * (chunk % kHalf)) * W + l % W;
 }

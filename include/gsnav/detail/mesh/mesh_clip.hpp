@@ -119,7 +119,7 @@ GSNAV_HD int clip_triangle(const MeshCamera& camera, std::uint32_t codes,
       const double t = d_in / (d_in - d_out);
       Vec3d q{fma(outside.x - in.x, t, in.x), fma(outside.y - in.y, t, in.y),
               fma(outside.z - in.z, t, in.z)};
-      q.z = max(q.z, camera.near_plane);  // // rounding may have moved it in front of the near plane
+      q.z = max(q.z, camera.near_plane);  // rounding may have moved it in front of the near plane
       out[m++] = q;
     }
     n = m;

@@ -244,7 +244,7 @@ GSNAV_HD void rasterize_mesh_tile(const MeshRasterArgs<S>& args, std::size_t til
   const auto row_at = [&](int y) GSNAV_INLINED { return static_cast<std::size_t>(y) * stride; };
   for (int y = tile_y; y < tile_bottom; ++y) {
     for (int x = tile_x; x < tile_right; ++x) {
-      // // holds 1 / z until the tile is finished
+      // holds 1 / z until the tile is finished
       args.depth[row_at(y) + static_cast<std::size_t>(x)] = S(0);
       args.visible[row_at(y) + static_cast<std::size_t>(x)] = kNoTriangle;
     }
@@ -260,7 +260,7 @@ GSNAV_HD void rasterize_mesh_tile(const MeshRasterArgs<S>& args, std::size_t til
   for (int y = tile_y; y < tile_bottom; ++y) {
     for (int x = tile_x; x < tile_right; ++x) {
       S& depth = args.depth[row_at(y) + static_cast<std::size_t>(x)];
-      depth = S(1) / depth;  // // infinity where there is no triangle
+      depth = S(1) / depth;  // infinity where there is no triangle
       far = max(far, depth);
     }
   }

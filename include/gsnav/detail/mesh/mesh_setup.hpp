@@ -105,7 +105,7 @@ GSNAV_HD bool place_triangle(const MeshCamera& camera, bool two_sided, const Mes
                              const MeshPoint& b, const MeshPoint& c, MeshTriangle<S>& out) noexcept {
   const std::int64_t area = doubled_area(a, b, c);
   if (area == 0) return false;
-  out.back = area > 0;  // // counter-clockwise from outside gives a negative area, because y points down
+  out.back = area > 0;  // counter-clockwise from outside gives a negative area, because y points down
   if (out.back && !two_sided) return false;
   out.corner[0] = a;
   out.corner[1] = out.back ? b : c;
@@ -137,7 +137,7 @@ GSNAV_HD void interpolate_triangle(const MeshCamera& camera, const Vec3d& v0, co
   out.inverse_z = {1.0 / z_min, 0, 0};
   out.b1 = out.b2 = {};
   const double inverse = 1.0 / nv;
-  // // edge-on: use its nearest depth and its first corner's colour
+  // edge-on: use its nearest depth and its first corner's colour
   if (!(nn > 0) || !is_finite(inverse)) return;
   const double px = out.x0 + 0.5 - camera.half_width - camera.cx,
                py = out.y0 + 0.5 - camera.half_height - camera.cy;

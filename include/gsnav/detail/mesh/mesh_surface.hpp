@@ -73,7 +73,7 @@ GSNAV_HD Vec3<S> sample_level(const TextureView& t, const std::uint8_t* texels, 
 /// that a pixel spans.
 template <Texel What, class S>
 GSNAV_HD Vec3<S> sample_texture(const TextureView& t, S u, S v, S footprint2) noexcept {
-  constexpr S kFar(1e6);  // // beyond this, float coordinates have no useful fraction
+  constexpr S kFar(1e6);  // beyond this, float coordinates have no useful fraction
   u = clamp(u, -kFar, kFar);
   v = clamp(v, -kFar, kFar);
   u = u - S(floor_of(u));
