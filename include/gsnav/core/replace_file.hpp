@@ -213,7 +213,7 @@ class OutputFile {
     return unwritable(path_, error_, Errc::write_failed);
   }
 
-  /// Deletes what was written. Does nothing if no file is open.
+  /// Deletes the temporary file. Does nothing if no file is open.
   void discard() noexcept {
     if (file_ != nullptr) std::fclose(file_);
     file_ = nullptr;

@@ -21,7 +21,7 @@ class RendererEngine;
 
 /// Settings of a Renderer.
 struct RenderOptions {
-  RenderConfig render{};  ///< Settings of each frame. The sort order is the scene's, not this one's.
+  RenderConfig render{};  ///< Settings of each frame. Its sort order is ignored: the scene has one.
   DetailChoice detail{};  ///< Levels of detail and visible sets to use. The scene must have them.
 };
 
@@ -85,12 +85,12 @@ class Renderer {
 };
 
 /// Builds a level-of-detail tree: build_lod (scene/lod_tree.hpp), compiled. It runs on the device's
-/// threads; for a GPU, on the CPU's.
+/// threads; for a GPU, on the threads of the CPU.
 /// @return the errors of build_lod.
 Result<LodTree> build_lod(const Device& device, const GaussianCloud& cloud,
                           const LodSettings& settings = {});
 /// Builds visible sets: build_visible_sets (scene/visible_sets.hpp), compiled. It runs on the device's
-/// threads; for a GPU, on the CPU's.
+/// threads; for a GPU, on the threads of the CPU.
 /// @return the errors of build_visible_sets.
 Result<VisibleSets> build_visible_sets(const Device& device, const GaussianCloud& cloud,
                                        std::span<const Vec3d> viewpoints,

@@ -18,8 +18,8 @@ namespace gsnav {
 inline constexpr int kInfluences4 = 4, kInfluences8 = 8;
 /// Number of parts that make a skinning weight of 1. Weights are stored as integers of parts, and those
 /// of a Gaussian sum to kWeightParts exactly. Rounding weights (detail/avatar/skinning_weights.hpp)
-/// moves a Gaussian by at most K / (4 kWeightParts) of the greatest distance between the positions that
-/// its joints alone would give it. Per metre of that distance: 15 um for K = 4, 31 um for K = 8.
+/// moves a Gaussian by at most K / (4 kWeightParts) times the greatest distance between two positions
+/// that single joints would give it. Per metre of that distance: 15 um for K = 4, 31 um for K = 8.
 inline constexpr int kWeightParts = 65535;
 /// Smallest determinant of a blended linear part that still has a useful orientation. Below it (a 180
 /// degree twist, the candy-wrapper effect) the joint with the greatest weight gives the rotation.
@@ -78,8 +78,8 @@ GSNAV_HD ScaledRotation<L> scaled_polar_rotation(const Mat3<L>& m) noexcept {
     active = active && (change > converged * sum);
     if (!any(active)) break;
   }
-  // With singular values a, b, c and sum = a + b + c: ((ab + bc + ca + |m|^2) I - m m^T) m + sum *
-  // cofactors equals (a + b)(b + c)(c + a) times the rotation.
+  // Let a, b, c be the singular values and sum = a + b + c. Then ((ab + bc + ca + |m|^2) I - m m^T) m +
+  // sum * cofactors equals (a + b)(b + c)(c + a) times the rotation.
   const L pairs = L(S(0.5)) * fma(sum, sum, -m2), d = pairs + m2;
   g00 = d - g00;
   g11 = d - g11;
@@ -137,8 +137,8 @@ struct Skinned {
 /// of the ellipsoid's axes.
 ///
 /// @param blend sum over the influences of weight * (posed joint * inverse bind), with rigid joints, in
-///   metres. Joints are relative to the actor's root: an error in the sum of weights then scales with
-///   the body, not with its distance from the origin.
+///   metres. Joints are relative to the actor's root, so that an error in the sum of weights scales with
+///   the body and not with its distance from the origin.
 /// @param first callable that returns the linear part of the joint with the greatest weight. It is
 ///   called when the blend has no useful orientation (see kMinBlendDeterminant).
 /// @param mean canonical position, metres

@@ -248,10 +248,10 @@ GSNAV_HD SweepResult<L> sweep_steps(const MovingCapsule<L>& agent, const MovingC
 /// distance, the plane still separates the capsules, so an advance cannot overshoot at any speed. `time`
 /// <= `contact_time`, and every earlier time is free of contact.
 ///
-/// From a start closer than skin/4, overlap included, the agent continues as long as it does not itself
-/// reduce the gap below its smallest value so far. The tolerance is about twice the skin (1.1e-4 m in
-/// 12,600 steps with pushes, at the default skin). A gap that only the body reduces does not stop the
-/// agent; `pushed` reports it.
+/// The agent may start closer than skin/4, or overlapping. It then continues as long as it does not
+/// itself reduce the gap below its smallest value so far. The tolerance is about twice the skin (1.1e-4
+/// m in 12,600 steps with pushes, at the default skin). A gap that only the body reduces does not stop
+/// the agent; `pushed` reports it.
 template <class L, class S = scalar_of<L>>
 GSNAV_HD SweepResult<L> sweep(const MovingCapsule<L>& agent, const MovingCapsule<L>& body,
                               const SweepRules<S>& rules = {}) noexcept {

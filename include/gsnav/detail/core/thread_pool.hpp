@@ -23,7 +23,7 @@ namespace gsnav {
 
 /// Thread pool that distributes the pieces of one job at a time.
 ///
-/// The caller works too, and never waits for a thread that has not started a piece: on a busy machine it
+/// The caller works too, and never waits for a thread that has not started a piece. On a busy machine it
 /// does the whole job itself. Idle threads spin for a bounded time and then sleep.
 ///
 /// Any thread may call run(), also from within a piece and several at once. A call that finds the pool
@@ -48,7 +48,7 @@ class ThreadPool {
   ThreadPool(const ThreadPool&) = delete;
   ThreadPool& operator=(const ThreadPool&) = delete;
 
-  /// Calls f(p) once for each p in [0, pieces), in any order. What the pieces wrote is visible on
+  /// Calls f(p) once for each p in [0, pieces), in any order. Memory that the pieces wrote is visible on
   /// return. An exception that leaves f terminates the process.
   template <class F>
   void run(std::uint32_t pieces, const F& f) noexcept {
@@ -171,7 +171,7 @@ class ThreadPool {
     }
   }
 
-  /// upper half: epoch of the job; lower half: next piece
+  /// epoch of the job (upper half) and next piece (lower half)
   alignas(kLine) std::atomic<std::uint64_t> ticket_{0};
   alignas(kLine) std::atomic<std::uint32_t> done_{0};   ///< pieces done by threads other than the caller
   alignas(kLine) std::atomic<std::uint32_t> epoch_{0};  ///< epoch of the last announced job
@@ -180,7 +180,8 @@ class ThreadPool {
   std::atomic<std::uint32_t> pieces_{0};
   std::atomic<bool> stop_{false};
   alignas(kLine) std::atomic<bool> taken_{false};
-  // Owned by the thread that has taken the pool. Workers read only what was written before they started.
+  // Owned by the thread that has taken the pool. Workers read only values that were written before they
+  // started.
   const int threads_;
   bool started_ = false, crowded_ = false;
   long process_ = 0;

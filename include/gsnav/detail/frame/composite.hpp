@@ -72,7 +72,7 @@ GSNAV_HD void composite_splat(BlendState<S, D>& state, const BlendRules<S>& rule
 }
 
 /// Kernel that blends one pixel of a frame with a mesh. Equals RasterizePixel, except that the mesh
-/// hides what is behind it.
+/// hides the splats behind it.
 template <class S, bool Color, DepthMode D, bool General>
 struct CompositePixel {
   RasterArgs<S> args;
@@ -91,8 +91,8 @@ struct CompositePixel {
 };
 
 /// Kernel that blends a pixel with fragments. The fragments divide its ray into intervals of depth. For
-/// each interval the tile's list is walked once, and the splats with a depth in the interval are
-/// blended, as if a mesh lay at its far end.
+/// each interval the tile's list is walked once, as if a mesh lay at the far end of the interval. Splats
+/// with a depth in the interval are blended.
 template <class S, bool Color, DepthMode D, bool General>
 struct FragmentPixel {
   RasterArgs<S> args;

@@ -14,8 +14,8 @@ namespace gsnav {
 /// (c_i.r)^2. Nothing is inverted, so flat Gaussians (s = 0) give the depth of their plane.
 ///
 /// It is evaluated as z + delta, relative to the ray through the mean. delta = -z sum h_i p_i / sum
-/// h_i^2, where p_i is the change of c_i.r from that ray to the pixel's, and h_i = g_i + p_i. Rounding
-/// is then relative to delta and not to z.
+/// h_i^2, where p_i is the change of c_i.r from that ray to the pixel's ray, and h_i = g_i + p_i.
+/// Rounding is then relative to delta and not to z.
 /// @param px, py pixel centre
 template <class L, class S>
 GSNAV_HD L ray_depth(const SplatDepth<S>& d, L px, L py) noexcept {

@@ -15,9 +15,9 @@ struct PixelColumns {
 };
 
 /// Columns that the ellipse of a splat's footprint covers in horizontal strips. Tiles, and blocks of a
-/// tile, are listed by it. L is one splat, or a pack with one splat per lane. The result always contains
-/// all pixels that pass the pixel test in scalar_of<L>: the ellipse is enlarged by the rounding of that
-/// test and of this one.
+/// tile, are listed by it. L is one splat, or a pack with one splat per lane. The result contains all
+/// pixels that pass the pixel test in scalar_of<L>, because the ellipse is enlarged by the rounding of
+/// both computations.
 ///
 /// About the centre, the ellipse is |w|^2 = (a X)^2 + (k X + b Y)^2 = r^2. Its right edge is X(Y) = -s Y
 /// + sqrt((r^2 - (beta Y)^2) / alpha^2), where alpha^2 = a^2 + k^2, s = k b / alpha^2 and beta = a b /

@@ -67,8 +67,8 @@ Vec3d origin_offset(const ViewedSet<S>& args, std::size_t o) noexcept {
 }
 
 /// Outputs of the projection: records of all sets of a frame, with kProjectChunk slots per chunk. Chunk
-/// c of a set writes its visible splats in row order, from slot (first_chunk + c) * kProjectChunk on,
-/// and their number to counts[first_chunk + c].
+/// c of a set writes its visible splats in row order, from slot (first_chunk + c) * kProjectChunk on. It
+/// writes their number to counts[first_chunk + c].
 template <class S>
 struct ProjectOutputs {
   View<SplatGeometry<S>> geometry;

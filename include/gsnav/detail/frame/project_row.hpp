@@ -248,8 +248,8 @@ struct Splat {
   SplatPerspective<S> perspective;  ///< unless Response::ewa
 };
 
-/// Makes the records of a row that was projected in T, with its mean in U, rounded to S. Returns false
-/// if no pixel centre lies in its bounds.
+/// Makes the records of a projected row, rounded to S. The row was projected in T and its mean in U.
+/// Returns false if no pixel centre lies in its bounds.
 /// @tparam GeometryOnly neither depth nor perspective is requested
 template <bool GeometryOnly, class T, class U, class S>
 GSNAV_HD bool make_splat(const ProjectionCamera<T>& camera, bool depth, const SeenRow<T>& seen, U mean_x,

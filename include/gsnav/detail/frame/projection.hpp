@@ -264,9 +264,9 @@ GSNAV_HD SplatDepth<L> make_splat_depth(const ProjectionCamera<scalar_of<L>>& ca
 /// Sort key for SortOrder::z_depth: depth of a centre along the view axis, metres, in double. Callers
 /// round it once, to float32.
 ///
-/// The rounded key has the same bits on every backend, and in any float64 renderer except where two
-/// float64 results straddle a float32 rounding boundary (about 1 key in 1e8). It depends neither on a
-/// set's origins nor on the world's origin.
+/// The rounded key has the same bits on every backend. It has them in any float64 renderer too, unless
+/// two float64 results straddle a float32 rounding boundary (about 1 key in 1e8). It depends neither on
+/// a set's origins nor on the world's origin.
 /// @param delta mean - camera position, asset frame, in double or a pack of doubles
 template <class D>
 GSNAV_HD D depth_key(const ProjectionCamera<double>& camera, const Vec3<D>& delta) noexcept {

@@ -25,14 +25,15 @@ struct SplatGeometry {
 };
 
 /// Colour of a projected Gaussian, >= 0. In the set's color space until ConvertSplatColors converts it
-/// to the frame's.
+/// to the space of the frame.
 template <class S>
 struct SplatColor {
   S r{}, g{}, b{}, pad{};
 };
 
-/// Record for per-ray depth (detail/frame/depth.hpp): products of the cofactor columns of the
-/// camera-space axes with the ray through the mean (g), and their change per pixel in x (gx) and y (gy).
+/// Record for per-ray depth (detail/frame/depth.hpp). g holds the products of the cofactor columns of
+/// the camera-space axes with the ray through the mean. gx and gy are their changes per pixel in x and
+/// y.
 template <class S>
 struct SplatDepth {
   S mean_x{}, mean_y{};  ///< pixels

@@ -31,8 +31,8 @@ enum class CameraAxes {
   opengl,  ///< x right, y up, -z forward: OpenGL, glm::lookAt, Habitat
 };
 
-/// Converts a world-to-camera map from the given camera axes to OpenCV's, or back. Turning a camera half
-/// round its x axis is its own inverse.
+/// Converts a world-to-camera map from the given camera axes to OpenCV axes, or back. Turning a camera
+/// half round its x axis is its own inverse.
 template <class S>
 Affine3<S> view_with_axes(const Affine3<S>& view, CameraAxes axes) noexcept {
   if (axes == CameraAxes::opencv) return view;

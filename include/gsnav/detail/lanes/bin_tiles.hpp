@@ -57,8 +57,8 @@ GSNAV_HD void for_each_intersection(const BinArgs<float>& args, const Cull& cull
 }  // namespace detail
 
 /// CountTileIntersections with the tiles that the projection found (BinArgs::spans). It records only
-/// where each row of tiles starts and ends, and computes prefix sums at the end, so that long rows cost
-/// no more than short ones.
+/// where each row of tiles starts and ends, then computes prefix sums. Long rows therefore cost no more
+/// than short ones.
 inline void count_tiles(const CountTileIntersections<float>& kernel, std::size_t block) noexcept {
   const BinArgs<float>& args = kernel.args;
   const std::size_t tiles = args.grid.count(), columns = static_cast<std::size_t>(args.grid.columns);

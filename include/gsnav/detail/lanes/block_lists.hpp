@@ -24,8 +24,8 @@ struct BlockLists {
   int counts[kMaxBlocks];
 };
 
-/// Lists the n splats of a batch in the open blocks that their ellipses reach, for the tile with its top
-/// left pixel at (tile_x, tile_y). The batch is read in whole packs.
+/// Lists the n splats of a batch in the open blocks that their ellipses reach. The tile has its top left
+/// pixel at (tile_x, tile_y). The batch is read in whole packs.
 inline void list_blocks(const SplatGeometry<float>* batch, int n, float log2_alpha_min, int tile_x,
                         int tile_y, int tile_size, const bool* open, BlockLists& lists) noexcept {
   static_assert(sizeof(SplatGeometry<float>) == 8 * sizeof(float));

@@ -102,8 +102,8 @@ GSNAV_HD void prefetch_colors(const ColorRows& sh, std::size_t size, int degree,
 }
 
 /// Writes the colours of the `count` survivors of a chunk to out[0], out[1], ... This runs after all
-/// geometry of the chunk has been written: coefficients are most of what a frame reads, and a single
-/// stream reads them fastest.
+/// geometry of the chunk has been written. Coefficients are most of the data that a frame reads, and a
+/// single stream reads them fastest.
 GSNAV_STAGE void color_survivors(const ColorRows& sh, int degree, Survivors& s, std::size_t count,
                                  SplatColor<float>* out) noexcept {
   constexpr std::size_t step = static_cast<std::size_t>(kWidth);

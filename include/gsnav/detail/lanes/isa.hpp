@@ -22,7 +22,7 @@
 #endif
 
 /// Marks a stage of a SIMD kernel, which is called and not inlined. A compiler that sees several stages
-/// as one function spills their registers. What a stage calls is inlined (GSNAV_HD).
+/// as one function spills their registers. Functions that a stage calls are inlined (GSNAV_HD).
 #define GSNAV_STAGE [[gnu::noinline]] inline
 
 namespace gsnav::lanes {

@@ -10,7 +10,8 @@
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
-/// Number of neighbouring blocks that make rows of kWidth pixels: as many as a block has rows.
+/// Number of neighbouring blocks that make rows of kWidth pixels. It equals the number of rows in a
+/// block.
 inline constexpr int kRowBlocks = kWidth / kBlockWidth;
 static_assert(kRowBlocks == kBlockHeight);
 

@@ -18,8 +18,9 @@ namespace gsnav {
 
 namespace detail {
 
-/// Correctly rounded float fma, computed in double. The product is exact in double and the sum is
-/// rounded to odd; rounding that to float gives the correctly rounded result (Boldo and Melquiond 2008).
+/// Correctly rounded float fma, computed in double. The product is exact in double, and the sum is
+/// rounded to odd. Rounding that sum to float gives the correctly rounded result (Boldo and Melquiond
+/// 2008).
 GSNAV_HD float fma_by_double(float a, float b, float c) noexcept {
   const double p = static_cast<double>(a) * static_cast<double>(b), d = static_cast<double>(c);
   double s = p + d;
@@ -54,8 +55,8 @@ GSNAV_HD __m128d sum_to_odd(__m128d p, __m128d d) noexcept {
 }
 
 /// True if rounding some of these doubles to float may differ from rounding the exact value once. That
-/// happens in two cases: halfway between two floats (the last 29 bits are 1 0...0), and below the normal
-/// floats but not 0, where the halfway points are elsewhere.
+/// happens halfway between two floats (the last 29 bits are 1 0...0). It also happens below the normal
+/// floats except at 0, where the halfway points are elsewhere.
 GSNAV_HD bool may_round_twice(__m128d low, __m128d high) noexcept {
   const __m128 a = _mm_castpd_ps(low), b = _mm_castpd_ps(high);
   const __m128i last = _mm_castps_si128(_mm_shuffle_ps(a, b, _MM_SHUFFLE(2, 0, 2, 0)));

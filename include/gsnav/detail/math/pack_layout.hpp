@@ -64,7 +64,7 @@ GSNAV_HD void store_interleaved(Pack<float, N> a, Pack<float, N> b, Pack<float, 
 
 namespace detail {
 /// Source lane for lane l of a pack made of chunks of W lanes. The first half of the result comes from
-/// pack a, the second from pack b. Of each, the chunks first, first + every, ... are taken.
+/// pack a, the second from pack b. It takes the chunks first, first + every, ... of each.
 template <int W, int N>
 constexpr int chunk_lane(int l, int first, int every) noexcept {
   constexpr int kHalf = N / W / 2;  // chunks of the result that come from a

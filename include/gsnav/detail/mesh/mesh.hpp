@@ -31,7 +31,7 @@ struct TextureView {
 enum class MeshAlpha : std::uint8_t {
   opaque,  ///< Alpha is ignored.
   mask,    ///< The surface exists where alpha is at least alpha_cutoff and has a hole elsewhere.
-  blend,   ///< The surface is see-through: what is behind shows through it.
+  blend,   ///< The surface is see-through.
 };
 
 /// Read-only arrays of an indexed triangle mesh with T triangles. It owns nothing. Coordinates are
@@ -79,9 +79,9 @@ struct MeshLight {
 
 /// Rule by which Gaussians and meshes become one image.
 enum class Composite : std::uint8_t {
-  merged,      ///< The contract's: each Gaussian is compared with the mesh's depth at each pixel.
-  hard_depth,  ///< Habitat-GS's: a pixel shows either the Gaussians or the mesh, whichever has the
-               ///< smaller expected depth.
+  merged,  ///< The rule of the contract: each Gaussian is compared with the mesh's depth at each pixel.
+  hard_depth,  ///< The rule of Habitat-GS: a pixel shows either the Gaussians or the mesh, whichever has
+               ///< the smaller expected depth.
 };
 
 /// A mesh instance in one camera's frame.

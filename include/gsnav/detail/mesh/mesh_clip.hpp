@@ -100,8 +100,8 @@ GSNAV_HD MeshPoint project_to_lattice(const MeshCamera& c, const Vec3d& p) noexc
 }
 
 /// Clips a triangle to the planes in `codes` (Sutherland-Hodgman). Returns the number of corners. The
-/// crossing of an edge is computed from its inner end to its outer end, so that both triangles of the
-/// edge get the same point.
+/// crossing of an edge is computed from its inner to its outer end. Both triangles of the edge thus get
+/// the same point.
 GSNAV_HD int clip_triangle(const MeshCamera& camera, std::uint32_t codes,
                            Vec3d (&p)[kMeshMostCorners]) noexcept {
   int n = 3;

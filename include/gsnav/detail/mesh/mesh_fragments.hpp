@@ -28,8 +28,8 @@ struct FragmentArgs {
 
 namespace detail {
 
-/// Calls f(pixel, t, x, y, z) for each pixel of a tile and each triangle that owns the pixel and is not
-/// behind the opaque mesh. For one pixel, triangles come in their order.
+/// Calls f(pixel, t, x, y, z) for each pixel of a tile and each triangle t that owns the pixel. Skips
+/// triangles behind the opaque mesh. For one pixel, triangles come in their order.
 template <class S, class F>
 GSNAV_HD void for_each_fragment(const FragmentArgs<S>& args, std::size_t tile, const F& f) noexcept {
   const BinArgs<S>& bin = args.raster.bin;

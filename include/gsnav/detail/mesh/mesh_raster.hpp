@@ -13,7 +13,7 @@ namespace gsnav {
 
 /// Exact values of the three edge functions of a triangle at pixel centres. All are >= 0 at pixels that
 /// the triangle owns. A centre exactly on an edge belongs to the triangle if the edge is a top or left
-/// one, so that exactly one of two triangles that share an edge owns it.
+/// one. Exactly one of two triangles that share an edge therefore owns it.
 struct MeshEdges {
   std::int64_t at[3];                 ///< at the centre of the current pixel
   std::int64_t step_x[3], step_y[3];  ///< change per pixel to the right, and per pixel down
@@ -179,7 +179,7 @@ GSNAV_HD bool mesh_hole(const MeshRasterArgs<S>& args, const MeshTriangle<S>& t,
 namespace detail {
 
 /// Calls f(y, left, right) for each row of the box [x0, x1) x [y0, y1), where [left, right) are the
-/// pixels that the triangle owns. The box must lie inside the triangle's.
+/// pixels that the triangle owns. The box must lie inside the triangle's box.
 template <class S, class F>
 GSNAV_HD void for_each_span(const TileGrid& grid, const MeshTriangle<S>& t, int x0, int y0, int x1,
                             int y1, const F& f) noexcept {

@@ -25,7 +25,7 @@ concept SlicingBackend = ProjectsChunks<B, S> && RunsStage<B, stage::Blend, Rast
 
 /// Plan of a frame that is drawn in slices of depth, front to back. Where a slice has closed all pixels,
 /// later slices need not project, colour, sort or bin anything. The image has the same bits as with one
-/// slice: each pixel blends the same splats in the same order, except those that come after it is
+/// slice. Each pixel blends the same splats in the same order, except those that come after it is
 /// closed.
 ///
 /// A chunk belongs to the slice of its nearest possible key. Its farther Gaussians are projected with it

@@ -136,8 +136,7 @@ inline Status validate(const MeshInstance& instance) {
 
 namespace detail {
 
-/// True if some part of a mesh's box may be in the image. Conservative: never false if a part is
-/// visible.
+/// True if a mesh's box may be in the image. Conservative: never false if some of the box is.
 inline bool box_may_be_visible(const MeshCamera& camera, const MeshPlacement& p) noexcept {
   const MeshView& m = p.mesh;
   if (m.low.x > m.high.x) return true;
@@ -168,8 +167,7 @@ inline bool place_mesh(const MeshInstance& i, const Camera& camera, const MeshCa
   return seen_through(i) == through && i.mesh.triangle_count() != 0 && box_may_be_visible(lens, p);
 }
 
-/// Lists the work items of the instances in view: of the see-through ones if `through`, otherwise of the
-/// others.
+/// Lists the work items of the instances in view, of those whose see-through property is `through`.
 template <class S, Backend B>
 void place_meshes(MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes, const Camera& camera,
                   bool through) {
@@ -304,7 +302,6 @@ MeshShadeArgs<S> shade_args(MeshWorkspace<S, B>& ws, const Camera& camera, const
 /// `images`. See-through meshes (MeshAlpha::blend) are left to draw_fragments
 /// (detail/render/draw_fragments.hpp). The result is complete after `backend.synchronize()` and valid
 /// until the next call.
-///
 /// @param meshes instances; their arrays are in the backend's memory
 /// @param tile_size width of the tiles of ws.tile_far, pixels
 /// @param layer_color whether to write the colour to ws.color. Then `images.color` is replaced by it.

@@ -80,9 +80,10 @@ struct RowWeightsWorkspace {
   std::vector<std::uint32_t> numbers;  ///< 0, 1, 2, ...
 };
 
-/// Draws a set and raises `most` [rows] to the largest share of a pixel's light, alpha times
-/// transmittance, that each Gaussian contributes anywhere in the image. Uses Quality::fast(); Gaussians
-/// of equal depth are blended in row order. The bits do not depend on the number of threads.
+/// Draws a set and measures the largest share of a pixel's light, alpha times transmittance, that each
+/// Gaussian contributes anywhere in the image. Raises the values of `most` [rows] to these shares. Uses
+/// Quality::fast(); Gaussians of equal depth are blended in row order. The bits do not depend on the
+/// number of threads.
 /// @return the errors of render_camera; invalid_argument if `most` has the wrong length.
 template <Backend B>
 requires is_host_backend<B> Status add_row_weights(B& backend, RowWeightsWorkspace<B>& ws,

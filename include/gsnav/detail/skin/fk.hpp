@@ -11,8 +11,8 @@
 
 namespace gsnav {
 
-/// Transform from a joint's frame to the root frame. `local` maps the joint's frame to its parent's;
-/// with parent -1 that is the root frame. `globals[parent]` must have been computed.
+/// Transform from a joint's frame to the root frame. `local` maps the joint's frame to the parent's
+/// frame, which is the root frame for parent -1. `globals[parent]` must have been computed.
 template <class S>
 GSNAV_HD Affine3<S> joint_global(const Affine3<S>* globals, std::int32_t parent,
                                  const Affine3<S>& local) noexcept {
@@ -20,7 +20,7 @@ GSNAV_HD Affine3<S> joint_global(const Affine3<S>* globals, std::int32_t parent,
 }
 
 /// Arrays of forward kinematics for A actors that share a skeleton of J joints. "Global" is the actor's
-/// root frame, in metres. A local transform maps a joint's frame to its parent's.
+/// root frame, in metres. A local transform maps a joint's frame to its parent's frame.
 template <class S>
 struct ForwardKinematicsArgs {
   View<const std::int32_t> parents;  ///< [J], index of the parent, or -1 for a child of the root frame.

@@ -20,7 +20,7 @@ inline constexpr double kLeastStretch = 0.5, kGreatestStretch = 2.0;
 /// DLB). The body keeps its width where it twists, and bulges at the outside of elbows. Joints that
 /// differ only by a translation give the result of linear blending.
 /// @param blend sum over the influences of weight * dual quaternion of the joint. Each has the sign that
-///   puts its real part on the same side as the first one's.
+///   puts its real part on the side of the first one.
 template <class L>
 GSNAV_HD Skinned<L> skin(const DualQuat<L>& blend, const Vec3<L>& mean, const Quat<L>& quat) noexcept {
   Skinned<L> out;
@@ -104,8 +104,8 @@ struct SkinGaussianDual {
 };
 
 /// Kernel that skins Gaussian i by linear blending and also stretches its shape. The shape is
-/// transformed by the derivative of the skinned position with respect to the canonical position, F =
-/// sum_k w_k A_k + sum_k (A_k p + t_k) grad(w_k)^T, instead of by a rotation. The singular values of F
+/// transformed by F instead of by a rotation. F is the derivative of the skinned position with respect
+/// to the canonical one: F = sum_k w_k A_k + sum_k (A_k p + t_k) grad(w_k)^T. The singular values of F
 /// are clamped (clamped_stretch). Means, quats and rotations are those of SkinGaussian.
 template <class S, class Out = float>
 struct SkinGaussianStretched {

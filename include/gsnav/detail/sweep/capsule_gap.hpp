@@ -77,11 +77,11 @@ GSNAV_HD Vec3<L> any_perpendicular(const Vec3<L>& v) noexcept {
 
 /// Distance of the segments a0 a1 and b0 b1, with closest points and a deterministic normal.
 ///
-/// It is the minimum over five candidates: the four distances from an endpoint to the other segment, and
-/// the crossing of the two lines if it lies inside both segments. No tolerance is needed. Segments of
-/// zero length and parallel segments are handled by the endpoint candidates. Near parallelism the
-/// crossing is inexact but still lies on both segments, where its error affects the distance only to
-/// second order.
+/// It is the minimum over five candidates. Four are distances from an endpoint to the other segment. The
+/// fifth is the distance at the crossing of the two lines, if that lies inside both segments. No
+/// tolerance is needed. Segments of zero length and parallel segments are handled by the endpoint
+/// candidates. Near parallelism the crossing is inexact but still lies on both segments, where its error
+/// affects the distance only to second order.
 ///
 /// The relative error in float is at most 1e-5 for distances >= 1 cm and coordinates of a few metres.
 template <class L>
