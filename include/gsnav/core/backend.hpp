@@ -32,6 +32,7 @@ struct NoopFunctor {
 ///
 /// A backend object is a queue. It runs work in the order of the calls, and results are complete after
 /// `synchronize()`.
+///
 /// @code
 /// using memory_space = HostSpace;                         // or a tag of its own
 /// void* allocate(std::size_t bytes, std::size_t align);   // nullptr when memory is exhausted
@@ -41,6 +42,7 @@ struct NoopFunctor {
 /// template <class F> void parallel_for(std::size_t n, const F& f);   // f(i) for i in [0, n)
 /// Status synchronize();
 /// @endcode
+///
 /// Optional members. Without them a generic form is used:
 /// - `run(stage, args...)`: runs a stage with the backend's own code. core/stages.hpp is the table of
 ///   stages.

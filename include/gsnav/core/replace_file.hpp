@@ -136,7 +136,7 @@ inline Status make_output_folder(const std::filesystem::path& folder) {
 /// - If several threads or processes write the same name, the file of one of them remains, whole.
 class OutputFile {
  public:
-  /// No file is open.
+  /// An object without an open file.
   OutputFile() = default;
   /// Not copyable.
   OutputFile(const OutputFile&) = delete;

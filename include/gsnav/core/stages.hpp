@@ -23,7 +23,6 @@
 //
 // A backend's form must produce the same bits as the generic form, except where RenderConfig::quality
 // allows a less exact exponential.
-// another exponential.
 
 namespace gsnav {
 

@@ -61,7 +61,8 @@ GSNAV_HD double abs(double a) noexcept { return ::fabs(a); }
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__FMA__)
 // Code for any x86-64 may not assume FMA, so compilers call libm, which takes five times as long. All
 // processors since 2013 have the instruction. It rounds as libm does, so both paths give the same bits.
-// / a * b + c, rounded once.
+
+/// a * b + c, rounded once.
 GSNAV_HD float fma(float a, float b, float c) noexcept {
   if (!__builtin_cpu_supports("fma")) return __builtin_fmaf(a, b, c);
   // volatile, or the compiler may execute it before the test.
@@ -201,8 +202,8 @@ GSNAV_HD float float_of_bits(std::uint32_t u) noexcept {
 
 /// True unless a is infinite or NaN.
 GSNAV_HD bool is_finite(float a) noexcept { return (bits_of(a) & 0x7f800000u) != 0x7f800000u; }
-// / True unless a is infinite or NaN. Compares with a literal, because numeric_limits' constexpr
-// functions are host code for nvcc.
+/// True unless a is infinite or NaN. Compares with a literal, because numeric_limits' constexpr
+/// functions are host code for nvcc.
 GSNAV_HD bool is_finite(double a) noexcept { return abs(a) <= 1.7976931348623157e308; }
 #if !defined(__CUDACC__)
 /// True unless a is infinite or NaN.

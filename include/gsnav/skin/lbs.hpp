@@ -199,7 +199,7 @@ struct SkinningArgs {
   GSNAV_HD bool writes_rotations() const noexcept { return !rotations_out[0].empty(); }
 };
 
-/// Skinning weight in [0, 1] of a number of parts. SIMD kernels compute the same bits.
+/// Converts a skinning weight from parts of kWeightParts to [0, 1]. SIMD kernels compute the same bits.
 template <class S>
 GSNAV_HD S skinning_weight(std::uint16_t parts) noexcept {
   return static_cast<S>(parts) * static_cast<S>(1.0 / kWeightParts);
@@ -275,7 +275,7 @@ GSNAV_HD void store_skinned(const Args& args, std::size_t i, const Skinned<S>& s
 /// Kernel that skins Gaussian i by linear blending.
 template <class S, class Out = float>
 struct SkinGaussian {
-  SkinningArgs<S, Out> args;  ///< arrays
+  SkinningArgs<S, Out> args;  ///< inputs and outputs
 
   /// Skins Gaussian i.
   GSNAV_HD void operator()(std::size_t i) const noexcept {

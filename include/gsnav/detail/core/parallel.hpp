@@ -27,7 +27,7 @@ struct BlockRange {
 
 namespace detail {
 
-/// Cut of n records into blocks, such that one multiplication gives the block of a position.
+/// Division of n records into blocks. One multiplication gives the block of a position.
 struct SortBlocks {
   std::size_t size = 0, blocks = 1;
   std::uint64_t inverse = 0;  ///< blocks / size as a fixed-point number with 32 fractional bits

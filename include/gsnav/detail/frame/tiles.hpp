@@ -112,8 +112,8 @@ GSNAV_HD void for_each_tile(const TileGrid& grid, const SplatGeometry<S>& g, con
       });
 }
 
-/// Tiles of a splat that covers only a few, relative to the tile `tile`: columns [columns[r][0],
-/// columns[r][1]) in row r. Rows beyond the splat's are empty.
+/// Compact list of the tiles of a splat that covers few. `tile` is the top left one. Row r of tiles has
+/// the columns [columns[r][0], columns[r][1]), counted from it; unused rows are empty.
 struct TileSpans {
   static constexpr int kRows = 5, kColumns = 255;
   static constexpr std::uint8_t kLarge = 255;  ///< value of `rows` for a splat with too many tiles

@@ -33,8 +33,8 @@ struct BlockRow {
   }
 };
 
-/// Writes one image of a row of blocks, or nothing if it is null. value(i) returns the pixels of block
-/// i.
+/// Writes the pixels of a row of blocks to an image. Does nothing if `image` is null. value(i) returns
+/// the pixels of block i.
 template <class Value>
 void write_plane(const BlockRow& row, float* image, const Value& value) noexcept {
   if (image == nullptr) return;
@@ -53,8 +53,8 @@ void write_plane(const BlockRow& row, float* image, const Value& value) noexcept
   }
 }
 
-/// Writes an image with three values per pixel of a row of blocks, or nothing if it is null. value(i)
-/// returns a Vec3.
+/// write_plane for an image with three values per pixel. value(i) returns the pixels of block i as a
+/// Vec3.
 template <class Value>
 void write_color(const BlockRow& row, float* image, const Value& value) noexcept {
   if (image == nullptr) return;

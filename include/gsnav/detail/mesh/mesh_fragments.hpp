@@ -14,8 +14,8 @@ namespace gsnav {
 /// Arguments for making the fragments of one camera.
 template <class S>
 struct FragmentArgs {
-  MeshRasterArgs<S> raster;         ///< lists of the transparent triangles; its images are not used
-  MeshShadeArgs<S> shade;           ///< light; its images are not used
+  MeshRasterArgs<S> raster;         ///< tile lists of the see-through triangles; its images are ignored
+  MeshShadeArgs<S> shade;           ///< light settings; its member `images` is ignored
   const S* behind = nullptr;        ///< [H][W], depth of the opaque meshes. Surfaces behind it give no
                                     ///< fragments.
   bool color = false;               ///< False: colours stay 0.

@@ -32,8 +32,8 @@ struct CullCounts {
   }
 };
 
-/// Counts culled rows for one camera, in float32 like frames. Arrays are in host memory. Culling
-/// guarantees that rows that are not touched have no (tile, Gaussian) pair.
+/// Counts the rows that culling keeps and removes for one camera. Uses float32, as frames do. Arrays are
+/// in host memory. Culling guarantees that rows that are not touched have no (tile, Gaussian) pair.
 template <Backend B>
 requires is_host_backend<B> CullCounts count_culled(B& backend, std::span<const GaussianSet> sets,
                                                     const Camera& camera, const RenderConfig& config) {

@@ -68,7 +68,7 @@ class DepthSlices {
     for (int s = 0; s + 1 < n; ++s) {
       const double share = kFirst + (1 - kFirst) * s / n;
       const std::size_t wanted = static_cast<std::size_t>(share * static_cast<double>(candidates_));
-      if (seen >= wanted) continue;  // no slice is empty
+      if (seen >= wanted) continue;  // a slice would be empty
       while (bucket + 1 < kBuckets && seen < wanted) seen += weights_[bucket++];
       ends_[static_cast<std::size_t>(count_++)] = bucket;
     }
