@@ -40,8 +40,7 @@ class Buffer {
 
   /// Sets the size to n. If the array has to grow, the old content is lost and 1/8 extra capacity is
   /// reserved.
-  /// @throws gsnav::Error with out_of_memory and the number of bytes if the backend cannot allocate
-  ///   them.
+  /// @throws gsnav::Error (out_of_memory, naming the number of bytes) if the backend has no memory.
   void resize_discard(std::size_t n) {
     if (n > capacity_) grow(n, n + (n < kMost - n / 8 ? n / 8 : 0));
     size_ = n;

@@ -90,7 +90,7 @@ inline Status append_line(const std::filesystem::path& path, std::string line) {
 /// Checks that a file named `path` can be written, without writing anything. Call it before long work
 /// whose result goes to `path`. The folder must exist and be writable. If `path` exists, it must be
 /// writable and not be a folder.
-/// @return file_not_found, with the path or the missing folder.
+/// @return file_not_found naming the path or the missing folder.
 inline Status check_output_path(const std::filesystem::path& path) {
   struct ::stat found {};
   if (path.empty()) return {Errc::file_not_found, "the name of the file to write is empty"};

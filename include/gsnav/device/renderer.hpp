@@ -40,7 +40,7 @@ struct RenderOptions {
 class Renderer {
  public:
   /// Creates a renderer that shares `scene`. The scene needs no NavMesh.
-  /// @return invalid_argument with the part or field; unsupported if the device is not available;
+  /// @return invalid_argument naming the part or field; unsupported if the device is not available;
   ///   out_of_memory; backend_failure.
   static Result<Renderer> create(const Device& device, std::shared_ptr<const SimulatorScene> scene,
                                  RenderOptions options = {});
@@ -60,7 +60,7 @@ class Renderer {
   /// @param cameras at least one, all of the same image size
   /// @param out images, resized as needed
   /// @param time seconds on the scene's clock, at which avatars are posed
-  /// @return invalid_argument with the field, or for no camera or different sizes; unsupported;
+  /// @return invalid_argument naming the field, or for no camera or different sizes; unsupported;
   ///   out_of_memory; backend_failure.
   Status render(std::span<const Camera> cameras, Frames<float>& out, double time = 0);
   /// Renders one frame per camera and returns the images. Errors as above.
@@ -71,10 +71,10 @@ class Renderer {
   /// Device that the renderer runs on.
   const Device& device() const noexcept { return device_; }
   /// Replaces the settings of all later frames.
-  /// @return invalid_argument with the field.
+  /// @return invalid_argument naming the field.
   Status set_config(const RenderConfig& config);
   /// Replaces SimulatorScene::light as the light on the scene's meshes, for all later frames.
-  /// @return invalid_argument with the field.
+  /// @return invalid_argument naming the field.
   Status set_light(const MeshLight& light);
 
  private:

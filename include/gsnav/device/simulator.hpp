@@ -39,7 +39,7 @@ class Simulator {
  public:
   /// Creates a simulator that shares `scene` (docs/ownership.md).
   /// @param others further bodies, numbered after the scene's avatars
-  /// @return invalid_argument with the field, sensor or asset; unsupported if the device is not
+  /// @return invalid_argument naming the field, sensor or asset; unsupported if the device is not
   ///   available; out_of_memory; backend_failure.
   static Result<Simulator> create(const Device& device, std::shared_ptr<const SimulatorScene> scene,
                                   SimulatorConfig config, World::BodySource others = {});
@@ -129,8 +129,8 @@ class BatchSimulator {
   /// Creates a simulator that shares `scenes`.
   /// @param environments number of environments, N
   /// @param next_episode called once for each episode of each environment; see EpisodeSource
-  /// @return invalid_argument with the field, sensor or scene; unsupported if the device is not
-  ///   available, or with a sensor whose images cannot stay where BatchConfig::images asks;
+  /// @return invalid_argument naming the field, sensor or scene; unsupported if the device is not
+  ///   available, or naming a sensor whose images cannot stay where BatchConfig::images asks;
   ///   out_of_memory; backend_failure.
   static Result<BatchSimulator> create(const Device& device,
                                        std::vector<std::shared_ptr<const SimulatorScene>> scenes,
@@ -164,7 +164,7 @@ class BatchSimulator {
   Result<BatchStep> reset(std::span<const std::uint8_t> mask = {});
   /// Performs one action per environment and renders.
   /// @param actions [N]
-  /// @return invalid_argument with the environment's index: for a wrong number of actions, before the
+  /// @return invalid_argument naming the environment's index: for a wrong number of actions, before the
   ///   first reset, or in an environment that is done with AutoReset::disabled. Also the errors of
   ///   World::step, or a rendering error.
   Result<BatchStep> step(std::span<const Action> actions);

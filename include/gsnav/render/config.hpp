@@ -33,15 +33,15 @@ struct RenderConfig {
   Composite composite = Composite::merged;  ///< Rule by which Gaussians and meshes are combined in
                                             ///< frames that have both.
   Quality quality{};                        ///< error budget: exact, fast, ... (docs/accuracy.md)
-  Tuning tuning{};                          ///< Parameters of speed. They change no bit of the image.
-  Compat compat = Compat::none;             ///< another renderer's rules, for parity tests
+  Tuning tuning{};               ///< Settings that affect speed only. They change no bit of the image.
+  Compat compat = Compat::none;  ///< another renderer's rules, for parity tests
 
   /// True if all settings are equal.
   bool operator==(const RenderConfig&) const = default;
 };
 
 /// Checks all fields.
-/// @return invalid_argument, with the field, if one is out of range.
+/// @return invalid_argument naming the field if one is out of range.
 inline Status validate(const RenderConfig& c) {
   const BadArgument bad{"RenderConfig."};
   if (c.outputs == 0 || (c.outputs & ~kAllOutputs) != 0) {

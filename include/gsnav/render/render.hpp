@@ -319,7 +319,7 @@ Status render_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gauss
 ///
 /// @param ws scratch memory, kept between calls
 /// @param stats filled on success, if not null
-/// @return invalid_argument with the field; unsupported for more than 2^32 Gaussians; backend_failure.
+/// @return invalid_argument naming the field; unsupported for more than 2^32 Gaussians; backend_failure.
 ///   The workspace throws gsnav::Error (out_of_memory).
 template <class S, Backend B>
 Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,

@@ -16,7 +16,7 @@
 namespace gsnav {
 
 /// Checks that the lengths of all arrays agree.
-/// @return invalid_argument with the array.
+/// @return invalid_argument naming the array.
 template <class S, class Out>
 Status validate(const SkinningArgs<S, Out>& args) {
   const std::size_t n = args.size();
@@ -73,7 +73,7 @@ bool has_skinning_mode(const SkinningArgs<S, Out>& args) noexcept {
 /// (stage::Skin), dual quaternions, or linear blending with stretch. Every joint index must be less than
 /// joints.size, which AvatarAsset::validate checks. The result is complete after
 /// `backend.synchronize()`.
-/// @return invalid_argument with the array.
+/// @return invalid_argument naming the array.
 template <class S, Backend B, class Out>
 Status skin_gaussians(B& backend, const SkinningArgs<S, Out>& args) {
   if (Status s = validate(args); !s) return s;
@@ -91,7 +91,7 @@ Status skin_gaussians(B& backend, const SkinningArgs<S, Out>& args) {
 
 /// Skins many avatars, with the same bits as skin_gaussians on each. On a GPU it takes one launch
 /// (stage::SkinAll).
-/// @return invalid_argument with the avatar's index and the array; then nothing is skinned.
+/// @return invalid_argument naming the avatar's index and the array; then nothing is skinned.
 template <class S, Backend B, class Out = float>
 Status skin_all(B& backend, std::span<const SkinningArgs<S, Out>> avatars) {
   for (std::size_t i = 0; i < avatars.size(); ++i) {

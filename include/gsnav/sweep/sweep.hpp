@@ -177,7 +177,7 @@ class SizeCheck {
 /// Computes the gaps of N pairs of capsules on a backend (stage::CapsuleGaps), with the same bits as
 /// capsule_gap. Arrays are in the backend's memory. The result is complete after
 /// `backend.synchronize()`.
-/// @return invalid_argument with the array whose length is wrong.
+/// @return invalid_argument naming the array whose length is wrong.
 template <Backend B, class S>
 Status capsule_gaps(B& backend, const CapsuleGapArgs<S>& args) {
   detail::SizeCheck check("CapsuleGapArgs", args.size());
@@ -195,7 +195,7 @@ Status capsule_gaps(B& backend, const CapsuleGapArgs<S>& args) {
 
 /// Sweeps N pairs of moving capsules on a backend (stage::SweepCapsules), with the same bits as sweep.
 /// Arrays are in the backend's memory. The result is complete after `backend.synchronize()`.
-/// @return invalid_argument with the array whose length is wrong.
+/// @return invalid_argument naming the array whose length is wrong.
 template <Backend B, class S>
 Status sweep_capsules(B& backend, const SweepArgs<S>& args) {
   detail::SizeCheck check("SweepArgs", args.size());

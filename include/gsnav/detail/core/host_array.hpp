@@ -32,7 +32,7 @@ class HostArray {
  public:
   /// Sets the size to n. If the array has to grow, all elements become zero; else they keep their
   /// values.
-  /// @throws gsnav::Error with out_of_memory and the number of bytes.
+  /// @throws gsnav::Error (out_of_memory, naming the number of bytes) if there is no memory.
   void resize(std::size_t n) {
     if (n > capacity_) grow(n);
     size_ = n;

@@ -15,7 +15,7 @@ namespace gsnav {
 inline constexpr int kMaxImageSide = 16384;
 
 /// Checks all fields of a camera.
-/// @return invalid_argument with the field, its value and the rule.
+/// @return invalid_argument naming the field, its value and the rule.
 inline Status validate(const Camera& c) {
   const BadArgument bad{"Camera."};
   if (c.width < 1 || c.width > kMaxImageSide) return bad("width", c.width, "must be in [1, 16384]");

@@ -12,7 +12,7 @@
 namespace gsnav {
 
 /// Checks that the lengths of all arrays agree.
-/// @return invalid_argument with the array.
+/// @return invalid_argument naming the array.
 inline Status validate(const TemporalView& in) {
   const std::size_t n = in.base.size();
   Status status;
@@ -53,7 +53,7 @@ struct Moment {
 /// Arithmetic is in S; double is the reference. On host backends with sorted rows (`base.chunk_bounds`
 /// is set), chunks get bounds for this moment; otherwise they have no bounds and none is culled. The
 /// result is complete after `backend.synchronize()`.
-/// @return invalid_argument with the array, or if the time is not finite.
+/// @return invalid_argument naming the array, or for a time that is not finite.
 template <class S, Backend B>
 Status gaussians_at(B& backend, const TemporalView& in, double t, Moment<B>& out) {
   if (Status s = validate(in); !s) return s;

@@ -91,7 +91,7 @@ struct MeshWorkspace {
 };
 
 /// Checks an instance against the assumptions of kernels, except the values of its indices.
-/// @return invalid_argument with the field.
+/// @return invalid_argument naming the field.
 inline Status validate(const MeshInstance& instance) {
   const MeshView& m = instance.mesh;
   const BadArgument bad{"MeshInstance: "};
@@ -197,7 +197,7 @@ void place_meshes(MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes,
 }
 
 /// Checks the meshes, the camera and the light of a frame.
-/// @return invalid_argument with the field.
+/// @return invalid_argument naming the field.
 inline Status validate(std::span<const MeshInstance> meshes, const Camera& camera,
                        const MeshLight& light) {
   if (Status s = gsnav::validate(camera); !s) return s;
@@ -306,7 +306,7 @@ MeshShadeArgs<S> shade_args(MeshWorkspace<S, B>& ws, const Camera& camera, const
 /// @param tile_size width of the tiles of ws.tile_far, pixels
 /// @param layer_color whether to write the colour to ws.color. Then `images.color` is replaced by it.
 /// @param stats filled on success, if not null
-/// @return invalid_argument with the field; unsupported for 2^32 triangles or more; backend_failure.
+/// @return invalid_argument naming the field; unsupported for 2^32 triangles or more; backend_failure.
 template <class S, Backend B>
 Status draw_meshes(B& backend, MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes,
                    const Camera& camera, const MeshLight& light, int tile_size, bool layer_color,

@@ -40,7 +40,7 @@ struct Quality {
 };
 
 /// Checks all fields.
-/// @return invalid_argument with the field.
+/// @return invalid_argument naming the field.
 inline Status validate(const Quality& q) {
   const BadArgument bad{"RenderConfig.quality."};
   if (q.exponential != Exponential::exact && q.exponential != Exponential::fast) {

@@ -17,7 +17,7 @@ struct Tuning {
 };
 
 /// Checks all fields.
-/// @return invalid_argument with the field.
+/// @return invalid_argument naming the field.
 inline Status validate(const Tuning& t) {
   const BadArgument bad{"RenderConfig.tuning."};
   if (t.tile_size != 0 && t.tile_size != 8 && t.tile_size != 16 && t.tile_size != 32) {

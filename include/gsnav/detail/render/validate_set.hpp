@@ -104,7 +104,7 @@ inline Status validate(const Selection& selection, std::size_t chunks) {
 }
 
 /// Checks a set against the assumptions of kernels.
-/// @return invalid_argument with the array or field.
+/// @return invalid_argument naming the array or field.
 inline Status validate(const GaussianSet& set) {
   const GaussianRows& g = set.gaussians;
   const ShapeRows& shape = g.shape;
