@@ -55,13 +55,13 @@ class Renderer {
   /// Frees the device's memory.
   ~Renderer();
 
-  /// Renders one frame per camera. Makes the images named by RenderConfig::outputs; on CPUs also
-  /// Frames::stats.
+  /// Renders one frame per camera. Makes the images named by RenderConfig::outputs. On CPUs it also
+  /// fills Frames::stats.
   /// @param cameras at least one, all of the same image size
   /// @param out images, resized as needed
   /// @param time seconds on the scene's clock, at which avatars are posed
-  /// @return invalid_argument naming the field, or for no camera or different sizes; unsupported;
-  ///   out_of_memory; backend_failure.
+  /// @return invalid_argument naming the field, or if there are no cameras or their sizes differ;
+  ///   unsupported; out_of_memory; backend_failure.
   Status render(std::span<const Camera> cameras, Frames<float>& out, double time = 0);
   /// Renders one frame per camera and returns the images. Errors as above.
   Result<Frames<float>> render(std::span<const Camera> cameras, double time = 0);

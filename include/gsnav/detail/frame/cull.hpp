@@ -41,8 +41,9 @@ struct ChunkInView {
     return log2(max(static_cast<double>(bounds.opacity_max), 1e-30)) - camera.log2_alpha_min;
   }
 
-  /// Reach of footprints along one image axis, given its focal length, principal point, size and limit
-  /// of the Jacobian.
+  /// Reach of footprints beyond their means along one image axis: `wide` in pixels times depth, plus
+  /// `fixed` in pixels. The arguments of reach() are the focal length, principal point, limit of the
+  /// Jacobian and image size of the axis.
   struct Reach {
     double wide, fixed;
   };

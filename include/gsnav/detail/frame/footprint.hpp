@@ -6,8 +6,8 @@
 
 namespace gsnav {
 
-/// Columns of pixels in a strip: from the one that contains `first` to the one before `end`, which is an
-/// integer.
+/// Range of pixel columns. It starts with the column that contains `first` and ends before `end`, which
+/// is an integer.
 template <class L>
 struct PixelColumns {
   mask_of<L> any;
