@@ -84,8 +84,8 @@ DLManagedTensor* to_dlpack(T* data, const std::int64_t (&shape)[N], DLDevice dev
 
 /// View of a tensor that another library owns, for instance to render into it. The tensor must outlive
 /// the view.
-/// @return invalid_argument naming the field if the type is not T, the memory is not on `device`, or the
-///   data is null or misaligned. The same if the elements are not compact and row-major.
+/// @return invalid_argument naming the field. The tensor must have type T, memory on `device`, aligned
+///   data that is not null, and compact, row-major elements.
 template <class T>
 Result<View<T>> from_dlpack(const DLTensor& tensor, DLDevice device) {
   const BadArgument bad{"DLTensor."};

@@ -129,22 +129,22 @@ void as_view(const Eigen::PlainObjectBase<Derived>&& m) = delete;
 
 // ---- copies
 
-/// Copy of a vector.
+/// Copies a vector to Eigen.
 template <class S>
 Eigen::Matrix<S, 3, 1> to_eigen(const Vec3<S>& v) {
   return {v.x, v.y, v.z};
 }
-/// Copy of a matrix.
+/// Copies a matrix to Eigen.
 template <class S>
 Eigen::Matrix<S, 3, 3> to_eigen(const Mat3<S>& m) {
   return as_eigen(m);
 }
-/// Copy of a quaternion. gsnav stores w x y z, Eigen x y z w.
+/// Copies a quaternion to Eigen. gsnav stores w x y z, Eigen x y z w.
 template <class S>
 Eigen::Quaternion<S> to_eigen(const Quat<S>& q) {
   return Eigen::Quaternion<S>(q.w, q.x, q.y, q.z);
 }
-/// Copy of an affine map.
+/// Copies an affine map to Eigen.
 template <class S>
 Eigen::Transform<S, 3, Eigen::Affine> to_eigen(const Affine3<S>& a) {
   Eigen::Transform<S, 3, Eigen::Affine> t = Eigen::Transform<S, 3, Eigen::Affine>::Identity();
@@ -152,7 +152,7 @@ Eigen::Transform<S, 3, Eigen::Affine> to_eigen(const Affine3<S>& a) {
   t.translation() = as_eigen(a.translation);
   return t;
 }
-/// Copy of a rigid map. The linear part must be a rotation.
+/// Copies a rigid map to Eigen. The linear part must be a rotation.
 template <class S>
 Eigen::Transform<S, 3, Eigen::Isometry> to_isometry(const Affine3<S>& a) {
   Eigen::Transform<S, 3, Eigen::Isometry> t = Eigen::Transform<S, 3, Eigen::Isometry>::Identity();
@@ -160,10 +160,10 @@ Eigen::Transform<S, 3, Eigen::Isometry> to_isometry(const Affine3<S>& a) {
   t.translation() = as_eigen(a.translation);
   return t;
 }
-/// Affine map of a similarity.
+/// Copies a similarity to Eigen, as an affine map.
 inline Eigen::Affine3d to_eigen(const Similarity& s) { return to_eigen(affine_from(s)); }
 
-/// Copy of an Eigen 3-vector or 3 x 3 matrix as Vec3 or Mat3.
+/// Copies an Eigen 3-vector or 3 x 3 matrix to a Vec3 or Mat3.
 template <class Derived>
 auto from_eigen(const Eigen::MatrixBase<Derived>& m) {
   using S = typename Derived::Scalar;
@@ -176,12 +176,12 @@ auto from_eigen(const Eigen::MatrixBase<Derived>& m) {
     return Vec3<S>{m.derived().coeff(0), m.derived().coeff(1), m.derived().coeff(2)};
   }
 }
-/// Copy of an Eigen quaternion.
+/// Copies an Eigen quaternion to a Quat.
 template <class Derived>
 Quat<typename Derived::Scalar> from_eigen(const Eigen::QuaternionBase<Derived>& q) {
   return {q.w(), q.x(), q.y(), q.z()};
 }
-/// Copy of an affine Eigen transform.
+/// Copies an affine Eigen transform to an Affine3.
 template <class S, int Mode, int Options>
 Affine3<S> from_eigen(const Eigen::Transform<S, 3, Mode, Options>& t) {
   static_assert(Mode != Eigen::Projective, "a projective map is not affine");

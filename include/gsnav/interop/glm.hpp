@@ -69,55 +69,55 @@ View<const Vec3<S>> as_view(const GlmVec3<S>* points, std::size_t n) noexcept {
 
 // ---- copies
 
-/// Copy of a vector.
+/// Copies a vector to GLM.
 template <class S>
 GlmVec3<S> to_glm(const Vec3<S>& v) noexcept {
   return {v.x, v.y, v.z};
 }
-/// Copy of a GLM vector.
+/// Copies a GLM vector to a Vec3.
 template <class S>
 Vec3<S> from_glm(const GlmVec3<S>& v) noexcept {
   return {v.x, v.y, v.z};
 }
 
-/// Copy of a matrix.
+/// Copies a matrix to GLM.
 template <class S>
 GlmMat3<S> to_glm(const Mat3<S>& m) noexcept {
   return {to_glm(m.column(0)), to_glm(m.column(1)), to_glm(m.column(2))};
 }
-/// Copy of a GLM matrix.
+/// Copies a GLM matrix to a Mat3.
 template <class S>
 Mat3<S> from_glm(const GlmMat3<S>& m) noexcept {
   return transpose(Mat3<S>{{from_glm(m[0]), from_glm(m[1]), from_glm(m[2])}});
 }
 
-/// Copy of a quaternion.
+/// Copies a quaternion to GLM.
 template <class S>
 GlmQuat<S> to_glm(const Quat<S>& q) noexcept {
   GlmQuat<S> r;  // set by name: the order of the constructor's arguments depends on GLM's version
   r.w = q.w, r.x = q.x, r.y = q.y, r.z = q.z;
   return r;
 }
-/// Copy of a GLM quaternion.
+/// Copies a GLM quaternion to a Quat.
 template <class S>
 Quat<S> from_glm(const GlmQuat<S>& q) noexcept {
   return {q.w, q.x, q.y, q.z};
 }
 
-/// 4 x 4 matrix of an affine map.
+/// Converts an affine map to a 4 x 4 matrix.
 template <class S>
 GlmMat4<S> to_glm(const Affine3<S>& a) noexcept {
   GlmMat4<S> m(to_glm(a.linear));
   m[3] = {to_glm(a.translation), S(1)};
   return m;
 }
-/// Affine map of a 4 x 4 matrix whose last row is 0 0 0 1. The last row is not checked.
+/// Converts a 4 x 4 matrix whose last row is 0 0 0 1 to an affine map. The last row is not checked.
 template <class S>
 Affine3<S> from_glm(const GlmMat4<S>& m) noexcept {
   return {from_glm(GlmMat3<S>(m)), from_glm(GlmVec3<S>(m[3]))};
 }
 
-/// 4 x 4 matrix of a similarity.
+/// Converts a similarity to a 4 x 4 matrix.
 inline glm::dmat4 to_glm(const Similarity& s) noexcept { return to_glm(affine_from(s)); }
 /// Similarity of a model matrix that only rotates, scales uniformly and translates.
 /// @return invalid_argument for any other matrix.

@@ -47,7 +47,7 @@ GSNAV_HD bool swept_apart(const MovingCapsule<double>& a, const MovingCapsule<do
   return false;
 }
 
-/// Order by avatar, then by bone.
+/// True if capsule a comes before capsule b: by avatar, then by bone.
 GSNAV_HD bool id_less(std::uint32_t avatar_a, std::uint32_t bone_a, std::uint32_t avatar_b,
                       std::uint32_t bone_b) noexcept {
   return avatar_a != avatar_b ? avatar_a < avatar_b : bone_a < bone_b;

@@ -26,9 +26,9 @@ enum class Response : std::uint8_t {
   ray,            ///< exact: the maximum along the ray
 };
 
-/// Conversion of a float32 key to the integer that is sorted. It keeps all bits, or only the lowest n of
-/// the bits counted from the near plane. With n = 24, 20 bits of the mantissa remain up to 2^16 times
-/// the near plane.
+/// Conversion of a float32 key to the integer that is sorted. It keeps all 32 bits, or n of them: the
+/// bits of the key minus those of the near plane, without the lowest ones. With n = 24, 20 bits of the
+/// mantissa remain, for keys up to 2^16 times the near plane.
 struct KeyCode {
   std::uint32_t base = 0, largest = 0xffffffffu;
   int shift = 0;

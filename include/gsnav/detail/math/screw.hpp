@@ -21,7 +21,8 @@ struct RigidPose {
 ///
 /// Let t be the translation from a to b in a's frame, theta the angle and n the axis. The part of t
 /// perpendicular to n is scaled by sin(u theta / 2) / sin(theta / 2) and turned by (u - 1) theta / 2
-/// about n. Small angles need no special formula.
+/// about n. Only rotations with a sine below 1e-9 are interpolated differently, by slerp and a straight
+/// line.
 template <class S>
 RigidPose<S> screw_between(const RigidPose<S>& a, const RigidPose<S>& b, S u) noexcept {
   const Quat<S> back = conjugate(a.rotation);

@@ -80,8 +80,8 @@ struct MeshLight {
 /// Rule by which Gaussians and meshes become one image.
 enum class Composite : std::uint8_t {
   merged,  ///< The rule of the contract: each Gaussian is compared with the mesh's depth at each pixel.
-  hard_depth,  ///< The rule of Habitat-GS: a pixel shows either the Gaussians or the mesh, whichever has
-               ///< the smaller expected depth.
+  hard_depth,  ///< The rule of Habitat-GS: Gaussians are drawn over the mesh where their expected depth
+               ///< is not beyond it. Elsewhere only the mesh shows.
 };
 
 /// A mesh instance in one camera's frame.
