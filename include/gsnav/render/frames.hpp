@@ -29,13 +29,13 @@ struct RenderStats {
 };
 
 /// Images of a batch of C cameras of one size (H x W pixels), in host memory. Images that were not
-/// requested are empty.
+/// requested are empty. Output (detail/frame/output.hpp) defines the values.
 template <class S>
 struct Frames {
   std::size_t cameras = 0,           ///< number of cameras, C
       height = 0,                    ///< rows of an image, H
       width = 0;                     ///< columns of an image, W
-  std::vector<S> rgb;                ///< [C][H][W][3]
+  std::vector<S> rgb;                ///< [C][H][W][3], colours over the background
   std::vector<S> alpha;              ///< [C][H][W]
   std::vector<S> median_depth;       ///< [C][H][W] metres; 0 where the ray hits nothing
   std::vector<S> expected_depth;     ///< [C][H][W] metres

@@ -38,7 +38,8 @@ GSNAV_HD void gap_packs(const CapsuleGapArgs<float>& args, std::size_t begin, st
   }
 }
 
-/// Computes GapOfPair<float> for the pairs [begin, end), kWidth at a time. Same bits.
+/// Computes GapOfPair<float> for the pairs [begin, end), kWidth at a time. The bits equal those of the
+/// scalar kernel.
 inline void gap_range(const CapsuleGapArgs<float>& args, std::size_t begin, std::size_t end) noexcept {
   const std::size_t packs = begin + (end - begin) / kWidth * kWidth;
   if (args.asks_for_points()) {
@@ -86,8 +87,8 @@ GSNAV_HD void write_sweeps(const SweepArgs<float>& args, const SweepResult<F>& r
 /// Largest number of pairs per call of sweep_range.
 inline constexpr std::size_t kSweepRange = 1024;
 
-/// Computes SweepPair<float> for the pairs [begin, end), at most kSweepRange, kWidth at a time. Same
-/// bits.
+/// Computes SweepPair<float> for the pairs [begin, end), at most kSweepRange, kWidth at a time. The bits
+/// equal those of the scalar kernel.
 ///
 /// Most pairs move apart or pass each other and need only one evaluation. The others are collected and
 /// finished together, so that a pack does not wait for a single lane.

@@ -56,7 +56,7 @@ GSNAV_STAGE void project_chunk_alone(const ViewedSet<float>& args, const Project
   ProjectChunk<float>{args, out}(c);
 }
 
-/// Computes ProjectChunk<float>, kWidth Gaussians at a time. Same bits.
+/// Computes ProjectChunk<float>, kWidth Gaussians at a time. The bits equal those of the scalar kernel.
 inline void project_chunk(const ViewedSet<float>& args, const ProjectOutputs<float>& out,
                           std::size_t c) noexcept {
   const ShapeRows& shape = args.gaussians.shape;

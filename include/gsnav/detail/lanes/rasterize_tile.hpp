@@ -27,7 +27,7 @@ class TileBlender {
   static constexpr DepthMode kLoop = TilePixels<Color, D, Mesh>::kLoop;
   static constexpr bool kNeedsId = D != DepthMode::none || General || Mesh;
 
-  /// What blending reads of a splat, besides its column terms.
+  /// Values of a splat that blending reads, besides its column terms.
   struct Row {
     float ref_y, b;
     SplatColor<float> color;

@@ -156,7 +156,8 @@ template <int K>
   return out;
 }
 
-/// Computes SkinGaussian<float> for the Gaussians [begin, end) in whole packs. Same bits.
+/// Computes SkinGaussian<float> for the Gaussians [begin, end) in whole packs. The bits equal those of
+/// the scalar kernel.
 template <int K>
 GSNAV_HD void skin_packs(const SkinningArgs<float>& args, std::size_t begin, std::size_t end) noexcept {
   for (std::size_t first = begin; first < end; first += kWidth) {
@@ -178,7 +179,8 @@ GSNAV_HD void skin_packs(const SkinningArgs<float>& args, std::size_t begin, std
   }
 }
 
-/// Computes SkinGaussian<float> for the Gaussians [begin, end), kWidth at a time. Same bits.
+/// Computes SkinGaussian<float> for the Gaussians [begin, end), kWidth at a time. The bits equal those
+/// of the scalar kernel.
 inline void skin_range(const SkinningArgs<float>& args, std::size_t begin, std::size_t end) noexcept {
   const std::size_t packs = begin + (end - begin) / kWidth * kWidth;
   if (args.influences == kInfluences8) {
