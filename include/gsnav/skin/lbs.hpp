@@ -14,8 +14,9 @@
 
 namespace gsnav {
 
-/// Number of joints that move one Gaussian: 4 or 8.
-inline constexpr int kInfluences4 = 4, kInfluences8 = 8;
+/// Supported numbers of joints that move one Gaussian (SkinningArgs::influences).
+inline constexpr int kInfluences4 = 4,  ///< four joints per Gaussian
+    kInfluences8 = 8;                   ///< eight joints per Gaussian
 /// Number of parts that make a skinning weight of 1. Weights are stored as integers of parts, and those
 /// of a Gaussian sum to kWeightParts exactly. Rounding weights (detail/avatar/skinning_weights.hpp)
 /// moves a Gaussian by at most K / (4 kWeightParts) times the greatest distance between two positions

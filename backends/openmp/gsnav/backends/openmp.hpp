@@ -51,25 +51,42 @@ inline namespace GSNAV_LANES_TAG {
 /// SIMD kernels of one instruction set, for Gaussians, meshes, skinning and capsules.
 /// lanes::kernel_table fills it.
 struct LaneKernels {
+  /// Name of the instruction set: "baseline", "avx2", "avx512", "neon" or "native".
   const char* name;
+  /// Number of float lanes.
   int width;
+  /// Projects a chunk of Gaussians.
   void (*project_chunk)(const ViewedSet<float>&, const ProjectOutputs<float>&,
                         std::size_t chunk) noexcept;
+  /// Counts the splats of each tile for one block of splats.
   void (*count_tiles)(const CountTileIntersections<float>&, std::size_t block) noexcept;
+  /// Like count_tiles, without splats behind a mesh.
   void (*count_tiles_before_mesh)(const CountTileIntersections<float, MeshCull<float>>&,
                                   std::size_t block) noexcept;
+  /// Writes the splats of one block to the lists of their tiles.
   void (*scatter_tiles)(const ScatterTileIntersections<float>&, std::size_t block) noexcept;
+  /// Like scatter_tiles, without splats behind a mesh.
   void (*scatter_tiles_before_mesh)(const ScatterTileIntersections<float, MeshCull<float>>&,
                                     std::size_t block) noexcept;
+  /// Blends a tile of a frame without meshes.
   void (*rasterize_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
+  /// Blends a tile of a frame with meshes.
   void (*composite_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
+  /// Projects a chunk of mesh vertices.
   void (*project_mesh_vertices)(const ProjectMeshVertices<float>&, std::size_t chunk) noexcept;
+  /// Counts the visible pieces of a chunk of triangles.
   void (*count_mesh_triangles)(const CountMeshTriangles<float>&, std::size_t chunk) noexcept;
+  /// Writes the visible pieces of a chunk of triangles.
   void (*write_mesh_triangles)(const WriteMeshTriangles<float>&, std::size_t chunk) noexcept;
+  /// Finds the nearest triangle at each pixel of a tile.
   void (*rasterize_mesh_tile)(const RasterizeMeshTile<float>&, std::size_t tile) noexcept;
+  /// Shades a row of pixels.
   void (*shade_mesh_row)(const ShadeMeshRow<float>&, std::size_t row) noexcept;
+  /// Skins the Gaussians [begin, end).
   void (*skin_range)(const SkinningArgs<float>&, std::size_t begin, std::size_t end) noexcept;
+  /// Computes the gaps of the pairs [begin, end) of capsules.
   void (*gap_range)(const CapsuleGapArgs<float>&, std::size_t begin, std::size_t end) noexcept;
+  /// Sweeps the pairs [begin, end) of capsules.
   void (*sweep_range)(const SweepArgs<float>&, std::size_t begin, std::size_t end) noexcept;
 };
 
@@ -98,7 +115,9 @@ class OpenMPBackend : public HostMemory {
       : threads_(threads > 0 ? threads : default_threads()),
         pool_(threads_ > 1 ? std::make_shared<ThreadPool>(threads_) : nullptr) {}
 
+  /// Number of threads, including the caller.
   int threads() const noexcept { return threads_; }
+  /// Number of threads: work is cut into that many pieces.
   std::size_t concurrency() const noexcept { return static_cast<std::size_t>(threads_); }
 
   /// Backend for one thread. With it, batches of cameras run one frame per thread.
@@ -119,9 +138,11 @@ class OpenMPBackend : public HostMemory {
       for (std::size_t i = begin; i < end; ++i) f(i);
     });
   }
+  /// Returns success: work is done when the call returns.
   Status synchronize() { return {}; }
 
   // Stages with SIMD kernels (core/stages.hpp).
+  /// Projects a set.
   void run(stage::Project, const ViewedSet<float>& args, const ProjectOutputs<float>& out) {
     const auto kernel = lane_kernels().project_chunk;
     parallel_for(args.chunk_count(), [&args, &out, kernel](std::size_t c) { kernel(args, out, c); });
@@ -133,44 +154,59 @@ class OpenMPBackend : public HostMemory {
     parallel_for(chunks.size,
                  [&args, &out, chunks, kernel](std::size_t i) { kernel(args, out, chunks[i]); });
   }
+  /// Binning reads the tiles that projection found (BinArgs::spans).
   static constexpr bool bins_in_lanes = true;
+  /// Counts the splats of each tile.
   void run(stage::Each, std::size_t n, const CountTileIntersections<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().count_tiles});
   }
+  /// Counts the splats of each tile that are not behind a mesh.
   void run(stage::Each, std::size_t n, const CountTileIntersections<float, MeshCull<float>>& k) {
     parallel_for(n, Compiled{k, lane_kernels().count_tiles_before_mesh});
   }
+  /// Writes the splats to the lists of their tiles.
   void run(stage::Each, std::size_t n, const ScatterTileIntersections<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().scatter_tiles});
   }
+  /// Writes the splats that are not behind a mesh to the lists of their tiles.
   void run(stage::Each, std::size_t n, const ScatterTileIntersections<float, MeshCull<float>>& k) {
     parallel_for(n, Compiled{k, lane_kernels().scatter_tiles_before_mesh});
   }
+  /// Blends a frame without meshes.
   void run(stage::Blend, const RasterArgs<float>& args) {
     parallel_for(args.grid.count(), Compiled{args, lane_kernels().rasterize_tile});
   }
+  /// Blends a frame with meshes.
   void run(stage::BlendWithMeshes, const RasterArgs<float>& args) {
     parallel_for(args.grid.count(), Compiled{args, lane_kernels().composite_tile});
   }
+  /// Projects the vertices of meshes.
   void run(stage::Each, std::size_t n, const ProjectMeshVertices<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().project_mesh_vertices});
   }
+  /// Counts the visible pieces of triangles.
   void run(stage::Each, std::size_t n, const CountMeshTriangles<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().count_mesh_triangles});
   }
+  /// Writes the visible pieces of triangles.
   void run(stage::Each, std::size_t n, const WriteMeshTriangles<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().write_mesh_triangles});
   }
+  /// Finds the nearest triangle at each pixel.
   void run(stage::Each, std::size_t n, const RasterizeMeshTile<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().rasterize_mesh_tile});
   }
+  /// Shades the pixels of meshes.
   void run(stage::Each, std::size_t n, const ShadeMeshRow<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().shade_mesh_row});
   }
+  /// Skins the Gaussians of an avatar.
   void run(stage::Skin, const SkinningArgs<float>& args) { in_ranges(args, lane_kernels().skin_range); }
+  /// Computes gaps of pairs of capsules.
   void run(stage::CapsuleGaps, const CapsuleGapArgs<float>& args) {
     in_ranges(args, lane_kernels().gap_range);
   }
+  /// Sweeps pairs of capsules.
   void run(stage::SweepCapsules, const SweepArgs<float>& args) {
     in_ranges(args, lane_kernels().sweep_range);
   }

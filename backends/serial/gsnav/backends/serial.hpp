@@ -12,10 +12,12 @@ namespace gsnav {
 /// In double it is the reference for all other backends.
 class SerialBackend : public HostMemory {
  public:
+  /// Calls f(i) for i in [0, n), in order.
   template <class F>
   void parallel_for(std::size_t n, const F& f) {
     for (std::size_t i = 0; i < n; ++i) f(i);
   }
+  /// Returns success: work is done when the call returns.
   Status synchronize() { return {}; }
 };
 

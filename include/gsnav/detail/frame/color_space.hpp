@@ -37,11 +37,13 @@ GSNAV_HD S converted(S value, ColorSpace from, ColorSpace to) noexcept {
 /// Kernel that converts the colours of one chunk of projected Gaussians to the space of blending.
 template <class S>
 struct ConvertSplatColors {
-  View<SplatColor<S>> colors;
-  View<const std::uint32_t> counts;
-  std::size_t first_chunk = 0;
-  ColorSpace from{}, to{};
+  View<SplatColor<S>> colors;        ///< [slots], colours of all sets
+  View<const std::uint32_t> counts;  ///< [chunks], number of splats per chunk
+  std::size_t first_chunk = 0;       ///< index of the first chunk of the set among those of all sets
+  ColorSpace from{},                 ///< space of the set
+      to{};                          ///< space of the frame
 
+  /// Converts the colours of chunk c of the set.
   GSNAV_HD void operator()(std::size_t c) const noexcept {
     const std::size_t base = (first_chunk + c) * kProjectChunk;
     for (std::size_t i = base; i < base + counts[first_chunk + c]; ++i) {
@@ -56,7 +58,8 @@ struct ConvertSplatColors {
 /// Kernel that decodes one value of an sRGB-encoded image in place.
 template <class S>
 struct DecodeImage {
-  S* values = nullptr;
+  S* values = nullptr;  ///< image, in sRGB encoding
+  /// Decodes value i.
   GSNAV_HD void operator()(std::size_t i) const noexcept { values[i] = srgb_decoded(values[i]); }
 };
 
