@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// People: skeletons, motions and skinning. Link gsnav::avatar. What makes them: rigging.hpp.
+// Avatars: skeletons, motions and skinning. Link gsnav::avatar. To make avatars, see rigging.hpp.
 
 #include "gsnav/avatar/actor.hpp"
 #include "gsnav/avatar/asset.hpp"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What runs where there is no scene yet: the embedded flat, people made by code alone and their walks.
-// Link gsnav::demo.
+// Content for programs that run without any file: the embedded flat, people made by code, and their
+// walks. Link gsnav::demo.
 
 #include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/detail/demo/floor_plan.hpp"

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Errors: float64 oracles and metrics of images and depths. Link gsnav::eval for SSIM and FLIP.
+// Measuring errors: float64 oracles, and metrics of images and depths. Link gsnav::eval for SSIM and
+// FLIP.
 
 #include "gsnav/detail/eval/depth_error.hpp"
 #include "gsnav/detail/eval/flip.hpp"

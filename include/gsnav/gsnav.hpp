@@ -2,8 +2,8 @@
 #pragma once
 
 // Everything that needs only a C++20 compiler. Add a backend (gsnav/backends/...), and link
-// gsnav::avatar for what avatar/ declares. nav, io, sim and interop have headers of their own, because
-// they need other libraries.
+// gsnav::avatar for the functions in avatar/. nav, io, sim and interop need other libraries and have
+// headers of their own.
 
 #include "gsnav/avatar.hpp"
 #include "gsnav/core/backend.hpp"

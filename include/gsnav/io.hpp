@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Files: scenes, images, meshes, avatars, episodes and data sets, read and written. Link gsnav::io.
+// Reading and writing files: scenes, images, meshes, avatars, episodes and data sets. Link gsnav::io.
 
 #include "gsnav/detail/io/avatar_file.hpp"
 #include "gsnav/detail/io/avatar_scene_file.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// NavMeshes, shortest paths, steps among moving people and planners. Link gsnav::nav.
+// NavMeshes, shortest paths, agent steps among moving people, and planners. Link gsnav::nav.
 
 #include "gsnav/detail/nav/episode.hpp"
 #include "gsnav/detail/nav/gaussian_navmesh.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A scene by its name, with all that belongs to it. Link gsnav::open.
+// Opens a scene by its name, together with its NavMesh and settings. Link gsnav::open.
 
 #include "gsnav/detail/open/open_scene.hpp"

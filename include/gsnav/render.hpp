@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Scenes and images: clouds of Gaussians, meshes, cameras, and the renderer on a device chosen at run
-// time. Link gsnav::device. BasicRenderer, over a backend of your choice: scene/basic_renderer.hpp. What
-// is made of a cloud before it is drawn: scene/prepare.hpp.
+// Scenes and images: Gaussian clouds, meshes, cameras, and the renderer on a device chosen at run time.
+// Link gsnav::device. For a backend chosen at compile time, see BasicRenderer
+// (scene/basic_renderer.hpp). To prepare a cloud before drawing (filtering, levels of detail), see
+// scene/prepare.hpp.
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/detail/frame/color_space.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What makes avatars: bodies of rigged meshes and of clouds, capsules that cover them, motions
+// Making avatars: bodies from rigged meshes and from clouds, capsules that cover them, motions
 // retargeted to their skeletons. Link gsnav::rigging.
 
 #include "gsnav/avatar.hpp"

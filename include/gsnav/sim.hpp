@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The simulator on a device chosen at run time: scenes, sensors, actions, episodes, metrics and
-// batches. Link gsnav::device. BasicSimulator and BasicBatchSimulator, over a backend of your choice:
-// sim/basic_simulator.hpp and sim/basic_batch.hpp.
+// The simulator on a device chosen at run time: scenes, sensors, actions, episodes, metrics and batches.
+// Link gsnav::device. For a backend chosen at compile time, see BasicSimulator (sim/basic_simulator.hpp)
+// and BasicBatchSimulator (sim/basic_batch.hpp).
 
 #include "gsnav/detail/sim/batch_world.hpp"
 #include "gsnav/detail/sim/body_cache.hpp"

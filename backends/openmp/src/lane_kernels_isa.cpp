@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compiled once per instruction set. Nothing here may leave a function behind that another object could
-// pick up: every definition lives in the set's own namespace or is always inlined.
+// Compiled once per instruction set. Every definition is in the set's own namespace or always inlined,
+// so that no other object can pick up a function from here.
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/lanes/kernels.hpp"
 

@@ -9,41 +9,53 @@
 
 namespace gsnav {
 
-/// Memory that the host reads and writes directly; arrays of the caller are used without a copy.
+/// Tag of memory that the host reads and writes directly. Arrays of the caller are used without a copy.
 struct HostSpace {};
 
-/// Which side each end of a copy lies on.
-enum class CopyKind { host_to_host, host_to_device, device_to_host, device_to_device };
+/// Source and destination of a copy: host or device memory.
+enum class CopyKind {
+  host_to_host,     ///< within host memory
+  host_to_device,   ///< from host memory to the backend's memory
+  device_to_host,   ///< from the backend's memory to host memory
+  device_to_device  ///< within the backend's memory
+};
 
 namespace detail {
+// Stands for any kernel in the concept Backend.
 struct NoopFunctor {
   GSNAV_HD void operator()(std::size_t) const noexcept {}
 };
 }  // namespace detail
 
-/// What it takes to run gsnav: six members and a memory space. A backend object is a queue: work is
-/// done in the order it was given, and results are there after `synchronize()`.
+/// Interface of a backend: where kernels run and where their arrays lie. Six members and a memory space
+/// are required.
 ///
-///     using memory_space = HostSpace;                     // or a tag of its own
-///     void* allocate(std::size_t bytes, std::size_t align);   // nullptr where there is none
-///     void  deallocate(void* p, std::size_t bytes) noexcept;
-///     void  copy(void* dst, const void* src, std::size_t bytes, CopyKind kind);
-///     void  fill(void* p, unsigned char byte, std::size_t bytes);
-///     template <class F> void parallel_for(std::size_t n, const F& f);   // f(i) for i in [0, n)
-///     Status synchronize();
+/// A backend object is a queue. It runs work in the order of the calls, and results are complete after
+/// `synchronize()`.
 ///
-/// Optional members, each with a generic fallback:
+/// @code
+/// using memory_space = HostSpace;                         // or a tag of its own
+/// void* allocate(std::size_t bytes, std::size_t align);   // nullptr when memory is exhausted
+/// void  deallocate(void* p, std::size_t bytes) noexcept;
+/// void  copy(void* dst, const void* src, std::size_t bytes, CopyKind kind);
+/// void  fill(void* p, unsigned char byte, std::size_t bytes);
+/// template <class F> void parallel_for(std::size_t n, const F& f);   // f(i) for i in [0, n)
+/// Status synchronize();
+/// @endcode
 ///
-/// - `run(stage, args...)`: a stage by code of its own. core/stages.hpp is the table of stages.
-/// - `sort_pairs(keys, values, keys_alt, values_alt, n, bits)`: a stable sort by the lowest `bits` of
-///   the key. Returns whether the result is in the _alt arrays.
-/// - `concurrency() -> std::size_t`: how many pieces to cut work into; 1 by default.
-/// - `one_thread() -> B`: a backend of the same kind for the calling thread alone. Batches of cameras
-///   are then cut by frames (detail/render/thread_frames.hpp).
-/// - `static constexpr bool bins_in_lanes`: binning reads BinArgs::spans, which projection then fills.
-/// - `batch_renderer`: a type that draws many cameras by one call (detail/sim/frame_batch.hpp).
-/// - `static allocate_host(bytes) -> void*` and `deallocate_host(p)`: host memory that it copies to
-///   and from without waiting (detail/core/host_array.hpp); nullptr where there is none.
+/// Optional members. Without them a generic form is used:
+/// - `run(stage, args...)`: runs a stage with the backend's own code. core/stages.hpp is the table of
+///   stages.
+/// - `sort_pairs(keys, values, keys_alt, values_alt, n, bits)`: sorts stably by the lowest `bits` bits
+///   of the keys. Returns true if the result is in the `_alt` arrays.
+/// - `concurrency() -> std::size_t`: number of pieces to cut work into. Default: 1.
+/// - `one_thread() -> B`: a backend of the same kind that uses only the calling thread. Batches of
+///   cameras then run one frame per thread (detail/render/thread_frames.hpp).
+/// - `static constexpr bool bins_in_lanes`: true if binning reads BinArgs::spans. Projection then fills
+///   that array.
+/// - `batch_renderer`: a type that draws many cameras in one call (detail/sim/frame_batch.hpp).
+/// - `static allocate_host(bytes) -> void*` and `deallocate_host(p)`: host memory for copies that do not
+///   wait (detail/core/host_array.hpp). `allocate_host` returns nullptr if there is none.
 template <class B>
 concept Backend = requires(B& b, void* p, const void* q, std::size_t n, detail::NoopFunctor f) {
   typename B::memory_space;
@@ -55,11 +67,11 @@ concept Backend = requires(B& b, void* p, const void* q, std::size_t n, detail::
   { b.synchronize() } -> std::same_as<Status>;
 };
 
-/// True where the host may touch the backend's memory.
+/// True if the host may read and write the backend's memory.
 template <class B>
 inline constexpr bool is_host_backend = std::is_same_v<typename B::memory_space, HostSpace>;
 
-/// How many pieces a backend wants work cut into.
+/// Number of pieces that the backend wants work cut into, at least 1.
 template <Backend B>
 std::size_t concurrency_of(const B& b) noexcept {
   if constexpr (requires { b.concurrency(); }) {

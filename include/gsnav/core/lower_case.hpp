@@ -5,8 +5,8 @@
 
 namespace gsnav {
 
-/// With the letters A to Z in lower case, whatever the locale; for names of joints and the endings of
-/// files.
+/// `text` with the letters A to Z in lower case, in any locale. Used for joint names and file
+/// extensions.
 inline std::string lower_case(std::string text) {
   for (char& c : text) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');

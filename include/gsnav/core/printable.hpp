@@ -9,9 +9,9 @@
 
 namespace gsnav {
 
-/// Text for a terminal: what could steer it is written as \xNN, that is control characters but tab and
-/// line feed, those of U+0080 to U+009F too, and bytes that are no UTF-8. Names of files may hold any of
-/// these. Status does it for its message.
+/// Escapes text for a terminal. File names may contain bytes that control a terminal; Status escapes its
+/// message with this function. Control characters (U+0000 to U+001F except tab and line feed, U+007F to
+/// U+009F) and bytes that are not valid UTF-8 are written as \\xNN.
 inline std::string printable(std::string_view text) {
   constexpr char kDigits[] = "0123456789ABCDEF";
   std::string out;
@@ -19,7 +19,7 @@ inline std::string printable(std::string_view text) {
   for (std::size_t i = 0; i < text.size();) {
     const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
     const unsigned first = byte(i);
-    // Bytes of the character that begins here by its first one; 0 where none does.
+    // Length in bytes of the character that starts here, from its first byte. 0 for an invalid start.
     const std::size_t length = first < 0x80   ? 1
                                : first < 0xc2 ? 0
                                : first < 0xe0 ? 2

@@ -19,11 +19,13 @@
 
 namespace gsnav {
 
-/// Error of an output path: "PATH: cannot be written: WHY".
+/// Status for an output path that cannot be written: "PATH: cannot be written: WHY".
 inline Status unwritable(const std::filesystem::path& path, const std::string& why,
                          Errc code = Errc::file_not_found) {
   return {code, path.string() + ": cannot be written: " + why};
 }
+/// Status for an output path that cannot be written. The reason is the system's text for the errno value
+/// `error`.
 inline Status unwritable(const std::filesystem::path& path, int error,
                          Errc code = Errc::file_not_found) {
   return unwritable(path, std::generic_category().message(error), code);
@@ -31,25 +33,27 @@ inline Status unwritable(const std::filesystem::path& path, int error,
 
 namespace detail {
 
-/// Follows the symbolic links of a path, also where the last one leads to nothing yet.
+/// Follows symbolic links, up to 40. The last target need not exist.
 inline std::filesystem::path link_target(std::filesystem::path path) {
   constexpr int kMostLinks = 40;
   std::error_code error;
   for (int i = 0; i < kMostLinks && std::filesystem::is_symlink(path, error); ++i) {
     const std::filesystem::path to = std::filesystem::read_symlink(path, error);
     if (error) break;
-    path = path.parent_path() / to;  // of an absolute `to`: `to`
+    path = path.parent_path() / to;  // `to` itself if it is absolute
   }
   return path;
 }
 
+/// Folder that contains `path`; "." for a bare name.
 inline std::filesystem::path folder_of(const std::filesystem::path& path) {
   const std::filesystem::path parent = path.parent_path();
   return parent.empty() ? std::filesystem::path(".") : parent;
 }
 
-/// Forces the names in a folder to the disk; errno of what failed, or 0. A folder that may not be read,
-/// or a file system without such a call, is left as it is.
+/// Flushes the directory entries of a folder to the disk.
+/// @return the errno value of the failure, or 0. A folder without read permission, or a file system
+///   without fsync for folders, is skipped and gives 0.
 inline int sync_folder(const std::filesystem::path& folder) {
   const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (fd < 0) return errno == EACCES ? 0 : errno;
@@ -60,8 +64,10 @@ inline int sync_folder(const std::filesystem::path& folder) {
 
 }  // namespace detail
 
-/// Appends a line to a file that exists. It is on the disk when this returns (fdatasync); a failure
-/// leaves the file as it was. A process that is killed can leave part of the line, without its end.
+/// Appends `line` and a line feed to an existing file and flushes it to the disk (fdatasync). A failed
+/// call truncates the file to its former length. A process killed during the call may leave part of the
+/// line without its end.
+/// @return file_not_found if the file cannot be opened, write_failed if the line cannot be written.
 inline Status append_line(const std::filesystem::path& path, std::string line) {
   line += '\n';
   const int fd = ::open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
@@ -81,10 +87,10 @@ inline Status append_line(const std::filesystem::path& path, std::string line) {
   return error == 0 ? Status() : unwritable(path, error, Errc::write_failed);
 }
 
-/// Checks that a file of this name can be written: the folder exists and may be written to, and what has
-/// the name is no folder and not write-protected. Writes nothing. Call it before long work whose result
-/// goes to `path`.
-/// @return file_not_found, naming the path or the folder that is missing.
+/// Checks that a file named `path` can be written, without writing anything. Call it before long work
+/// whose result goes to `path`. The folder must exist and be writable. If `path` exists, it must be
+/// writable and not be a folder.
+/// @return file_not_found naming the path or the missing folder.
 inline Status check_output_path(const std::filesystem::path& path) {
   struct ::stat found {};
   if (path.empty()) return {Errc::file_not_found, "the name of the file to write is empty"};
@@ -107,9 +113,8 @@ inline Status check_output_path(const std::filesystem::path& path) {
   return {};
 }
 
-/// Makes a folder for files to be written, and those above it, where they are missing. Call it before
-/// long work.
-/// @return file_not_found where it cannot be made, is a file or may not be written to.
+/// Creates an output folder and its missing parents. Call it before long work.
+/// @return file_not_found if the folder cannot be created, is a file or is not writable.
 inline Status make_output_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
@@ -119,22 +124,30 @@ inline Status make_output_folder(const std::filesystem::path& folder) {
   return ::access(folder.c_str(), W_OK | X_OK) == 0 ? Status() : unwritable(folder, errno);
 }
 
-/// A file being written, which takes its name only when it is whole.
+/// A file that gets its name only when it is complete.
 ///
-/// Bytes go to a nameless file in the target's folder (or, where the file system has none, to one of a
-/// unique name `NAME.PID-NUMBER.part`). `commit` forces them to the disk and renames. Until then, and
-/// after any failure, what had the name before is untouched and nothing new is left; a process that is
-/// killed leaves a `.part` file at most. An existing file keeps its permissions; a symbolic link stays
-/// one, and its target is replaced. Devices and pipes are written in place. Objects of different threads
-/// and processes may write the same name: one of them stays.
+/// Bytes go to an unnamed file in the target's folder, or to `NAME.PID-NUMBER.part` on file systems
+/// without unnamed files. `commit` flushes the bytes to the disk and renames the file. Until then, and
+/// after any failure, an existing file of that name is unchanged and nothing new is left. A killed
+/// process leaves at most a `.part` file.
+/// - An existing file keeps its permissions.
+/// - The target of a symbolic link is replaced; the link stays.
+/// - Devices and pipes are written in place.
+/// - If several threads or processes write the same name, the file of one of them remains, whole.
 class OutputFile {
  public:
+  /// An object without an open file.
   OutputFile() = default;
+  /// Not copyable.
   OutputFile(const OutputFile&) = delete;
+  /// Not copyable.
   OutputFile& operator=(const OutputFile&) = delete;
+  /// Discards a file that was not committed.
   ~OutputFile() { discard(); }
 
-  /// Starts a file that `commit` names `path`. Errors as of `check_output_path`.
+  /// Starts a file that `commit` will name `path`. Discards a file that is still open.
+  /// @return the errors of `check_output_path`, or file_not_found if the temporary file cannot be
+  ///   created.
   Status open(const std::filesystem::path& path) {
     discard();
     error_ = 0;
@@ -152,7 +165,8 @@ class OutputFile {
       fd = open_aside();
     }
     if (fd < 0) return unwritable(path, errno);
-    if (exists && !in_place_) {  // as far as we may
+    // Best effort: without the rights, the file keeps our owner and mode.
+    if (exists && !in_place_) {
       [[maybe_unused]] const int owner = ::fchown(fd, old.st_uid, old.st_gid);
       [[maybe_unused]] const int mode = ::fchmod(fd, old.st_mode & 0777);
     }
@@ -166,19 +180,22 @@ class OutputFile {
     return {};
   }
 
-  /// Appends bytes. A failure is kept and returned by `commit`; nothing is written after it.
+  /// Appends `size` bytes. After a failure nothing more is written, and `commit` returns the error.
   void write(const void* data, std::size_t size) {
     // fwrite must not be given a null pointer, not even for no bytes.
     if (error_ != 0 || size == 0) return;
     if (std::fwrite(data, 1, size, file_) != size) error_ = errno != 0 ? errno : EIO;
   }
+  /// Appends the bytes of `text`. Failures as above.
   void write(std::string_view text) { write(text.data(), text.size()); }
+  /// True after a failed write.
   bool failed() const noexcept { return error_ != 0; }
 
-  /// Forces the bytes to the disk, gives the file its name and forces that to the disk too; the object
-  /// can then be opened again.
-  /// @return write_failed with the system's reason. Then what had the name before is unchanged, unless
-  /// the new name alone could not be forced to the disk.
+  /// Flushes the bytes to the disk, gives the file its name, and flushes the name to the disk. The
+  /// object can then open another file.
+  /// @return invalid_argument if no file is open; write_failed with the system's reason. On failure an
+  ///   existing file of that name is unchanged, unless the only thing that failed was flushing the new
+  ///   name.
   Status commit() {
     if (file_ == nullptr) return {Errc::invalid_argument, "OutputFile: no file is open"};
     if (error_ == 0 && std::fflush(file_) != 0) error_ = errno;
@@ -196,7 +213,7 @@ class OutputFile {
     return unwritable(path_, error_, Errc::write_failed);
   }
 
-  /// Gives up: nothing is left of what was written. Does nothing where no file is open.
+  /// Deletes the temporary file. Does nothing if no file is open.
   void discard() noexcept {
     if (file_ != nullptr) std::fclose(file_);
     file_ = nullptr;
@@ -204,19 +221,19 @@ class OutputFile {
   }
 
  private:
-  /// A name beside the target that no other thread or process uses.
+  /// A name in the target's folder that no other thread or process uses.
   std::filesystem::path unique_name() const {
     static std::atomic<unsigned> next{0};
-    constexpr std::size_t kLongest = 200;  // of 255, so that the end fits
+    constexpr std::size_t kLongest = 200;  // a name has at most 255 bytes; the suffix needs the rest
     const std::string name = target_.filename().string().substr(0, kLongest);
     return target_.parent_path() /
            (name + "." + std::to_string(::getpid()) + "-" + std::to_string(next++) + ".part");
   }
 
-  /// Calls make(name) with unique names until one is free; the last result.
+  /// Calls make(name) with unique names until one is free. Returns the result of the last call.
   template <class F>
   int with_unique_name(const F& make) {
-    constexpr int kMostTries = 100;  // names that killed processes of the same id left
+    constexpr int kMostTries = 100;  // killed processes with the same id may have left files
     int made = -1;
     for (int i = 0; i < kMostTries; ++i) {
       aside_ = unique_name();
@@ -229,7 +246,7 @@ class OutputFile {
 
   int open_aside() {
 #if defined(O_TMPFILE)
-    // Nameless: gone with the process, however it ends. It is named through /proc.
+    // An unnamed file vanishes with the process. linkat names it later through /proc.
     if (::access("/proc/self/fd", X_OK) == 0) {
       const int fd = ::open(detail::folder_of(target_).c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
       if (fd >= 0) return fd;
@@ -239,7 +256,8 @@ class OutputFile {
         [](const char* name) { return ::open(name, O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666); });
   }
 
-  /// Gives the target's name where it is free, one aside where it is not: a link never replaces a file.
+  /// Links the unnamed file to the target's name. If that name is taken, links it to a temporary name,
+  /// which `commit` renames: linkat cannot replace a file.
   void name_nameless() {
     const std::string nameless = "/proc/self/fd/" + std::to_string(::fileno(file_));
     const auto link = [&](const char* name) {
@@ -260,10 +278,10 @@ class OutputFile {
   bool in_place_ = false;
 };
 
-/// Writes a file by `write(OutputFile&)`, which may return a Status. Readers see the file of before or
-/// the whole new one; a failure, an exception too, changes nothing (`OutputFile` says how).
-/// @return the Status of `write`; file_not_found where the file cannot be begun, write_failed where it
-/// cannot be finished.
+/// Writes a file with `write(OutputFile&)`, which may return a Status or void. Readers see the old file
+/// or the complete new one. If anything fails or throws, the old file stays (see OutputFile).
+/// @return the error of `write`; file_not_found if the file cannot be created; write_failed if it cannot
+///   be finished.
 template <class F>
 requires std::is_invocable_v<const F&, OutputFile&> Status
 replace_file(const std::filesystem::path& path, const F& write) {
@@ -277,7 +295,7 @@ replace_file(const std::filesystem::path& path, const F& write) {
   return file.commit();
 }
 
-/// The same for content that is ready.
+/// Replaces a file by `content`. Errors and guarantees of replace_file above.
 inline Status replace_file(const std::filesystem::path& path, std::string_view content) {
   return replace_file(path, [content](OutputFile& file) { file.write(content); });
 }

@@ -7,12 +7,14 @@
 
 namespace gsnav {
 
-/// Small deterministic generator (SplitMix64, Steele et al. 2014): the same seed gives the same
-/// numbers on every platform, and every instance is independent of all others.
+/// Small deterministic random generator (SplitMix64, Steele et al. 2014). A seed gives the same integers
+/// and uniform numbers on every platform.
 class Rng {
  public:
+  /// Starts the sequence of `seed`. Each object has a state of its own.
   explicit Rng(std::uint64_t seed = 0) noexcept : state_(seed) {}
 
+  /// Next 64 random bits.
   std::uint64_t next() noexcept {
     state_ += 0x9e3779b97f4a7c15ull;
     std::uint64_t z = state_;
@@ -29,7 +31,7 @@ class Rng {
     __extension__ using Wide = unsigned __int128;
     return static_cast<std::uint64_t>((static_cast<Wide>(next()) * n) >> 64);
   }
-  /// Standard normal (Box-Muller, one value a call).
+  /// Standard normal number (Box-Muller; each call uses two uniform numbers).
   double normal() noexcept {
     const double u = 1.0 - uniform(), v = uniform();
     return sqrt(-2.0 * ::log(u)) * cos(6.283185307179586 * v);

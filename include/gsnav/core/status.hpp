@@ -13,23 +13,25 @@
 
 namespace gsnav {
 
-/// What kind of thing went wrong; the message says which file, field and value.
+/// Category of an error. The message of the Status names the file, field and value.
 enum class Errc {
-  ok = 0,
-  invalid_argument,   ///< a value the caller gave is impossible
-  invalid_file,       ///< a file's content is malformed, truncated or hostile
-  file_not_found,     ///< a path does not exist or cannot be opened, for reading or for writing
-  unsupported,        ///< legal, but not handled
-  out_of_memory,      ///< an allocation failed
-  nothing_navigable,  ///< a NavMesh build found no walkable surface
-  backend_failure,    ///< a device or driver reported an error
-  write_failed,  ///< a file was begun and could not be finished: a full disk, a quota, a failing device
+  ok = 0,             ///< no error
+  invalid_argument,   ///< The caller passed an impossible value.
+  invalid_file,       ///< A file's content is malformed, truncated or hostile.
+  file_not_found,     ///< A path does not exist, or cannot be opened for reading or writing.
+  unsupported,        ///< Valid input that gsnav does not handle.
+  out_of_memory,      ///< An allocation failed.
+  nothing_navigable,  ///< A NavMesh build found no walkable surface.
+  backend_failure,    ///< A device or driver reported an error.
+  write_failed,  ///< A file was started and could not be finished (full disk, quota, failing device).
 };
 
-/// The exception behind `.value()` and `.throw_if_error()`.
+/// Exception thrown by `Result::value()` and `Status::throw_if_error()`.
 class Error : public std::runtime_error {
  public:
+  /// An exception with a code and its message.
   Error(Errc code, const std::string& message) : std::runtime_error(message), code_(code) {}
+  /// Category of the error.
   Errc code() const noexcept { return code_; }
 
  private:
@@ -37,6 +39,7 @@ class Error : public std::runtime_error {
 };
 
 namespace detail {
+/// Throws gsnav::Error. Without exceptions, prints the message and aborts.
 [[noreturn]] inline void fail(Errc code, const std::string& message) {
 #if defined(__cpp_exceptions)
   throw Error(code, message);
@@ -48,18 +51,23 @@ namespace detail {
 }
 }  // namespace detail
 
-/// Success, or a code with a message for people.
+/// Success, or an error code with a message for people.
 class [[nodiscard]] Status {
  public:
+  /// Success.
   Status() = default;
-  /// `message` may hold names of files: it is kept as printable() makes it.
+  /// An error. `message` is escaped by printable(), because it may contain file names.
   Status(Errc code, const std::string& message) : code_(code), message_(printable(message)) {}
 
+  /// True on success.
   bool ok() const noexcept { return code_ == Errc::ok; }
+  /// True on success.
   explicit operator bool() const noexcept { return ok(); }
+  /// Category of the error, Errc::ok on success.
   Errc code() const noexcept { return code_; }
+  /// What went wrong, where and why. Empty on success.
   const std::string& message() const noexcept { return message_; }
-  /// Throws gsnav::Error (aborts under -fno-exceptions) unless ok.
+  /// Throws gsnav::Error if this is an error; aborts under -fno-exceptions.
   void throw_if_error() const {
     if (!ok()) detail::fail(code_, message_);
   }
@@ -69,15 +77,17 @@ class [[nodiscard]] Status {
   std::string message_;
 };
 
-/// Makes invalid_argument errors whose messages begin with the same words:
-///
-///     const BadArgument bad{"Camera."};
-///     if (width < 1) return bad("width", width, "must be positive");
+/// Makes invalid_argument errors whose messages share a prefix.
+/// @code
+/// const BadArgument bad{"Camera."};
+/// if (width < 1) return bad("width", width, "must be positive");
+/// @endcode
 struct BadArgument {
-  const char* subject;
+  const char* subject;  ///< prefix of the messages, such as "Camera."
 
+  /// Error with the message "`subject` `what`", without a space between them.
   Status operator()(const std::string& what) const { return {Errc::invalid_argument, subject + what}; }
-  /// "`field` = `value`: `rule`".
+  /// Error with the message "`subject` `field` = `value`: `rule`".
   template <class T>
   Status operator()(const char* field, const T& value, const char* rule) const {
     std::string text;
@@ -90,39 +100,54 @@ struct BadArgument {
   }
 };
 
-/// A value or the Status that says why there is none.
+/// A value of type T, or the Status that says why there is none.
 template <class T>
 class [[nodiscard]] Result {
  public:
+  /// Holds a value.
   Result(T value) : content_(std::move(value)) {}
+  /// Holds an error. `status` must not be ok.
   Result(Status status) : content_(std::move(status)) {}
+  /// Holds an error with a code and a message.
   Result(Errc code, const std::string& message) : content_(Status(code, message)) {}
 
+  /// True if there is a value.
   bool ok() const noexcept { return content_.index() == 0; }
+  /// True if there is a value.
   explicit operator bool() const noexcept { return ok(); }
-  /// The error, or an ok Status.
+  /// The error, or an ok Status if there is a value.
   Status status() const { return ok() ? Status() : *std::get_if<1>(&content_); }
+  /// Category of the error, Errc::ok if there is a value.
   Errc code() const noexcept { return ok() ? Errc::ok : std::get_if<1>(&content_)->code(); }
+  /// Message of the error, empty if there is a value.
   std::string message() const { return status().message(); }
 
-  /// The value; throws gsnav::Error (aborts under -fno-exceptions) where there is none.
+  /// The value.
+  /// @throws gsnav::Error if there is none (aborts under -fno-exceptions).
   T& value() & {
     require();
     return *std::get_if<0>(&content_);
   }
+  /// The value, read-only. Throws as above.
   const T& value() const& {
     require();
     return *std::get_if<0>(&content_);
   }
-  /// By value, so that `for (auto& x : load().value())` does not outlive what it walks.
+  /// Moves the value out. It is returned by value, so that `for (auto& x : load().value())` does not
+  /// iterate over a destroyed temporary. Throws as above.
   T value() && {
     require();
     return std::move(*std::get_if<0>(&content_));
   }
+  /// Access to a member of the value. Throws as above.
   T* operator->() { return &value(); }
+  /// Read-only access to a member of the value. Throws as above.
   const T* operator->() const { return &value(); }
+  /// The value. Throws as above.
   T& operator*() & { return value(); }
+  /// The value, read-only. Throws as above.
   const T& operator*() const& { return value(); }
+  /// Moves the value out. Throws as above.
   T operator*() && { return std::move(*this).value(); }
 
  private:

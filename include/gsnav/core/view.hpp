@@ -9,42 +9,51 @@
 
 namespace gsnav {
 
-/// A pointer and a length: how arrays reach kernels. Owns nothing, is trivially copyable and works in
-/// device code, where std::span does not. `View<const T>` reads only.
+/// A pointer and a length: the form in which kernels receive arrays. It owns nothing, is trivially
+/// copyable and works in device code, where std::span does not. `View<const T>` is read-only.
 template <class T>
 struct View {
-  T* data = nullptr;
-  std::size_t size = 0;
+  T* data = nullptr;     ///< first element
+  std::size_t size = 0;  ///< number of elements
 
+  /// An empty view.
   View() = default;
+  /// View of n elements from d on.
   GSNAV_HD constexpr View(T* d, std::size_t n) noexcept : data(d), size(n) {}
-  /// View<T> converts to View<const T>, never the other way.
+  /// Converts View<T> to View<const T>.
   template <class U, class = std::enable_if_t<std::is_same_v<const U, T> && !std::is_const_v<U>>>
   GSNAV_HD constexpr View(const View<U>& other) noexcept : data(other.data), size(other.size) {}
 
+  /// Element i, unchecked.
   GSNAV_HD constexpr T& operator[](std::size_t i) const noexcept { return data[i]; }
+  /// True if there are no elements.
   GSNAV_HD constexpr bool empty() const noexcept { return size == 0; }
+  /// Pointer to the first element.
   GSNAV_HD constexpr T* begin() const noexcept { return data; }
+  /// Pointer past the last element.
   GSNAV_HD constexpr T* end() const noexcept { return data + size; }
 };
 
-/// View of any contiguous container (std::vector, std::array, std::span, a C array's wrapper).
+/// View of a contiguous container (std::vector, std::array, std::span).
 template <class C>
 auto view_of(C& c) noexcept -> View<std::remove_pointer_t<decltype(c.data())>> {
   return {c.data(), c.size()};
 }
 
-/// K arrays of one length, as kernels see them.
+/// K arrays of the same length, in the form in which kernels receive them. It owns nothing.
 template <class T, std::size_t K>
 struct Planes {
-  T* data[K]{};
-  std::size_t size = 0;  ///< of each; kUnequal where the arrays differ
+  T* data[K]{};          ///< first elements of the arrays, null for an array that is not set
+  std::size_t size = 0;  ///< Length of each array; kUnequal if their lengths differ.
 
+  /// size of arrays whose lengths differ
   static constexpr std::size_t kUnequal = static_cast<std::size_t>(-1);
 
+  /// View of array k.
   GSNAV_HD constexpr View<T> operator[](std::size_t k) const noexcept { return {data[k], size}; }
+  /// True if the arrays have no elements.
   GSNAV_HD constexpr bool empty() const noexcept { return size == 0; }
-  /// Array k. The first one that is set gives the length.
+  /// Sets array k. The first array that is set determines the length.
   GSNAV_HD constexpr void set(std::size_t k, const View<T>& plane) noexcept {
     bool first = true;
     for (std::size_t i = 0; i < K; ++i) first = first && (i == k || data[i] == nullptr);

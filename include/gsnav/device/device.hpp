@@ -10,45 +10,48 @@
 
 namespace gsnav {
 
+/// Kind of hardware that a program computes on.
 enum class DeviceKind : std::uint8_t {
-  serial,  ///< one thread, portable code: the reference
-  cpu,     ///< threads and SIMD lanes (OpenMPBackend)
+  serial,  ///< one thread of portable code: the reference
+  cpu,     ///< all CPU cores and SIMD lanes (OpenMPBackend)
   cuda,    ///< an NVIDIA GPU (CudaBackend)
 };
 
-/// What a renderer or a simulator computes on. A value: it names hardware and holds none of it. Each
-/// object that is made on it has threads, or a stream, of its own.
+/// Hardware that renderers and simulators run on. A Device is a value that names hardware; it holds no
+/// resources. Each object created on it has its own threads or stream.
 class Device {
  public:
-  /// The portable device.
+  /// The serial device.
   Device() = default;
 
-  /// By name:
+  /// Parses the name of a device:
   ///
   ///     "best"              the first GPU, or else "cpu", or else "serial"
   ///     "cpu", "cpu:4"      all threads (OMP_NUM_THREADS is respected), or four
   ///     "cuda", "cuda:1"    the first GPU, or the second
   ///     "serial"            one thread, portable code
   ///
-  /// Errors: invalid_argument where the text is none of these, and unsupported where this build or this
-  /// machine has no such device. Both list the devices that there are.
+  /// @return invalid_argument for any other text; unsupported if this build or machine has no such
+  ///   device. Both messages list the available devices.
   static Result<Device> parse(std::string_view text);
 
-  /// Names of the devices of this build on this machine, slowest kind first, as parse takes them:
-  /// "serial", "cpu", "cuda:0".
+  /// Names of all devices of this build on this machine in the form that parse accepts, slowest kind
+  /// first: "serial", "cpu", "cuda:0".
   static std::vector<std::string> available();
 
+  /// Kind of hardware.
   DeviceKind kind() const noexcept { return kind_; }
-  /// Of the CPU; 0: as many as OpenMP takes.
+  /// Number of CPU threads. 0: OpenMP's default.
   int threads() const noexcept { return threads_; }
-  /// Number of the GPU.
+  /// Index of the GPU.
   int index() const noexcept { return index_; }
 
-  /// As parse takes it: "serial", "cpu", "cpu:4", "cuda:0".
+  /// Name in the form that parse accepts: "serial", "cpu", "cpu:4", "cuda:0".
   std::string name() const;
-  /// For people: "CPU, 4 threads, avx2 lanes" or "NVIDIA H100 80GB HBM3 (cuda:0)".
+  /// Description for people: "CPU, 4 threads, avx2 lanes" or "NVIDIA H100 80GB HBM3 (cuda:0)".
   std::string description() const;
 
+  /// True if both name the same hardware.
   bool operator==(const Device&) const = default;
 
  private:

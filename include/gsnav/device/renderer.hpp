@@ -19,46 +19,62 @@ namespace detail {
 class RendererEngine;
 }
 
-/// How a scene is drawn.
+/// Settings of a Renderer.
 struct RenderOptions {
-  RenderConfig render{};  ///< its sort order is the scene's
-  DetailChoice detail{};  ///< levels of detail, visible sets: the scene must have them
+  RenderConfig render{};  ///< Settings of each frame. Its sort order is ignored: the scene has one.
+  DetailChoice detail{};  ///< Levels of detail and visible sets to use. The scene must have them.
 };
 
-/// Renders a scene on any device: Gaussians, meshes and avatars in one image. It holds the scene in the
-/// device's memory and keeps its scratch between calls. Images have the bits of BasicRenderer<float, B>,
-/// where B is the device's backend. It may be moved; one that was moved from answers with
-/// invalid_argument. Calls of one renderer must not overlap. Nothing that it is given must outlive a
-/// call (docs/ownership.md).
+/// Renders a scene on any device: Gaussians, meshes and avatars in one image.
 ///
-///     auto device = gsnav::Device::parse("best").value();
-///     auto renderer = gsnav::Renderer::create(device, cloud).value();
-///     auto frames = renderer.render(camera).value();   // frames.rgb, frames.median_depth, ...
+/// The renderer keeps the scene in the device's memory, and its scratch memory between calls. It owns or
+/// shares all that it needs, so arguments need not outlive a call (docs/ownership.md). Images have the
+/// same bits as those of `BasicRenderer<float, B>`, where B is the device's backend. Not thread-safe:
+/// calls of one renderer must not overlap. After a move, the old object returns invalid_argument.
+///
+/// @code
+/// auto device = gsnav::Device::parse("best").value();
+/// auto renderer = gsnav::Renderer::create(device, cloud).value();
+/// auto frames = renderer.render(camera).value();   // frames.rgb, frames.median_depth, ...
+/// @endcode
 class Renderer {
  public:
-  /// Shares the scene, which needs no NavMesh. Errors: invalid_argument naming the part or the field;
-  /// unsupported where the device is not there; out_of_memory; backend_failure.
+  /// Creates a renderer that shares `scene`. The scene needs no NavMesh.
+  /// @return invalid_argument naming the part or field; unsupported if the device is not available;
+  ///   out_of_memory; backend_failure.
   static Result<Renderer> create(const Device& device, std::shared_ptr<const SimulatorScene> scene,
                                  RenderOptions options = {});
-  /// Owns a cloud, placed at the world's origin: pass std::move(cloud) to save the copy. Errors: the
-  /// same as above.
+  /// Creates a renderer that owns `cloud`, placed at the world's origin. Pass std::move(cloud) to avoid
+  /// a copy.
+  /// @return the errors of the overload above.
   static Result<Renderer> create(const Device& device, GaussianCloud cloud, RenderOptions options = {});
+  /// Takes over the renderer of the argument.
   Renderer(Renderer&&) noexcept;
+  /// Takes over the renderer of the argument.
   Renderer& operator=(Renderer&&) noexcept;
+  /// Frees the device's memory.
   ~Renderer();
 
-  /// Renders from each camera, which have one size, with avatars where they are at `time`, seconds on
-  /// the scene's clock. Images are those that RenderConfig::outputs names; CPUs fill Frames::stats.
-  /// Errors: invalid_argument naming the field, no camera, or cameras of several sizes; unsupported;
-  /// out_of_memory; backend_failure.
+  /// Renders one frame per camera. Makes the images named by RenderConfig::outputs. On CPUs it also
+  /// fills Frames::stats.
+  /// @param cameras at least one, all of the same image size
+  /// @param out images, resized as needed
+  /// @param time seconds on the scene's clock, at which avatars are posed
+  /// @return invalid_argument naming the field, or if there are no cameras or their sizes differ;
+  ///   unsupported; out_of_memory; backend_failure.
   Status render(std::span<const Camera> cameras, Frames<float>& out, double time = 0);
+  /// Renders one frame per camera and returns the images. Errors as above.
   Result<Frames<float>> render(std::span<const Camera> cameras, double time = 0);
+  /// Renders one camera and returns its images. Errors as above.
   Result<Frames<float>> render(const Camera& camera, double time = 0);
 
+  /// Device that the renderer runs on.
   const Device& device() const noexcept { return device_; }
-  /// The rules that frames are drawn by from now on.
+  /// Replaces the settings of all later frames.
+  /// @return invalid_argument naming the field.
   Status set_config(const RenderConfig& config);
-  /// The light on the scene's meshes from now on, in place of SimulatorScene::light.
+  /// Replaces SimulatorScene::light as the light on the scene's meshes, for all later frames.
+  /// @return invalid_argument naming the field.
   Status set_light(const MeshLight& light);
 
  private:
@@ -68,10 +84,14 @@ class Renderer {
   std::unique_ptr<detail::RendererEngine> engine_;
 };
 
-/// build_lod, and build_visible_sets (scene/visible_sets.hpp), compiled: by the device's threads, or of
-/// a GPU by the CPU's. Errors: theirs.
+/// Builds a level-of-detail tree: build_lod (scene/lod_tree.hpp), compiled. It runs on the device's
+/// threads; for a GPU, on the threads of the CPU.
+/// @return the errors of build_lod.
 Result<LodTree> build_lod(const Device& device, const GaussianCloud& cloud,
                           const LodSettings& settings = {});
+/// Builds visible sets: build_visible_sets (scene/visible_sets.hpp), compiled. It runs on the device's
+/// threads; for a GPU, on the threads of the CPU.
+/// @return the errors of build_visible_sets.
 Result<VisibleSets> build_visible_sets(const Device& device, const GaussianCloud& cloud,
                                        std::span<const Vec3d> viewpoints,
                                        const VisibleSettings& settings,

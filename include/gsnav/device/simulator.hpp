@@ -24,64 +24,87 @@ class BatchEngine;
 class SimulatorEngine;
 }  // namespace detail
 
-/// A simulator on any device: scene, avatars, agent, sensors and the PointNav task. It is
-/// BasicSimulator<B>, where B is the device's backend, compiled once: the same calls give the same bits.
-/// It may be moved. In one that was moved from, calls that can fail answer invalid_argument; make no
-/// others.
+/// Navigation simulator for one agent on any device: scene, avatars, sensors and the PointNav task.
 ///
-///     auto sim = gsnav::Simulator::create(device, scene, config).value();
-///     auto obs = sim.reset(episode).value();
-///     while (!sim.done()) obs = sim.step(policy(obs)).value();
-///     auto metrics = sim.metrics();
+/// It is `BasicSimulator<B>`, compiled for the device's backend B: the same calls return the same bits.
+/// After a move, calls of the old object that can fail return invalid_argument; do not make others.
+///
+/// @code
+/// auto sim = gsnav::Simulator::create(device, scene, config).value();
+/// auto obs = sim.reset(episode).value();
+/// while (!sim.done()) obs = sim.step(policy(obs)).value();
+/// auto metrics = sim.metrics();
+/// @endcode
 class Simulator {
  public:
-  /// Shares the scene (docs/ownership.md). Errors: invalid_argument naming the field, sensor or asset;
-  /// unsupported where the device is not there; out_of_memory; backend_failure. `others` adds bodies to
-  /// the scene's avatars, numbered behind them.
+  /// Creates a simulator that shares `scene` (docs/ownership.md).
+  /// @param others further bodies, numbered after the scene's avatars
+  /// @return invalid_argument naming the field, sensor or asset; unsupported if the device is not
+  ///   available; out_of_memory; backend_failure.
   static Result<Simulator> create(const Device& device, std::shared_ptr<const SimulatorScene> scene,
                                   SimulatorConfig config, World::BodySource others = {});
-  /// Owns the scene. Errors: the same as above.
+  /// Creates a simulator that owns `scene`.
+  /// @return the errors of the overload above.
   static Result<Simulator> create(const Device& device, SimulatorScene scene, SimulatorConfig config);
+  /// Takes over the simulator of the argument.
   Simulator(Simulator&&) noexcept;
+  /// Takes over the simulator of the argument.
   Simulator& operator=(Simulator&&) noexcept;
+  /// Frees the device's memory.
   ~Simulator();
 
-  /// Begins an episode. Errors: what World::reset reports; rendering.
+  /// Starts an episode and renders the first observations.
+  /// @return the errors of World::reset, or a rendering error.
   Result<Observations> reset(const PointNavEpisode& episode);
-  /// Acts for one control period; Action::stop ends the episode. Errors: what World::step reports;
-  /// rendering.
+  /// Performs one action for one control period and renders. `Action::stop` ends the episode.
+  /// @return the errors of World::step, or a rendering error.
   Result<Observations> step(Action action);
+  /// Moves at the given velocities for one control period and renders.
+  /// @return the errors of World::step, or a rendering error.
   Result<Observations> step(const VelocityCommand& command);
-  /// Renders what the agent sees now, without acting. Errors: what rendering reports.
+  /// Renders the sensors at the present time, without acting.
+  /// @return a rendering error.
   Result<Observations> observe();
 
+  /// True if the episode has ended.
   bool done() const noexcept;
+  /// Metrics of the episode so far.
   EpisodeMetrics metrics() const;
-  /// Seconds on the scene's clock.
+  /// Time on the scene's clock, seconds.
   double clock() const noexcept { return world().time(); }
+  /// Position and orientation of the agent.
   const AgentPose& agent() const noexcept { return world().agent(); }
+  /// The world without images: agent, task and clock. Valid while the simulator lives.
   const World& world() const noexcept;
+  /// The scene. Valid while the simulator lives.
   const SimulatorScene& scene() const noexcept;
+  /// Settings. Valid while the simulator lives.
   const SimulatorConfig& config() const noexcept;
+  /// Device that the simulator runs on.
   const Device& device() const noexcept { return device_; }
 
-  /// Everything that changes while it runs, and the way back to it. Errors: of World::set_state.
+  /// All state that changes during an episode. Pass a copy to set_state to return to this moment.
   const WorldState& state() const noexcept { return world().state(); }
+  /// Restores a state that state() returned.
+  /// @return the errors of World::set_state.
   Status set_state(const WorldState& state);
-  /// Metres, radians. Errors: of World::set_agent.
+  /// Moves the agent. Position in metres, angles in radians.
+  /// @return the errors of World::set_agent.
   Status set_agent(const Vec3d& position, double yaw, double pitch = 0.0);
-  /// Decides the sensors' noise from here on.
+  /// Seeds the sensors' noise from now on.
   void set_seed(std::uint64_t seed) noexcept;
-  /// Turns rendering on or off from the next action on.
+  /// Turns rendering on or off, from the next action on.
   void set_rendering(bool on) noexcept;
-  /// Renders made so far: sensors at one place with one field of view count once.
+  /// Number of renders so far. Sensors with the same position and field of view share a render.
   std::size_t render_count() const noexcept;
 
-  /// Renders any camera at the present time (a map, a spectator). Images live until the next call.
-  /// Errors: of Renderer::render.
+  /// Renders any camera at the present time, such as a map or a spectator's view. The images are valid
+  /// until the next call.
+  /// @return the errors of Renderer::render.
   Result<const Frames<float>*> render(const Camera& camera, unsigned outputs = kRgb);
-  /// The goal of ImageNav: what an agent at the episode's goal sees, with nobody about. In the sensors'
-  /// order; they live until the next call. Errors: invalid_argument before reset; rendering.
+  /// Goal images of ImageNav: what the sensors see from the episode's goal, without avatars. In the
+  /// order of the sensors; valid until the next call.
+  /// @return invalid_argument before the first reset; a rendering error.
   Result<std::span<const Observation>> goal_images();
 
  private:
@@ -91,49 +114,68 @@ class Simulator {
   std::unique_ptr<detail::SimulatorEngine> engine_;
 };
 
-/// N environments over M scenes on any device: BasicBatchSimulator<B>, where B is the device's backend,
-/// compiled once. It may be moved; one that was moved from has no environments and answers with
-/// invalid_argument. After an error reset() begins anew.
+/// Navigation simulator for N environments over M scenes on any device, stepped by one call.
 ///
-///     auto sim = gsnav::BatchSimulator::create(device, scenes, config, 256, episode_of).value();
-///     auto out = sim.reset().value();
-///     while (running) out = sim.step(policy(out)).value();
+/// It is `BasicBatchSimulator<B>`, compiled for the device's backend B. After an error, call reset() to
+/// start again. After a move, the old object has no environments and returns invalid_argument.
+///
+/// @code
+/// auto sim = gsnav::BatchSimulator::create(device, scenes, config, 256, episode_of).value();
+/// auto out = sim.reset().value();
+/// while (running) out = sim.step(policy(out)).value();
+/// @endcode
 class BatchSimulator {
  public:
-  /// Shares the scenes. `next_episode` is asked for each episode of each environment; see EpisodeSource.
-  /// Errors: invalid_argument naming the field, sensor or scene; unsupported where the device is not
-  /// there, or naming a sensor whose images cannot stay where BatchConfig::images says; out_of_memory;
-  /// backend_failure.
+  /// Creates a simulator that shares `scenes`.
+  /// @param environments number of environments, N
+  /// @param next_episode called once for each episode of each environment; see EpisodeSource
+  /// @return invalid_argument naming the field, sensor or scene; unsupported if the device is not
+  ///   available, or naming a sensor whose images cannot stay where BatchConfig::images asks;
+  ///   out_of_memory; backend_failure.
   static Result<BatchSimulator> create(const Device& device,
                                        std::vector<std::shared_ptr<const SimulatorScene>> scenes,
                                        BatchConfig config, std::size_t environments,
                                        EpisodeSource next_episode);
-  /// The same over scenes that are loaded in the background and leave when they are not needed.
+  /// Creates a simulator over scenes that `library` loads in the background and unloads when they are
+  /// not needed. Other arguments and errors as for create.
   static Result<BatchSimulator> create_from_library(const Device& device,
                                                     std::shared_ptr<SceneLibrary> library,
                                                     BatchConfig config, std::size_t environments,
                                                     EpisodeSource next_episode);
+  /// Takes over the simulator of the argument.
   BatchSimulator(BatchSimulator&&) noexcept;
+  /// Takes over the simulator of the argument.
   BatchSimulator& operator=(BatchSimulator&&) noexcept;
+  /// Frees the device's memory.
   ~BatchSimulator();
 
+  /// Number of environments, N.
   std::size_t environments() const noexcept;
+  /// World of an environment, without images. Valid while the simulator lives.
   const World& world(std::size_t environment) const noexcept;
+  /// Index of the scene that an environment is in.
   std::size_t scene_of(std::size_t environment) const noexcept;
+  /// Device that the simulator runs on.
   const Device& device() const noexcept { return device_; }
 
-  /// Begins the next episode in every environment or, with a mask [N], in those where it is not 0.
-  /// Errors: what the episode source and World::reset report; rendering.
+  /// Starts the next episode in all environments, or only in those whose mask is not 0.
+  /// @param mask [N], or empty for all
+  /// @return the errors of the episode source and World::reset, or a rendering error.
   Result<BatchStep> reset(std::span<const std::uint8_t> mask = {});
-  /// One action, or one command of velocities, for each environment, [N]. Errors: invalid_argument
-  /// (another number of actions; an environment that is done, with AutoReset::disabled; before reset),
-  /// with the environment's number; what World::step reports; rendering.
+  /// Performs one action per environment and renders.
+  /// @param actions [N]
+  /// @return invalid_argument naming the environment's index: for a wrong number of actions, before the
+  ///   first reset, or in an environment that is done with AutoReset::disabled. Also the errors of
+  ///   World::step, or a rendering error.
   Result<BatchStep> step(std::span<const Action> actions);
+  /// Moves each environment's agent at the given velocities, [N], and renders. Errors as above.
   Result<BatchStep> step(std::span<const VelocityCommand> commands);
 
-  /// Renders made so far, and how many times an avatar was skinned for them.
+  /// Number of renders so far.
   std::size_t render_count() const noexcept;
+  /// Number of times that an avatar was skinned for rendering.
   std::size_t pose_count() const noexcept;
+  /// Turns rendering on or off, from the next action on.
   void set_rendering(bool on) noexcept;
 
  private:

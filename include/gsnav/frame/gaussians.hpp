@@ -11,54 +11,58 @@
 
 namespace gsnav {
 
-/// The screen-space filter that an asset was trained with.
+/// Screen-space filter that an asset was trained with.
 enum class Filter : std::uint8_t {
-  classic,  ///< eps2d is added to the 2D covariance, opacity stays (INRIA)
-  mip,  ///< ... and opacity is multiplied by sqrt(det0 / det) (Mip-Splatting, antialiased), det0 with
-        ///< base_eps2d
+  classic,  ///< Adds eps2d to the diagonal of the 2D covariance; keeps the opacity (INRIA).
+  mip,  ///< As classic, and multiplies the opacity by sqrt(det0 / det), where det0 is the determinant
+        ///< with base_eps2d (Mip-Splatting, antialiased).
 };
 
 /// Number of SH coefficients per channel up to `degree`.
 GSNAV_HD constexpr int sh_coefficient_count(int degree) noexcept { return (degree + 1) * (degree + 1); }
 
-/// Highest SH degree the kernels evaluate.
+/// Highest SH degree that kernels evaluate.
 inline constexpr int kMaxShDegree = 3;
 
-/// How many consecutive Gaussians are culled together and projected as one work item.
+/// Rows per chunk. The Gaussians of a chunk are culled together and projected as one work item.
 inline constexpr std::size_t kProjectChunk = 256;
 
-/// Of a chunk that is only partly in view so many consecutive rows at a time are tested once more.
+/// Rows per part. A chunk that straddles the edge of the view is culled again, one part at a time.
 inline constexpr std::size_t kChunkPart = 64;
 
-/// What a chunk of Gaussians may reach: a bound for all of them, in the asset's frame.
+/// Bounds of all Gaussians of a chunk, in the asset's frame.
 struct ChunkBounds {
-  Vec3d low{}, high{};    ///< box of the means, metres
+  Vec3d low{},            ///< smallest coordinates of the means, metres
+      high{};             ///< largest coordinates of the means, metres
   float scale_max = 0;    ///< largest standard deviation, metres
   float opacity_max = 0;  ///< in [0, 1]
 };
 
-/// How the rows of a chunk of kProjectChunk are packed (detail/frame/set_rows.hpp).
+/// Constants that decode the packed rows of one chunk (detail/frame/set_rows.hpp).
 struct PackedChunk {
-  Vec3<float> low{}, step{};  ///< offset of a mean: low + step code, metres
-  float scale_step = 0;       ///< root of a standard deviation: scale_step code
-  float sh_steps[3]{};        ///< coefficient of band 1, 2, 3: step code, where these have 8 bits
+  Vec3<float> low{},     ///< offset of a mean with code 0, metres
+      step{};            ///< a mean's offset is low + step * code, metres
+  float scale_step = 0;  ///< The square root of a standard deviation is scale_step * code.
+  float sh_steps[3]{};  ///< A coefficient of band 1, 2 or 3 is its step * code, if bands are stored as 8
+                        ///< bits.
 };
 
-/// Words of 32 bits, one a row, that a chunk takes.
+/// Number of 32-bit words that hold one bit per row of a chunk.
 inline constexpr std::size_t kSeenRowWords = kProjectChunk / 32;
 
-/// Which rows of a chunk may be seen: all where there are no words.
+/// Rows of a chunk that may be visible, one bit per row. Without words, all rows may be.
 struct SeenRows {
-  const std::uint32_t* words = nullptr;  ///< [kSeenRowWords]
-  /// Of the 32 rows from 32 k on.
+  const std::uint32_t* words = nullptr;  ///< [kSeenRowWords], or null
+  /// Bits of the rows 32 k to 32 k + 31.
   GSNAV_HD std::uint32_t word(std::size_t k) const noexcept { return words == nullptr ? ~0u : words[k]; }
+  /// True if `row` may be visible.
   GSNAV_HD bool has(std::size_t row) const noexcept { return (word(row / 32) >> (row % 32) & 1u) != 0; }
-  /// Whether any of the kChunkPart rows of a part.
+  /// True if any row of a part may be visible.
   GSNAV_HD bool any_of_part(std::size_t part) const noexcept {
     static_assert(kChunkPart == 64);
     return (word(2 * part) | word(2 * part + 1)) != 0;
   }
-  /// The parts with any: a bit each.
+  /// Bits of the parts that have a row that may be visible. Bit p is part p.
   GSNAV_HD std::uint32_t parts() const noexcept {
     if (words == nullptr) return ~0u;
     std::uint32_t bits = 0;
@@ -67,60 +71,66 @@ struct SeenRows {
   }
 };
 
-/// Where N Gaussians are, how large and how opaque they are: what geometry is computed from. Metres, in
-/// the asset's own frame. One of three encodings holds the shapes: quats and scales; axes; codes.
+/// Positions, shapes and opacities of N Gaussians, in metres in the asset's frame. Shapes are in one of
+/// three encodings: quats and scales, axes, or codes.
 struct ShapeRows {
-  std::size_t size = 0;           ///< N
-  Planes<const float, 3> means;   ///< x, y, z offsets from the row's origin
-  Planes<const float, 4> quats;   ///< w, x, y, z of unit length
-  Planes<const float, 3> scales;  ///< standard deviations >= 0
-  /// Shapes that are no rotated ellipsoids' (a skinned Gaussian's blended axes): [3 r + c] is row r,
-  /// column c of the factor M, Sigma = M M^T. Without quats and scales, or in place of them.
+  std::size_t size = 0;           ///< number of Gaussians, N
+  Planes<const float, 3> means;   ///< x, y, z offsets from the row's origin, metres
+  Planes<const float, 4> quats;   ///< unit quaternions w, x, y, z
+  Planes<const float, 3> scales;  ///< standard deviations, metres, >= 0
+  /// Shapes that are not rotated ellipsoids, such as the blended axes of a skinned Gaussian. Plane 3 r +
+  /// c is row r, column c of the factor M of the covariance M M^T. Replaces quats and scales.
   Planes<const float, 9> axes;
-  View<const float> opacities;           ///< in [0, 1], [N]
-  View<const std::uint32_t> origin_ids;  ///< [N] into GaussianRows::origins, or empty: all 0
-  /// Packed shapes and opacities, [10][N]: kScales, kQuats, kOpacity, kMeans. [7][N] where means are
-  /// floats. Without quats, scales and opacities. Host memory only.
+  View<const float> opacities;           ///< [N], in [0, 1]
+  View<const std::uint32_t> origin_ids;  ///< [N], indices into GaussianRows::origins. Empty: all 0.
+  /// Packed shapes, opacities and means, [10][N], in the planes kScales, kQuats, kOpacity and kMeans.
+  /// [7][N] if means are floats. Replaces quats, scales and opacities. Host memory only.
   View<const std::uint16_t> codes;
-  View<const PackedChunk> chunks;  ///< what codes stand for, [ceil(N / kProjectChunk)]
+  View<const PackedChunk> chunks;  ///< constants that decode `codes`, [ceil(N / kProjectChunk)]
 
-  static constexpr int kScales = 0, kQuats = 3, kOpacity = 6, kMeans = 7, kCodePlanes = 10;
+  static constexpr int kScales = 0,  ///< first plane of `codes` with scales
+      kQuats = 3,                    ///< first plane with rotations
+      kOpacity = 6,                  ///< plane with opacities
+      kMeans = 7,                    ///< first plane with means
+      kCodePlanes = 10;              ///< number of planes
 
-  /// Whether shapes and opacities are packed. False in device code.
+  /// True if shapes and opacities are packed. Always false in device code.
   GSNAV_HD bool packed() const noexcept { return GSNAV_DEVICE_CODE == 0 && !codes.empty(); }
-  /// Chunks that the rows make.
+  /// Number of chunks that N rows make.
   GSNAV_HD std::size_t chunk_count() const noexcept {
     return (size + kProjectChunk - 1) / kProjectChunk;
   }
 };
 
-/// The SH coefficients of N Gaussians. One of three encodings holds them: floats; floats and halves;
-/// packed.
+/// SH coefficients of N Gaussians in one of three encodings: floats; degree 0 as floats and the rest as
+/// halves; packed.
 struct ColorRows {
-  int degree = 0;         ///< 0 to 3
-  View<const float> sh0;  ///< [N][3], the degree-0 coefficients
-  View<const float> shN;  ///< [N][(degree+1)^2 - 1][3], empty for degree 0
-  /// The same as IEEE binary16 (detail/math/half.hpp), in place of shN.
+  int degree = 0;         ///< SH degree, 0 to 3
+  View<const float> sh0;  ///< [N][3], coefficients of degree 0
+  View<const float> shN;  ///< [N][(degree+1)^2 - 1][3], coefficients above degree 0. Empty for degree 0.
+  /// shN as IEEE binary16 (detail/math/half.hpp). Replaces shN.
   View<const std::uint16_t> shN_half;
-  /// Packed degree-0 coefficients as binary16, [N][3], in place of sh0. Host memory only.
+  /// Packed: coefficients of degree 0 as binary16, [N][3]. Replaces sh0. Host memory only.
   View<const std::uint16_t> sh0_half;
-  /// Packed bands, [N][(degree+1)^2 - 1][3], in place of shN and shN_half. Beside sh0_half only.
+  /// Packed: bands above degree 0, [N][(degree+1)^2 - 1][3]. Replaces shN and shN_half. Only together
+  /// with sh0_half.
   View<const std::int8_t> shN_codes;
-  View<const PackedChunk> chunks;  ///< steps of shN_codes, [ceil(N / kProjectChunk)]
-  /// Rotation of each Gaussian since training (w, x, y, z), or empty: the view direction is turned back
-  /// by it before SH is evaluated. Of skinned sets of degree >= 1.
+  View<const PackedChunk> chunks;  ///< decoding steps of shN_codes, [ceil(N / kProjectChunk)]
+  /// Rotation of each Gaussian since training, w, x, y, z. SH is evaluated at the view direction turned
+  /// back by it. Used by skinned sets of degree >= 1. Empty: no rotation.
   Planes<const float, 4> rotations;
-  /// Highest SH degree that the Gaussians of a chunk use, one a chunk (detail/scene/scene_bands.hpp):
-  /// bands above it are not read. In the backend's memory. Empty: degree.
+  /// Highest SH degree that the Gaussians of each chunk use, one value per chunk
+  /// (detail/scene/scene_bands.hpp). Higher bands are not read. In the backend's memory. Empty: `degree`
+  /// for all chunks.
   View<const std::uint8_t> chunk_degrees;
 
-  /// Whether degree-0 coefficients are packed. False in device code.
+  /// True if the coefficients of degree 0 are packed. Always false in device code.
   GSNAV_HD bool packed() const noexcept { return GSNAV_DEVICE_CODE == 0 && !sh0_half.empty(); }
-  /// Values of a row above degree 0.
+  /// Number of values per row above degree 0.
   GSNAV_HD std::size_t rest() const noexcept {
     return static_cast<std::size_t>(3 * (sh_coefficient_count(degree) - 1));
   }
-  /// Degree to which row i is evaluated where `wanted` is asked for.
+  /// Degree to which row i is evaluated if degree `wanted` is requested.
   GSNAV_HD int degree_of(std::size_t i, int wanted) const noexcept {
     if (chunk_degrees.empty()) return wanted;
     const int used = static_cast<int>(chunk_degrees[i / kProjectChunk]);
@@ -128,61 +138,66 @@ struct ColorRows {
   }
 };
 
-/// Read-only arrays of N Gaussians, as kernels see them. Owns nothing.
+/// Read-only arrays of N Gaussians, in the form in which kernels receive them. It owns nothing.
 ///
-/// A position is `origins[origin_ids[i]] + mean_i`: float32 offsets from origins on a 64 m lattice, so
-/// that scenes far from zero lose nothing.
+/// The position of Gaussian i is `origins[origin_ids[i]] + mean_i`. Means are float32 offsets from
+/// origins on a 64 m lattice, so scenes far from zero keep their precision.
 struct GaussianRows {
-  ShapeRows shape;
-  ColorRows color;
-  View<const Vec3d> origins;  ///< metres, asset frame; host memory; empty: one origin at zero
-  /// Place of each Gaussian before rows were sorted in space, [N]: those of one depth are blended in
-  /// that order. Empty: row order.
+  ShapeRows shape;            ///< positions, shapes, opacities
+  ColorRows color;            ///< SH coefficients
+  View<const Vec3d> origins;  ///< Metres, asset frame, in host memory. Empty: one origin at zero.
+  /// Index of each Gaussian before rows were sorted in space, [N]. Gaussians of equal depth are blended
+  /// in the order of these ids. Empty: row order.
   View<const std::uint32_t> row_ids;
-  /// One a chunk of kProjectChunk rows, [ceil(N / kProjectChunk)]: chunks that cannot be seen are not
-  /// touched. Empty: all are.
+  /// Bounds of each chunk, [ceil(N / kProjectChunk)]. Chunks outside the view are skipped. Empty: no
+  /// chunk is skipped.
   View<const ChunkBounds> chunk_bounds;
-  /// One for kChunkPart rows, [ceil(N / kChunkPart)]: of chunks at the edge of the view only the parts
-  /// that may be seen are touched. Empty: chunks are taken whole.
+  /// Bounds of each part, [ceil(N / kChunkPart)]. In chunks at the edge of the view, parts outside the
+  /// view are skipped. Empty: chunks are projected whole.
   View<const ChunkBounds> part_bounds;
 
+  /// Number of Gaussians.
   GSNAV_HD std::size_t size() const noexcept { return shape.size; }
+  /// Number of chunks.
   GSNAV_HD std::size_t chunk_count() const noexcept { return shape.chunk_count(); }
 };
 
-/// Words of `Selection::seen` that a set of so many chunks has for its chunks.
+/// Number of leading words of `Selection::seen` that hold the bits of `chunks` chunks.
 GSNAV_HD constexpr std::size_t seen_chunk_words(std::size_t chunks) noexcept {
   return (chunks + 31) / 32;
 }
 
-/// Which rows of a set are drawn, of a set of `chunks` chunks. In the backend's memory. Owns nothing.
+/// The rows of a set that a frame draws. Arrays are in the backend's memory. It owns nothing. `chunks`
+/// is the number of chunks of the set throughout.
 struct Selection {
-  /// Numbers of the chunks that are drawn, each once: the selection of a level-of-detail tree
+  /// Indices of the chunks to draw, each once, as a level-of-detail tree selects them
   /// (scene/lod_cut.hpp). Empty: all chunks.
   View<const std::uint32_t> drawn_chunks;
-  /// What may be seen from where the camera is; the rest is not drawn (scene/visible_sets.hpp). Empty:
-  /// all may. First seen_chunk_words() words: bit c % 32 of word c / 32 for each chunk c. Where it is
-  /// longer, as many more: how many bits the words before have; then kSeenRowWords words for each chunk
-  /// with a bit, in their order, of which bit r % 32 of word r / 32 is its row r.
+  /// Chunks and rows that may be visible from the camera's position; the others are not drawn
+  /// (scene/visible_sets.hpp). Empty: all may be visible. The layout is:
+  /// 1. seen_chunk_words() words with one bit per chunk: chunk c is bit c % 32 of word c / 32.
+  /// 2. Optional: for each of those words, the number of bits set in all words before it.
+  /// 3. With 2: kSeenRowWords words per chunk whose bit is set, in the order of chunks. Row r is bit r %
+  ///   32 of word r / 32.
   View<const std::uint32_t> seen;
 
-  /// How many chunks are drawn.
+  /// Number of chunks to draw.
   GSNAV_HD std::size_t count(std::size_t chunks) const noexcept {
     return drawn_chunks.empty() ? chunks : drawn_chunks.size;
   }
-  /// The chunk that is drawn as the c-th.
+  /// Index of the c-th chunk to draw.
   GSNAV_HD std::size_t chunk_id(std::size_t c) const noexcept {
     return drawn_chunks.empty() ? c : drawn_chunks[c];
   }
-  /// Whether anything of a chunk, by its number, may be seen from where the camera is.
+  /// True if some row of the chunk may be visible from the camera's position.
   GSNAV_HD bool may_be_seen(std::size_t chunk) const noexcept {
     return seen.empty() || (seen[chunk / 32] >> (chunk % 32) & 1u) != 0;
   }
-  /// Whether `seen` knows of rows too.
+  /// True if `seen` has bits per row.
   GSNAV_HD bool has_seen_rows(std::size_t chunks) const noexcept {
     return seen.size > seen_chunk_words(chunks);
   }
-  /// Which rows may be seen of a chunk that may be seen.
+  /// Rows that may be visible, of a chunk for which may_be_seen() is true.
   GSNAV_HD SeenRows seen_rows(std::size_t chunks, std::size_t chunk) const noexcept {
     if (!has_seen_rows(chunks)) return {};
     const std::size_t words = seen_chunk_words(chunks);
@@ -192,37 +207,39 @@ struct Selection {
   }
 };
 
-/// Whether Selection::seen may have so many words for so many chunks: of chunks alone, or of rows too.
+/// True if `words` is a valid length of Selection::seen for a set of `chunks` chunks, with or without
+/// bits per row.
 GSNAV_HD constexpr bool seen_may_have(std::size_t words, std::size_t chunks) noexcept {
   const std::size_t of_chunks = seen_chunk_words(chunks);
   return words == of_chunks || (words >= 2 * of_chunks && (words - 2 * of_chunks) % kSeenRowWords == 0);
 }
 
-/// What the numbers of a colour mean.
+/// Encoding of colour values.
 enum class ColorSpace : std::uint8_t {
-  display,  ///< sRGB-encoded: what screens take, and nearly all captures are trained in
+  display,  ///< sRGB-encoded, as screens and nearly all training images are
   linear,   ///< proportional to light, Rec. 709 primaries
 };
 
-/// One set of Gaussians in the world: a scene tile, an avatar, an object.
+/// One set of Gaussians in the world: a scene, an avatar, an object.
 struct GaussianSet {
-  GaussianRows gaussians;
-  Similarity world_from_asset{};
-  Filter filter = Filter::classic;
-  float eps2d = 0.3f;                            ///< px^2 added to the diagonal of the 2D covariance
-  ColorSpace color_space = ColorSpace::display;  ///< of its colours; converted to the frame's after SH
-  /// px^2 that the opacities count with already, in [0, eps2d]: the mip filter makes up for the rest. 0:
-  /// Mip-Splatting's.
+  GaussianRows gaussians;                        ///< arrays, owned by the caller
+  Similarity world_from_asset{};                 ///< placement in the world
+  Filter filter = Filter::classic;               ///< screen-space filter of the training
+  float eps2d = 0.3f;                            ///< added to the diagonal of the 2D covariance, px^2
+  ColorSpace color_space = ColorSpace::display;  ///< Encoding of the set's colours. They are converted
+                                                 ///< to the frame's after SH.
+  /// Blur (px^2) that the stored opacities already account for, in [0, eps2d]. The mip filter
+  /// compensates only for eps2d - base_eps2d. 0 is Mip-Splatting's filter.
   float base_eps2d = 0;
-  Selection selection{};  ///< which rows are drawn
+  Selection selection{};  ///< rows to draw
 
-  /// How many chunks are drawn.
+  /// Number of chunks to draw.
   GSNAV_HD std::size_t drawn_chunk_count() const noexcept {
     return selection.count(gaussians.chunk_count());
   }
 };
 
-// Larger than what functions of kernels take (docs/architecture.md, "Sizes of arguments").
+// Larger arguments do not fit what kernel functions accept (docs/architecture.md, "Sizes of arguments").
 static_assert(sizeof(void*) != 8 || (sizeof(ShapeRows) <= 256 && sizeof(ColorRows) <= 256));
 static_assert(sizeof(void*) != 8 || (sizeof(GaussianRows) <= 480 && sizeof(GaussianSet) <= 592));
 

@@ -5,12 +5,13 @@
 
 namespace gsnav {
 
-/// The degree-0 basis function, 1 / (2 sqrt(pi)).
+/// SH basis function of degree 0: 1 / (2 sqrt(pi)).
 inline constexpr double kSh0 = 0.28209479177387814;
 
-/// Real spherical harmonics up to `degree` (0 to 3) at the unit direction d, with the
-/// Condon-Shortley phase, in the order of INRIA files. `coefficient(k)` gives the Vec3<L> of
-/// coefficient k. Returns sum(basis * coefficient), without offset or clamp.
+/// Sum of real spherical harmonics up to `degree` (0 to 3) at the unit direction d, without offset or
+/// clamp. Signs include the Condon-Shortley phase; coefficients are in the order of INRIA files.
+/// @param coefficient callable: `coefficient(k)` returns the Vec3<L> of coefficient k, k < (degree +
+///   1)^2
 template <class L, class Coefficient>
 GSNAV_HD Vec3<L> evaluate_sh(int degree, const Vec3<L>& d, const Coefficient& coefficient) noexcept {
   using S = scalar_of<L>;
@@ -51,7 +52,8 @@ GSNAV_HD Vec3<L> evaluate_sh(int degree, const Vec3<L>& d, const Coefficient& co
   return sum;
 }
 
-/// Colour of a Gaussian seen along `d`: 0.5 + SH, clamped below at 0 after the sum, never above.
+/// Colour of a Gaussian seen along the unit direction d: max(0, 0.5 + SH) per channel. There is no upper
+/// limit.
 template <class L, class Coefficient>
 GSNAV_HD Vec3<L> sh_color(int degree, const Vec3<L>& d, const Coefficient& coefficient) noexcept {
   using S = scalar_of<L>;

@@ -7,22 +7,27 @@
 
 namespace gsnav {
 
-/// Pinhole camera: x right, y down, z forward (OpenCV). Pixel (column j, row i) has its centre at
-/// (j + 0.5, i + 0.5); row 0 is the top. Always double: kernels get what they need in their scalar.
+/// Pinhole camera. Camera axes are x right, y down, z forward (OpenCV). The pixel in column j, row i has
+/// its centre at (j + 0.5, i + 0.5); row 0 is the top. All values are double; kernels convert them to
+/// their scalar type.
 struct Camera {
-  Affine3<double> viewmat{};  ///< world to camera, rigid
-  double fx = 128, fy = 128;  ///< focal lengths in pixels, > 0
-  double cx = 128, cy = 128;  ///< principal point in pixels, may be off-centre
-  int width = 256, height = 256;
-  double near_plane = 0.2;  ///< a Gaussian whose centre has z <= near_plane is not drawn; metres
-  /// Additionally a Gaussian is not drawn where z <= near_sigma times its extent (one sigma) along the
-  /// view axis. 0 for tools; 1 for simulator sensors, whose near plane is close to zero.
+  Affine3<double> viewmat{};  ///< world to camera, rigid, metres
+  double fx = 128,            ///< horizontal focal length in pixels, > 0
+      fy = 128;               ///< vertical focal length in pixels, > 0
+  double cx = 128,            ///< column of the principal point in pixels; may be off-centre
+      cy = 128;               ///< row of the principal point in pixels; may be off-centre
+  int width = 256,            ///< image width in pixels
+      height = 256;           ///< image height in pixels
+  double near_plane = 0.2;    ///< Metres. A Gaussian whose centre has z <= near_plane is not drawn.
+  /// Also skip a Gaussian whose centre has z <= near_sigma times its standard deviation along the view
+  /// axis. Use 0 for tools, and 1 for simulator sensors, whose near plane is close to zero.
   double near_sigma = 0.0;
 
-  /// Camera position in the world.
+  /// Camera position in the world, metres.
   Vec3d position() const noexcept { return rigid_inverse(viewmat).translation; }
 
-  /// Sets square pixels from a horizontal field of view (degrees) and centres the principal point.
+  /// Sets a w x h image with square pixels, a horizontal field of view in degrees and a centred
+  /// principal point.
   Camera& set_hfov(int w, int h, double hfov_degrees) noexcept {
     width = w;
     height = h;
@@ -32,7 +37,8 @@ struct Camera {
     return *this;
   }
 
-  /// Camera at `eye` that looks at `target`, with `up` upwards in the image (not parallel to the view).
+  /// Camera at `eye` that looks at `target`. `up` points upwards in the image and must not be parallel
+  /// to the view direction. Image size in pixels, field of view in degrees.
   static Camera look_at(const Vec3d& eye, const Vec3d& target, const Vec3d& up, int w, int h,
                         double hfov_degrees) noexcept {
     Camera c;

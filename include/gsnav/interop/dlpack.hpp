@@ -16,15 +16,14 @@
 #include "gsnav/core/status.hpp"
 #include "gsnav/core/view.hpp"
 
-// DLPack over gsnav's arrays and the other way, without a copy: what learners (PyTorch, JAX, CuPy,
-// TensorFlow) exchange tensors by. A tensor says nothing of streams. Where the learner works on another
-// stream than the backend, call `backend.hand_over_to(learners_stream)` after the work that fills a
-// tensor was given to the backend, and let the learner's stream do the same before the memory is written
-// again.
+// Exchanges arrays with machine-learning frameworks (PyTorch, JAX, CuPy, TensorFlow) through DLPack,
+// without copies. A DLPack tensor carries no stream. If the framework works on another stream than the
+// backend, call `backend.hand_over_to(framework_stream)` after the work that fills a tensor. Make the
+// framework's stream wait the same way before the memory is written again.
 
 namespace gsnav::interop {
 
-/// Of a backend's memory: the GPU's number where there is one, else the CPU.
+/// DLPack device of a backend's memory: the GPU with its index, or the CPU.
 template <Backend B>
 DLDevice dlpack_device([[maybe_unused]] const B& backend) noexcept {
   if constexpr (requires {
@@ -37,7 +36,7 @@ DLDevice dlpack_device([[maybe_unused]] const B& backend) noexcept {
   }
 }
 
-/// Of T: whole numbers and floats of 8 to 64 bits.
+/// DLPack type of T: an integer or floating-point type of 8 to 64 bits.
 template <class T>
 constexpr DLDataType dlpack_type() noexcept {
   static_assert(std::is_arithmetic_v<T> && !std::is_same_v<T, bool> && !std::is_same_v<T, long double>);
@@ -45,12 +44,16 @@ constexpr DLDataType dlpack_type() noexcept {
   return {static_cast<std::uint8_t>(code), static_cast<std::uint8_t>(8 * sizeof(T)), 1};
 }
 
-/// A compact row-major tensor of `shape` over `data`. The taker calls its deleter, once, which lets go
-/// of `owner` (may be null: then the memory must outlive the tensor by other means). `data` may be null
-/// where a size is 0.
+/// Wraps `data` in a compact, row-major tensor. The consumer must call its deleter once, which releases
+/// `owner`.
 ///
-///     std::shared_ptr<Frames> frames = ...;
-///     DLManagedTensor* t = to_dlpack(frames->rgb.data(), {n, h, w, 3}, dlpack_device(backend), frames);
+/// @code
+/// std::shared_ptr<Frames> frames = ...;
+/// DLManagedTensor* t = to_dlpack(frames->rgb.data(), {n, h, w, 3}, dlpack_device(backend), frames);
+/// @endcode
+///
+/// @param data first element; may be null if a size is 0
+/// @param owner keeps the memory alive. If null, the caller must keep it alive as long as the tensor.
 template <class T, std::size_t N>
 DLManagedTensor* to_dlpack(T* data, const std::int64_t (&shape)[N], DLDevice device,
                            std::shared_ptr<const void> owner) {
@@ -79,9 +82,10 @@ DLManagedTensor* to_dlpack(T* data, const std::int64_t (&shape)[N], DLDevice dev
   return &holder.release()->tensor;
 }
 
-/// The elements of a tensor that another library owns, for images to be written into. It must outlive
-/// the view. Errors: invalid_argument naming the field where the type is not T, the memory is not on
-/// `device`, or elements are not compact and row-major.
+/// View of a tensor that another library owns, for instance to render into it. The tensor must outlive
+/// the view.
+/// @return invalid_argument naming the field. The tensor must have type T, memory on `device`, aligned
+///   data that is not null, and compact, row-major elements.
 template <class T>
 Result<View<T>> from_dlpack(const DLTensor& tensor, DLDevice device) {
   const BadArgument bad{"DLTensor."};

@@ -5,34 +5,42 @@
 
 namespace gsnav {
 
-/// Quaternion in the order w, x, y, z (the order of INRIA files). Habitat's xyzw is converted in io.
+/// Quaternion w + x i + y j + z k, stored in the order w, x, y, z. Files and libraries with the order
+/// xyzw are converted in io and interop.
 template <class L>
 struct Quat {
-  L w{1}, x{0}, y{0}, z{0};
+  L w{1},    ///< real part
+      x{0},  ///< coefficient of i
+      y{0},  ///< coefficient of j
+      z{0};  ///< coefficient of k
 };
 
-using Quatf = Quat<float>;
-using Quatd = Quat<double>;
+using Quatf = Quat<float>;   ///< quaternion of floats
+using Quatd = Quat<double>;  ///< quaternion of doubles
 
+/// Dot product of the four components.
 template <class L>
 GSNAV_HD L dot(const Quat<L>& a, const Quat<L>& b) noexcept {
   return fma(a.z, b.z, fma(a.y, b.y, fma(a.x, b.x, a.w * b.w)));
 }
 
+/// All components times s.
 template <class L>
 GSNAV_HD Quat<L> operator*(const Quat<L>& a, L s) noexcept {
   return {a.w * s, a.x * s, a.y * s, a.z * s};
 }
+/// Sum by components.
 template <class L>
 GSNAV_HD Quat<L> operator+(const Quat<L>& a, const Quat<L>& b) noexcept {
   return {a.w + b.w, a.x + b.x, a.y + b.y, a.z + b.z};
 }
+/// All components negated: the same rotation.
 template <class L>
 GSNAV_HD Quat<L> operator-(const Quat<L>& a) noexcept {
   return {-a.w, -a.x, -a.y, -a.z};
 }
 
-/// Hamilton product: the rotation b followed by the rotation a.
+/// Hamilton product. As rotations: b first, then a.
 template <class L>
 GSNAV_HD Quat<L> operator*(const Quat<L>& a, const Quat<L>& b) noexcept {
   return {fma(-a.z, b.z, fma(-a.y, b.y, fma(-a.x, b.x, a.w * b.w))),
@@ -41,18 +49,21 @@ GSNAV_HD Quat<L> operator*(const Quat<L>& a, const Quat<L>& b) noexcept {
           fma(a.z, b.w, fma(-a.y, b.x, fma(a.x, b.y, a.w * b.z)))};
 }
 
+/// Conjugate. For a unit quaternion, the inverse rotation.
 template <class L>
 GSNAV_HD constexpr Quat<L> conjugate(const Quat<L>& q) noexcept {
   return {q.w, -q.x, -q.y, -q.z};
 }
 
+/// Conversion of the components to type T.
 template <class T, class U>
 GSNAV_HD constexpr Quat<T> quat_cast(const Quat<U>& q) noexcept {
   return {static_cast<T>(q.w), static_cast<T>(q.x), static_cast<T>(q.y), static_cast<T>(q.z)};
 }
 
-/// Normalises q in place, scaling by its largest component first so that lengths from 1e-37 to 1e37
-/// neither overflow nor vanish. Returns false, leaving q as it is, when q is zero or not finite.
+/// Normalises q in place. Dividing by the largest component first keeps lengths from 1e-37 to 1e37 from
+/// overflowing or vanishing.
+/// @return false, with q unchanged, if q is zero or not finite.
 template <class S>
 GSNAV_HD bool normalize(Quat<S>& q) noexcept {
   const S m = max(max(abs(q.w), abs(q.x)), max(abs(q.y), abs(q.z)));
@@ -65,20 +76,20 @@ GSNAV_HD bool normalize(Quat<S>& q) noexcept {
   return true;
 }
 
-/// Rotation matrix of a unit quaternion.
+/// Rotation matrix of the unit quaternion q.
 template <class L>
 GSNAV_HD Mat3<L> rotation_matrix(const Quat<L>& q) noexcept {
   const L x2 = q.x + q.x, y2 = q.y + q.y, z2 = q.z + q.z;
   const L wx = q.w * x2, wy = q.w * y2, wz = q.w * z2;
   const L one(1);
-  // Each entry is fused so that a compiler's own contraction cannot change it.
+  // Each product is inside fma, so that no compiler can contract differently.
   return {{{fma(-q.y, y2, fma(-q.z, z2, one)), fma(q.x, y2, -wz), fma(q.x, z2, wy)},
            {fma(q.x, y2, wz), fma(-q.x, x2, fma(-q.z, z2, one)), fma(q.y, z2, -wx)},
            {fma(q.x, z2, -wy), fma(q.y, z2, wx), fma(-q.x, x2, fma(-q.y, y2, one))}}};
 }
 
-/// Quaternion of a rotation matrix; the branch on the largest diagonal term keeps it stable at 180
-/// degrees.
+/// Unit quaternion of a rotation matrix. Branching on the largest diagonal element keeps it accurate
+/// near 180 degrees.
 template <class S>
 GSNAV_HD Quat<S> quat_from_matrix(const Mat3<S>& m) noexcept {
   const S trace = m(0, 0) + m(1, 1) + m(2, 2);
@@ -113,8 +124,8 @@ GSNAV_HD Vec3<L> rotate(const Quat<L>& q, const Vec3<L>& v) noexcept {
   return rotation_matrix(q) * v;
 }
 
-/// Spherical interpolation along the shortest arc, t in [0, 1]; nearly equal rotations are interpolated
-/// linearly and normalised (the error is below 1e-9 radian there).
+/// Spherical linear interpolation along the shorter arc: a at t = 0, b at t = 1. Nearly equal rotations
+/// are interpolated linearly and normalised, which is off by less than 1e-9 radians.
 template <class S>
 GSNAV_HD Quat<S> slerp(const Quat<S>& a, Quat<S> b, S t) noexcept {
   S c = dot(a, b);

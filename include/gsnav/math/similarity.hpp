@@ -5,24 +5,27 @@
 
 namespace gsnav {
 
-/// Similarity x_world = scale * rotation * x_asset + translation: how an asset stands in the Y-up world.
-/// Metres and double throughout, so that a scene a thousand kilometres away loses nothing.
+/// Similarity x_world = scale * rotation * x_asset + translation: the placement of an asset in the Y-up
+/// world. Metres, in double, so that a scene 1000 km from the origin loses no precision.
 struct Similarity {
-  Quatd rotation{};
-  Vec3d translation{};
-  double scale = 1.0;
+  Quatd rotation{};     ///< unit quaternion
+  Vec3d translation{};  ///< metres
+  double scale = 1.0;   ///< > 0
 };
 
+/// Maps the point v.
 inline Vec3d operator*(const Similarity& s, const Vec3d& v) noexcept {
   return rotate(s.rotation, v) * s.scale + s.translation;
 }
 
+/// Composition: b first, then a.
 inline Similarity operator*(const Similarity& a, const Similarity& b) noexcept {
   Quatd q = a.rotation * b.rotation;
   normalize(q);
   return {q, a * b.translation, a.scale * b.scale};
 }
 
+/// Inverse map.
 inline Similarity inverse(const Similarity& s) noexcept {
   const Quatd q = conjugate(s.rotation);
   return {q, rotate(q, s.translation) * (-1.0 / s.scale), 1.0 / s.scale};

@@ -6,64 +6,77 @@
 
 namespace gsnav {
 
-/// Two components. `L` is a scalar (float, double) or a lane pack.
+/// Vector of two components. `L` is a scalar (float, double) or a SIMD pack.
 template <class L>
 struct Vec2 {
-  L x{}, y{};
+  L x{},    ///< first component
+      y{};  ///< second component
 };
 
-/// Three components. `L` is a scalar (float, double) or a lane pack.
+/// Vector of three components. `L` is a scalar (float, double) or a SIMD pack.
 template <class L>
 struct Vec3 {
-  L x{}, y{}, z{};
+  L x{},    ///< first component
+      y{},  ///< second component
+      z{};  ///< third component
 
+  /// Component i: 0 is x, 1 is y, 2 is z.
   GSNAV_HD constexpr L& operator[](int i) noexcept { return i == 0 ? x : (i == 1 ? y : z); }
+  /// Component i, read-only.
   GSNAV_HD constexpr const L& operator[](int i) const noexcept { return i == 0 ? x : (i == 1 ? y : z); }
 };
 
-using Vec3f = Vec3<float>;
-using Vec3d = Vec3<double>;
+using Vec3f = Vec3<float>;   ///< vector of three floats
+using Vec3d = Vec3<double>;  ///< vector of three doubles
 
+/// Sum.
 template <class L>
 GSNAV_HD constexpr Vec3<L> operator+(const Vec3<L>& a, const Vec3<L>& b) noexcept {
   return {a.x + b.x, a.y + b.y, a.z + b.z};
 }
+/// Difference.
 template <class L>
 GSNAV_HD constexpr Vec3<L> operator-(const Vec3<L>& a, const Vec3<L>& b) noexcept {
   return {a.x - b.x, a.y - b.y, a.z - b.z};
 }
+/// Negated vector.
 template <class L>
 GSNAV_HD constexpr Vec3<L> operator-(const Vec3<L>& a) noexcept {
   return {-a.x, -a.y, -a.z};
 }
+/// All components times s.
 template <class L>
 GSNAV_HD constexpr Vec3<L> operator*(const Vec3<L>& a, L s) noexcept {
   return {a.x * s, a.y * s, a.z * s};
 }
+/// All components times s.
 template <class L>
 GSNAV_HD constexpr Vec3<L> operator*(L s, const Vec3<L>& a) noexcept {
   return a * s;
 }
+/// Adds b to a.
 template <class L>
 GSNAV_HD constexpr Vec3<L>& operator+=(Vec3<L>& a, const Vec3<L>& b) noexcept {
   return a = a + b;
 }
+/// Subtracts b from a.
 template <class L>
 GSNAV_HD constexpr Vec3<L>& operator-=(Vec3<L>& a, const Vec3<L>& b) noexcept {
   return a = a - b;
 }
+/// True if all components are equal.
 template <class L>
 GSNAV_HD constexpr bool operator==(const Vec3<L>& a, const Vec3<L>& b) noexcept {
   return a.x == b.x && a.y == b.y && a.z == b.z;
 }
 
-/// a.b as one product and two fused steps, in the order x, y, z: the same bits on every backend.
+/// Dot product: one product and two fused steps, in the order x, y, z. All backends agree on the bits.
 template <class L>
 GSNAV_HD L dot(const Vec3<L>& a, const Vec3<L>& b) noexcept {
   return fma(a.z, b.z, fma(a.y, b.y, a.x * b.x));
 }
 
-/// a * b - c * d with an error of at most 1.5 ulp (Kahan's difference of products).
+/// a * b - c * d with an error of at most 1.5 ulp (Kahan's algorithm).
 template <class L>
 GSNAV_HD L difference_of_products(L a, L b, L c, L d) noexcept {
   const L cd = c * d;
@@ -71,50 +84,53 @@ GSNAV_HD L difference_of_products(L a, L b, L c, L d) noexcept {
   return fma(a, b, -cd) + error;
 }
 
+/// Cross product, each component with an error of at most 1.5 ulp.
 template <class L>
 GSNAV_HD Vec3<L> cross(const Vec3<L>& a, const Vec3<L>& b) noexcept {
   return {difference_of_products(a.y, b.z, a.z, b.y), difference_of_products(a.z, b.x, a.x, b.z),
           difference_of_products(a.x, b.y, a.y, b.x)};
 }
 
-/// a x b with an error of a rounding of |a| |b| a component: for vectors that are not nearly parallel,
-/// or where that does no harm.
+/// Cross product by plain fma. The error per component is one rounding of |a| |b|, which is relatively
+/// large for nearly parallel vectors.
 template <class L>
 GSNAV_HD Vec3<L> rough_cross(const Vec3<L>& a, const Vec3<L>& b) noexcept {
   return {fma(a.y, b.z, -(a.z * b.y)), fma(a.z, b.x, -(a.x * b.z)), fma(a.x, b.y, -(a.y * b.x))};
 }
 
-/// a + s * b in one fused step a component.
+/// a + s * b, rounded once per component.
 template <class L>
 GSNAV_HD Vec3<L> fma(L s, const Vec3<L>& b, const Vec3<L>& a) noexcept {
   return {fma(s, b.x, a.x), fma(s, b.y, a.y), fma(s, b.z, a.z)};
 }
 
+/// Euclidean length.
 template <class L>
 GSNAV_HD L norm(const Vec3<L>& a) noexcept {
   return sqrt(dot(a, a));
 }
 
-/// a / |a|; the zero vector stays zero.
+/// a / |a|. The zero vector stays zero.
 template <class S>
 GSNAV_HD Vec3<S> normalized(const Vec3<S>& a) noexcept {
   const S n = norm(a);
   return n > S(0) ? a * (S(1) / n) : a;
 }
 
-/// Linear interpolation, exact at both ends for t = 0 and t = 1.
+/// Linear interpolation. Exact at t = 0 (a) and t = 1 (b).
 template <class L>
 GSNAV_HD Vec3<L> lerp(const Vec3<L>& a, const Vec3<L>& b, L t) noexcept {
   const L s = L(1) - t;
   return {fma(t, b.x, s * a.x), fma(t, b.y, s * a.y), fma(t, b.z, s * a.z)};
 }
 
-/// Component-wise conversion between scalar types.
+/// Conversion of the components to type T.
 template <class T, class U>
 GSNAV_HD constexpr Vec3<T> vec_cast(const Vec3<U>& a) noexcept {
   return {static_cast<T>(a.x), static_cast<T>(a.y), static_cast<T>(a.z)};
 }
 
+/// True if all components are finite.
 template <class S>
 GSNAV_HD bool is_finite(const Vec3<S>& a) noexcept {
   return is_finite(a.x) && is_finite(a.y) && is_finite(a.z);

@@ -15,29 +15,33 @@
 
 namespace gsnav {
 
-/// Settings of a frame: what the image is, how exact it is, how it is computed. The defaults are the
-/// contract's (docs/accuracy.md).
+/// Settings of one frame: images to make, image quality, and how the frame is computed. The defaults
+/// follow the image contract (docs/accuracy.md).
 struct RenderConfig {
-  /// Images to make. Calls that are given a FrameImages make those that it points to, and do not read
-  /// this.
+  /// Images to make, a bitmask of kRgb, kAlpha, kMedianDepth, ... Ignored by calls that take a
+  /// FrameImages: those make the images it points to.
   unsigned outputs = kRgb | kAlpha | kMedianDepth;
-  SortOrder sort_order = SortOrder::z_depth;
-  Response response = Response::ewa;
-  double first_hit_tau = 0.5;  ///< in (0, 1): first-hit depth is where alpha reaches this
-  /// What colours are blended in, and images and `background` hold: the main asset's space. Sets of the
-  /// other are converted Gaussian by Gaussian, after SH; meshes too. Linear images need encoding to be
-  /// looked at (srgb_encoded).
+  SortOrder sort_order = SortOrder::z_depth;  ///< key by which Gaussians are sorted
+  Response response = Response::ewa;          ///< how a Gaussian spreads over the image
+  double first_hit_tau = 0.5;  ///< First-hit depth is taken where accumulated alpha reaches this. Range
+                               ///< (0, 1).
+  /// Color space in which Gaussians and meshes are blended; images and `background` use it too. Sets
+  /// stored in the other space are converted per Gaussian, after SH evaluation. Convert linear images
+  /// with srgb_encoded before you view them.
   ColorSpace blend_space = ColorSpace::display;
-  Vec3d background{0, 0, 0};                ///< of blend_space
-  Composite composite = Composite::merged;  ///< of Gaussians and meshes, where a frame has both
-  Quality quality{};
-  Tuning tuning{};
-  Compat compat = Compat::none;
+  Vec3d background{0, 0, 0};                ///< colour behind everything, in blend_space
+  Composite composite = Composite::merged;  ///< Rule by which Gaussians and meshes are combined in
+                                            ///< frames that have both.
+  Quality quality{};                        ///< error budget: exact, fast, ... (docs/accuracy.md)
+  Tuning tuning{};               ///< Settings that affect speed only. They change no bit of the image.
+  Compat compat = Compat::none;  ///< another renderer's rules, for parity tests
 
+  /// True if all settings are equal.
   bool operator==(const RenderConfig&) const = default;
 };
 
-/// invalid_argument, naming the field, or ok.
+/// Checks all fields.
+/// @return invalid_argument naming the field if one is out of range.
 inline Status validate(const RenderConfig& c) {
   const BadArgument bad{"RenderConfig."};
   if (c.outputs == 0 || (c.outputs & ~kAllOutputs) != 0) {

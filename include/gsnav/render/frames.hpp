@@ -7,37 +7,45 @@
 
 namespace gsnav {
 
-/// What the meshes of a frame were made of.
+/// Counts of the triangles in a frame.
 struct MeshStats {
-  std::uint64_t triangles = 0;   ///< in all instances
-  std::uint64_t not_finite = 0;  ///< of those in view, left out: a corner is NaN or infinite
-  std::uint64_t drawn = 0;       ///< that may cover a pixel centre; pieces, where clipped
+  std::uint64_t triangles = 0;   ///< triangles of all instances
+  std::uint64_t not_finite = 0;  ///< Triangles in view that are left out because a corner is NaN or
+                                 ///< infinite.
+  std::uint64_t drawn = 0;  ///< Triangles that may cover a pixel centre. A clipped triangle counts once
+                            ///< per piece.
   std::uint64_t fragments =
-      0;  ///< pixels of surfaces that are seen through (MeshAlpha::blend), not behind opaque ones
+      0;  ///< Pixels of see-through surfaces (MeshAlpha::blend) that are not behind opaque ones.
 };
 
-/// What one camera's frame was made of.
+/// Counts of one camera's frame.
 struct RenderStats {
-  std::uint64_t gaussians = 0;  ///< in all sets
-  std::uint64_t visible = 0;    ///< whose footprint bounds reach the image, less those found hidden
-  std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs, less those found hidden by a mesh
-  MeshStats meshes;
+  std::uint64_t gaussians = 0;  ///< Gaussians in all sets
+  std::uint64_t visible = 0;  ///< Gaussians whose footprint bounds reach the image, without those found
+                              ///< hidden
+  std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs, without those found hidden by a
+                                         ///< mesh
+  MeshStats meshes;                      ///< counts of the meshes
 };
 
-/// Images of a batch of cameras of one size in host memory; an image not asked for is empty.
+/// Images of a batch of C cameras of one size (H x W pixels), in host memory. Images that were not
+/// requested are empty. Output (detail/frame/output.hpp) defines the values.
 template <class S>
 struct Frames {
-  std::size_t cameras = 0, height = 0, width = 0;
-  std::vector<S> rgb;                ///< [C][H][W][3]
+  std::size_t cameras = 0,           ///< number of cameras, C
+      height = 0,                    ///< rows of an image, H
+      width = 0;                     ///< columns of an image, W
+  std::vector<S> rgb;                ///< [C][H][W][3], colours over the background
   std::vector<S> alpha;              ///< [C][H][W]
-  std::vector<S> median_depth;       ///< [C][H][W] metres, 0: no return
-  std::vector<S> expected_depth;     ///< [C][H][W]
-  std::vector<S> accumulated_depth;  ///< [C][H][W]
-  std::vector<S> first_hit_depth;    ///< [C][H][W]
+  std::vector<S> median_depth;       ///< [C][H][W] metres; 0 where the ray hits nothing
+  std::vector<S> expected_depth;     ///< [C][H][W] metres
+  std::vector<S> accumulated_depth;  ///< [C][H][W] metres
+  std::vector<S> first_hit_depth;    ///< [C][H][W] metres
   std::vector<RenderStats> stats;    ///< [C]
 
-  /// The images in the order of kImages (detail/frame/output.hpp).
+  /// Pointer to the vector of one image.
   using VectorPointer = std::vector<S> Frames::*;
+  /// The images in the order of kImages (detail/frame/output.hpp).
   static constexpr VectorPointer kVectors[] = {&Frames::rgb,
                                                &Frames::alpha,
                                                &Frames::median_depth,

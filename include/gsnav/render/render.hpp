@@ -27,12 +27,13 @@ namespace gsnav {
 
 namespace detail {
 
+/// Grid of tiles of one camera's image.
 template <Backend B>
 TileGrid grid_of(const RenderConfig& config, const Camera& camera) noexcept {
   return TileGrid::of(camera.width, camera.height, tile_size_of<B>(config, camera.width, camera.height));
 }
 
-/// One work item per row of pixels: enough parallelism on a CPU at little overhead.
+/// Blends one row of pixels per work item. On a CPU that is enough parallelism, at little overhead.
 template <class S, class PixelKernel>
 struct RasterizeRow {
   PixelKernel kernel;
@@ -56,7 +57,7 @@ void blend_pixels(B& backend, const RasterArgs<S>& args) {
   });
 }
 
-/// Sizes the scratch of one camera's frame and writes the projection's arguments.
+/// Sizes the scratch memory of one camera's frame and writes the arguments of the projection.
 template <class S, Backend B>
 void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
                         const Camera& camera, const RenderConfig& config, const FrameImages<S>& images,
@@ -116,13 +117,14 @@ void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> 
   }
 }
 
-/// Whether colours of a set have to be converted before they are blended.
+/// True if some set's colours must be converted before blending.
 inline bool any_other_space(std::span<const GaussianSet> sets, const RenderConfig& config) noexcept {
   return std::any_of(sets.begin(), sets.end(),
                      [&](const GaussianSet& s) { return s.color_space != config.blend_space; });
 }
 
-/// Converts the colours of one projected set where its space is not the frame's.
+/// Converts the colours of one projected set from `from` to `to`. Does nothing if both are the same
+/// space.
 template <class S, Backend B>
 void convert_set(B& backend, const ViewedSet<S>& args, const ProjectOutputs<S>& out, ColorSpace from,
                  ColorSpace to) {
@@ -131,16 +133,16 @@ void convert_set(B& backend, const ViewedSet<S>& args, const ProjectOutputs<S>& 
                        ConvertSplatColors<S>{out.colors, out.counts, args.first_chunk, from, to});
 }
 
-/// What comes after the projection of one camera: sort, bin, blend, of the keys in `range`. Adds to
-/// `stats`.
+/// Sorts, bins and blends the projected Gaussians whose key is in `range`. Adds to `stats`.
 template <class S, Backend B>
 Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camera,
                       const RenderConfig& config, const KeyRange& range, const TileProgress<S>& progress,
                       const MeshLayer<S>& mesh, const FrameImages<S>& images, RenderStats& stats) {
   // ---- sort
-  // Distances may round to below the near plane that their z is beyond, but not to half of it.
+  // Lower bound of all keys. A distance may round to slightly less than the near plane, but not to half
+  // of it.
   const float near_plane =
-      ws.projections.empty() ? 0 : ws.projections[0].camera.near_plane;  // of all sets
+      ws.projections.empty() ? 0 : ws.projections[0].camera.near_plane;  // the same for all sets
   const std::uint32_t base =
       config.quality.key_bits < 32 ? 0 : std::max(bits_of(0.5f * near_plane), range.low);
   const Result<std::size_t> ordered =
@@ -205,25 +207,27 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   return {};
 }
 
-/// Slices that a frame is drawn in, of which so many Gaussians at most may be visible.
+/// Number of depth slices for a frame with at most `candidates` visible Gaussians.
 inline int depth_slices_of(const RenderConfig& config, std::size_t candidates,
                            const Camera& camera) noexcept {
   if (config.response != Response::ewa || config.compat != Compat::none || config.quality.key_bits < 32)
     return 1;
   if (config.tuning.depth_slices != 0) return config.tuning.depth_slices;
-  // Where few Gaussians are for a pixel, projecting them is a small part of the frame.
+  // With few Gaussians per pixel, projection is a small part of the frame, and slices cannot save much.
   constexpr std::size_t kFew = 131072;
   const std::size_t pixels =
       static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   return candidates < kFew || candidates < pixels / 2 ? 1 : 4;
 }
 
-/// Projects and draws a frame, front to back, in slices of depth; false where one is as good.
+/// Projects and draws a frame in slices of depth, front to back. Returns false, having drawn nothing,
+/// when a single slice would be as fast.
 template <class B>
 Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Camera& camera,
                             const RenderConfig& config, const FrameImages<float>& images,
                             RenderStats& stats) {
-  if (depth_slices_of(config, stats.gaussians, camera) < 2) return false;  // nothing needs to be planned
+  // The upper bound already says one slice: skip planning.
+  if (depth_slices_of(config, stats.gaussians, camera) < 2) return false;
   DepthSlices& slices = ws.slices;
   const View<const ViewedSet<float>> sets = view_of(ws.projections);
   slices.plan(backend, sets);
@@ -257,7 +261,7 @@ Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Cam
   return true;
 }
 
-/// render_camera, and behind a mesh where there is one.
+/// Renders a camera like render_camera. If `mesh` is not empty, composites it with the Gaussians.
 template <class S, Backend B>
 Status render_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
                     const Camera& camera, const RenderConfig& config, const MeshLayer<S>& mesh,
@@ -307,12 +311,16 @@ Status render_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gauss
 
 }  // namespace detail
 
-/// Renders sets of Gaussians as one sorted list into the images of one camera: project, sort by
-/// (float32 key, set, row), bin into tiles, blend. Arrays of `sets` and pointers of `images` are in the
-/// backend's memory ([H][W] row-major). Fills `stats` when given. The result is there after
-/// `backend.synchronize()`.
+/// Renders sets of Gaussians into the images of one camera. All sets are drawn as one list, sorted by
+/// (float32 key, set, row): project, sort, bin into tiles, blend.
 ///
-/// Errors: invalid_argument naming the field; out_of_memory is thrown by the workspace.
+/// Arrays of `sets` and pointers of `images` are in the backend's memory; images are row-major, [H][W]
+/// or [H][W][3]. The result is complete after `backend.synchronize()`.
+///
+/// @param ws scratch memory, kept between calls
+/// @param stats filled on success, if not null
+/// @return invalid_argument naming the field; unsupported for more than 2^32 Gaussians; backend_failure.
+///   The workspace throws gsnav::Error (out_of_memory).
 template <class S, Backend B>
 Status render_camera(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
                      const Camera& camera, const RenderConfig& config, const FrameImages<S>& images,

@@ -14,21 +14,23 @@
 
 namespace gsnav {
 
-/// Joints that move one Gaussian: one of these two.
-inline constexpr int kInfluences4 = 4, kInfluences8 = 8;
-/// Skinning weights are whole numbers of parts, of which this many are 1; those of a Gaussian make 1
-/// exactly. Rounding weights (detail/avatar/skinning_weights.hpp) moves a Gaussian by at most K / (4 *
-/// kWeightParts) of the greatest distance between the places where its joints alone would put it: 15 um
-/// a metre for K = 4, 31 um for K = 8.
+/// Supported numbers of joints that move one Gaussian (SkinningArgs::influences).
+inline constexpr int kInfluences4 = 4,  ///< four joints per Gaussian
+    kInfluences8 = 8;                   ///< eight joints per Gaussian
+/// Number of parts that make a skinning weight of 1. Weights are stored as integers of parts, and those
+/// of a Gaussian sum to kWeightParts exactly. Rounding weights (detail/avatar/skinning_weights.hpp)
+/// moves a Gaussian by at most K / (4 kWeightParts) times the greatest distance between two positions
+/// that single joints would give it. Per metre of that distance: 15 um for K = 4, 31 um for K = 8.
 inline constexpr int kWeightParts = 65535;
-/// A blended linear part with a smaller determinant has no orientation worth the name (the candy
-/// wrapper of a 180 degree twist): the joint of the greatest weight gives the rotation there.
+/// Smallest determinant of a blended linear part that still has a useful orientation. Below it (a 180
+/// degree twist, the candy-wrapper effect) the joint with the greatest weight gives the rotation.
 inline constexpr double kMinBlendDeterminant = 0.1;
 
 namespace detail {
 
-/// Cofactor matrix: det(m) times the inverse transposed. Errors are roundings of m's greatest elements:
-/// enough for the polar factor of what has det > 0.1, not for needles (cross() has what they need).
+/// Cofactor matrix: det(m) times the transposed inverse. The error is a rounding of m's greatest
+/// elements. That suffices for the polar factor of a matrix with det > 0.1, but not for needle shapes;
+/// use cross() for those.
 template <class L>
 GSNAV_HD Mat3<L> cofactors(const Mat3<L>& m) noexcept {
   return {{rough_cross(m.row[1], m.row[2]), rough_cross(m.row[2], m.row[0]),
@@ -37,27 +39,30 @@ GSNAV_HD Mat3<L> cofactors(const Mat3<L>& m) noexcept {
 
 }  // namespace detail
 
-/// A rotation times `scale` > 0.
+/// A rotation matrix multiplied by a factor.
 template <class L>
 struct ScaledRotation {
-  Mat3<L> matrix;
-  L scale;
+  Mat3<L> matrix;  ///< scale * rotation
+  L scale;         ///< > 0
 };
 
-/// The rotation nearest to m in the Frobenius norm (its polar factor), for det(m) > 0, in closed form
-/// from the sum of m's singular values (Markley 1993, FOAM). The sum is the greatest root of (x^2 -
-/// |m|^2)^2 - 8 det(m) x - 4 |cofactors|^2, to which Newton's iteration descends from sqrt(3) |m|
-/// without passing it. Error of an element for blends of rotations with det > 0.1: 1e-6 in float, 2e-15
-/// in double; it grows as the greatest singular value over the sum of the other two. Lanes that are done
-/// stay where they are while others go on.
+/// Rotation nearest to m in the Frobenius norm (its polar factor), for det(m) > 0. Returned with a
+/// scale; see polar_rotation for the rotation itself.
+///
+/// It is computed in closed form from the sum x of m's singular values (Markley 1993, FOAM). That sum is
+/// the greatest root of (x^2 - |m|^2)^2 - 8 det(m) x - 4 |cofactors|^2. Newton's iteration descends to
+/// it from sqrt(3) |m| without passing it.
+///
+/// The error per element for blends of rotations with det > 0.1 is 1e-6 in float and 2e-15 in double. It
+/// grows with the ratio of the greatest singular value to the sum of the other two.
 template <class L>
 GSNAV_HD ScaledRotation<L> scaled_polar_rotation(const Mat3<L>& m) noexcept {
   using S = scalar_of<L>;
-  // The error is about the square of the last step, so this is rounding.
+  // Newton's iteration squares the error in each step, so after a step this small only rounding is left.
   const L converged(sizeof(S) > sizeof(float) ? S(1e-9) : S(2e-4));
   const Mat3<L> c = detail::cofactors(m);
   const L det = dot(m.row[0], c.row[0]);
-  // m times its transposed, whose trace is |m|^2 and whose principal minors add up to |cofactors|^2.
+  // m m^T. Its trace is |m|^2, and its principal minors sum to |cofactors|^2.
   L g00 = dot(m.row[0], m.row[0]), g11 = dot(m.row[1], m.row[1]), g22 = dot(m.row[2], m.row[2]);
   const L g01 = dot(m.row[0], m.row[1]), g02 = dot(m.row[0], m.row[2]), g12 = dot(m.row[1], m.row[2]);
   const L m2 = g00 + (g11 + g22);
@@ -69,13 +74,13 @@ GSNAV_HD ScaledRotation<L> scaled_polar_rotation(const Mat3<L>& m) noexcept {
     const L t = fma(sum, sum, -m2);
     const L value = fma(t, t, -(four * fma(det2, sum, c2))), slope = four * fma(sum, t, -det2);
     const L change = value / slope;
-    // A lane that has converged stays: a pack gives the bits of its lanes alone.
+    // A converged lane keeps its value, so that a pack gives the bits of each lane computed alone.
     sum = select(active, sum - change, sum);
     active = active && (change > converged * sum);
     if (!any(active)) break;
   }
-  // With singular values a, b, c and their vectors, ((ab + bc + ca + |m|^2) I - m m^T) m + sum *
-  // cofactors is (a + b) (b + c) (c + a) times the rotation.
+  // Let a, b, c be the singular values and sum = a + b + c. Then ((ab + bc + ca + |m|^2) I - m m^T) m +
+  // sum * cofactors equals (a + b)(b + c)(c + a) times the rotation.
   const L pairs = L(S(0.5)) * fma(sum, sum, -m2), d = pairs + m2;
   g00 = d - g00;
   g11 = d - g11;
@@ -85,14 +90,16 @@ GSNAV_HD ScaledRotation<L> scaled_polar_rotation(const Mat3<L>& m) noexcept {
             fma(g22, m.row[2], fma(-g12, m.row[1], fma(-g02, m.row[0], c.row[2] * sum)))}},
           fma(pairs, sum, -det)};
 }
+/// Rotation nearest to m in the Frobenius norm, for det(m) > 0. Accuracy of scaled_polar_rotation.
 template <class L>
 GSNAV_HD Mat3<L> polar_rotation(const Mat3<L>& m) noexcept {
   const ScaledRotation<L> r = scaled_polar_rotation(m);
   return r.matrix * (L(scalar_of<L>(1)) / r.scale);
 }
 
-/// Quaternion of a rotation, of any length, without branches (Shepperd's four cases, the one with the
-/// largest component selected): for lanes. Scalars get the same bits.
+/// Quaternion of a rotation, not normalised. Evaluates Shepperd's four cases without branches and
+/// selects the one with the largest component, so it also runs on packs. Scalars and packs get the same
+/// bits.
 template <class L>
 GSNAV_HD Quat<L> quat_direction(const ScaledRotation<L>& rotation) noexcept {
   const Mat3<L>& m = rotation.matrix;
@@ -118,22 +125,26 @@ GSNAV_HD Quat<L> quat_direction(const ScaledRotation<L>& rotation) noexcept {
   return q;
 }
 
-/// A Gaussian after skinning.
+/// A skinned Gaussian.
 template <class L>
 struct Skinned {
-  Vec3<L> mean{};
+  Vec3<L> mean{};      ///< metres, relative to the actor's root
   Quat<L> quat{};      ///< orientation: rotation * canonical orientation
-  Quat<L> rotation{};  ///< what the body has turned it by since the canonical pose
+  Quat<L> rotation{};  ///< rotation of the body at this Gaussian since the canonical pose
 };
 
-/// Linear blend skinning of one Gaussian, or of a pack of them.
+/// Skins one Gaussian, or a pack of Gaussians, by linear blend skinning. The mean is transformed by the
+/// blended matrix, and the orientation by its polar factor. The result does not depend on the numbering
+/// of the ellipsoid's axes.
 ///
-/// `blend`: sum over the influences of weight * (posed joint * inverse bind), the joints rigid, metres,
-/// relative to the actor's root (so that an error of the weights' sum is scaled by the body's size, not
-/// by its place in the world). `first()`: linear part of the joint of the greatest weight; called where
-/// a blend has no orientation. The mean goes through the blended matrix, the orientation through its
-/// polar factor, so that the result does not depend on how the ellipsoid's axes are numbered.
-/// `rotation`: whether Skinned::rotation is asked for.
+/// @param blend sum over the influences of weight * (posed joint * inverse bind), with rigid joints, in
+///   metres. Joints are relative to the actor's root, so that an error in the sum of weights scales with
+///   the body and not with its distance from the origin.
+/// @param first callable that returns the linear part of the joint with the greatest weight. It is
+///   called when the blend has no useful orientation (see kMinBlendDeterminant).
+/// @param mean canonical position, metres
+/// @param quat canonical orientation, unit length
+/// @param rotation whether to compute Skinned::rotation
 template <class L, class First>
 GSNAV_HD Skinned<L> skin(Affine3<L> blend, const First& first, const Vec3<L>& mean, const Quat<L>& quat,
                          bool rotation = true) noexcept {
@@ -159,44 +170,48 @@ GSNAV_HD Skinned<L> skin(Affine3<L> blend, const First& first, const Vec3<L>& me
   return out;
 }
 
-/// Arrays of one skinning, all in the backend's memory. `S` is the scalar of the arithmetic, `Out` of
-/// what is written.
+/// Arrays for skinning N Gaussians of one avatar, all in the backend's memory. `S` is the scalar type of
+/// the arithmetic, `Out` that of the results.
 template <class S, class Out = float>
 struct SkinningArgs {
-  View<const float> means[3];               ///< canonical x, y, z, metres, [N] each
-  View<const float> quats[4];               ///< canonical w, x, y, z of unit length, [N] each
-  int influences = kInfluences4;            ///< K: 4 or 8
-  View<const std::uint16_t> joint_indices;  ///< [N][K], the greatest weight first
-  View<const std::uint16_t> weights;  ///< [N][K] parts of kWeightParts, which is the sum of each row
-  View<const Affine3<S>> joints;      ///< [J] posed joint * inverse bind, relative to the root
-  View<Out> means_out[3];             ///< [N] each
-  View<Out> quats_out[4];             ///< [N] each
-  View<Out> rotations_out[4];         ///< [N] each, or empty: not asked for
-  /// Dual quaternion blending: `joints` as dual quaternions, [J], which are then what is read. Empty:
-  /// linear blending.
+  View<const float> means[3];               ///< canonical positions x, y, z, metres, [N] each
+  View<const float> quats[4];               ///< canonical orientations w, x, y, z, unit length, [N] each
+  int influences = kInfluences4;            ///< joints per Gaussian, K: 4 or 8
+  View<const std::uint16_t> joint_indices;  ///< [N][K], joint with the greatest weight first
+  View<const std::uint16_t> weights;        ///< [N][K], in parts of kWeightParts; each row sums to
+                                            ///< kWeightParts
+  View<const Affine3<S>> joints;            ///< [J], posed joint * inverse bind, relative to the root
+  View<Out> means_out[3];                   ///< skinned positions x, y, z, metres, [N] each
+  View<Out> quats_out[4];                   ///< skinned orientations w, x, y, z, [N] each
+  View<Out> rotations_out[4];  ///< Skinned::rotation w, x, y, z, [N] each. Empty: not computed.
+  /// Joints as dual quaternions, [J]. If set, Gaussians are skinned by dual quaternion blending and
+  /// `joints` is not read. Empty: linear blending.
   View<const DualQuat<S>> dual_joints;
-  /// Linear blending with stretch: gradients of the second to last weight of each Gaussian by its
-  /// canonical place, [N][K-1][3], 1/metres, standard deviations, and where the shapes go. Empty: shapes
-  /// are turned only.
+  /// Gradients of the weights by canonical position, [N][K-1][3], 1/metres, for the second to the last
+  /// influence. If set, linear blending also stretches the shapes: `scales` is read and `axes_out`
+  /// written. Empty: shapes are only rotated.
   View<const float> weight_gradients;
-  View<const float> scales[3];  ///< canonical, metres, [N] each
-  View<Out> axes_out[9];        ///< [N] each, as ShapeRows::axes
+  View<const float> scales[3];  ///< canonical standard deviations, metres, [N] each; for stretch
+  View<Out> axes_out[9];  ///< skinned shapes, [N] each, in the layout of ShapeRows::axes; for stretch
 
+  /// Number of Gaussians, N.
   GSNAV_HD std::size_t size() const noexcept { return means[0].size; }
+  /// True if rotations_out is to be written.
   GSNAV_HD bool writes_rotations() const noexcept { return !rotations_out[0].empty(); }
 };
 
-/// A skinning weight from its parts. The lanes do the same.
+/// Converts a skinning weight from parts of kWeightParts to [0, 1]. SIMD kernels compute the same bits.
 template <class S>
 GSNAV_HD S skinning_weight(std::uint16_t parts) noexcept {
   return static_cast<S>(parts) * static_cast<S>(1.0 / kWeightParts);
 }
 
-/// Every number of `a` times the weight, and the same added to `sum`.
+/// All elements of `a` times the weight.
 template <class L>
 GSNAV_HD Affine3<L> weighted(const L& weight, const Affine3<L>& a) noexcept {
   return {a.linear * weight, a.translation * weight};
 }
+/// All elements of `a` times the weight, added to `sum`.
 template <class L>
 GSNAV_HD Affine3<L> weighted(const L& weight, const Affine3<L>& a, const Affine3<L>& sum) noexcept {
   Affine3<L> out;
@@ -205,8 +220,8 @@ GSNAV_HD Affine3<L> weighted(const L& weight, const Affine3<L>& a, const Affine3
   return out;
 }
 
-/// The blend of a Gaussian's K joints: the sum of weight(k) * joint(k), in the order of k. A joint is
-/// whatever has the two functions `weighted`: its numbers may be blended in any layout.
+/// Blended transform of a Gaussian: the sum of weight(k) * joint(k) for k < K, in the order of k. A
+/// joint may be of any type that has the two functions `weighted`.
 template <int K, class Joint, class Weight>
 GSNAV_HD auto blend_influences(const Joint& joint, const Weight& weight) noexcept {
   auto sum = weighted(weight(0), joint(0));
@@ -214,15 +229,16 @@ GSNAV_HD auto blend_influences(const Joint& joint, const Weight& weight) noexcep
   return sum;
 }
 
-/// What skinning reads of a Gaussian.
+/// Inputs of skinning for one Gaussian.
 template <int K>
 struct SkinRow {
-  std::uint16_t joints[K], parts[K];
-  Vec3<float> mean;
-  Quat<float> quat;
+  std::uint16_t joints[K],  ///< joint indices
+      parts[K];             ///< weights, in parts of kWeightParts
+  Vec3<float> mean;         ///< canonical position, metres
+  Quat<float> quat;         ///< canonical orientation
 };
 
-/// Of Gaussian i.
+/// Reads the inputs of Gaussian i.
 template <int K, class S, class Out>
 GSNAV_HD SkinRow<K> read_skin_row(const SkinningArgs<S, Out>& args, std::size_t i) noexcept {
   SkinRow<K> row;
@@ -235,7 +251,7 @@ GSNAV_HD SkinRow<K> read_skin_row(const SkinningArgs<S, Out>& args, std::size_t 
   return row;
 }
 
-/// Skins a Gaussian whose K joints `joint_at(index)` gives (an Affine3<S>, or a reference to one).
+/// Skins one Gaussian. `joint_at(index)` returns a joint as `Affine3<S>`, or a reference to it.
 template <class S, int K, class JointAt>
 GSNAV_HD Skinned<S> skin_row(const SkinRow<K>& row, const JointAt& joint_at, bool rotation) noexcept {
   const auto joint = [&](int k) GSNAV_INLINED -> decltype(auto) { return joint_at(row.joints[k]); };
@@ -245,7 +261,7 @@ GSNAV_HD Skinned<S> skin_row(const SkinRow<K>& row, const JointAt& joint_at, boo
   return skin<S>(blend, first, vec_cast<S>(row.mean), quat_cast<S>(row.quat), rotation);
 }
 
-/// Writes Gaussian i. `Args`: SkinningArgs, or what has its arrays.
+/// Writes the results of Gaussian i. `Args` is SkinningArgs or a type with the same output arrays.
 template <class Args, class S>
 GSNAV_HD void store_skinned(const Args& args, std::size_t i, const Skinned<S>& s) noexcept {
   using Out = std::remove_reference_t<decltype(args.means_out[0][i])>;
@@ -257,11 +273,12 @@ GSNAV_HD void store_skinned(const Args& args, std::size_t i, const Skinned<S>& s
   for (int k = 0; k < 4; ++k) args.rotations_out[k][i] = static_cast<Out>(rotation[k]);
 }
 
-/// Skins Gaussian i.
+/// Kernel that skins Gaussian i by linear blending.
 template <class S, class Out = float>
 struct SkinGaussian {
-  SkinningArgs<S, Out> args;
+  SkinningArgs<S, Out> args;  ///< inputs and outputs
 
+  /// Skins Gaussian i.
   GSNAV_HD void operator()(std::size_t i) const noexcept {
     const auto joint_at = [this](std::uint16_t j)
                               GSNAV_INLINED -> const Affine3<S>& { return args.joints[j]; };

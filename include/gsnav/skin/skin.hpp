@@ -15,7 +15,8 @@
 
 namespace gsnav {
 
-/// Checks that the arrays fit each other; names the one that does not.
+/// Checks that the lengths of all arrays agree.
+/// @return invalid_argument naming the array.
 template <class S, class Out>
 Status validate(const SkinningArgs<S, Out>& args) {
   const std::size_t n = args.size();
@@ -60,7 +61,7 @@ Status validate(const SkinningArgs<S, Out>& args) {
 
 namespace detail {
 
-/// Whether another kernel than the usual one is asked for.
+/// True if the arrays ask for dual quaternions or stretch instead of plain linear blending.
 template <class S, class Out>
 bool has_skinning_mode(const SkinningArgs<S, Out>& args) noexcept {
   return !args.dual_joints.empty() || !args.weight_gradients.empty();
@@ -68,9 +69,11 @@ bool has_skinning_mode(const SkinningArgs<S, Out>& args) noexcept {
 
 }  // namespace detail
 
-/// Skins N Gaussians on a backend: linearly (stage::Skin), by dual quaternions or with stretch, as the
-/// arrays that are given say. Every joint index must be below joints.size (AvatarAsset::validate checks
-/// that). The result is there after `backend.synchronize()`. Errors: invalid_argument naming the array.
+/// Skins N Gaussians on a backend. The arrays in `args` select the method: linear blending
+/// (stage::Skin), dual quaternions, or linear blending with stretch. Every joint index must be less than
+/// joints.size, which AvatarAsset::validate checks. The result is complete after
+/// `backend.synchronize()`.
+/// @return invalid_argument naming the array.
 template <class S, Backend B, class Out>
 Status skin_gaussians(B& backend, const SkinningArgs<S, Out>& args) {
   if (Status s = validate(args); !s) return s;
@@ -86,9 +89,9 @@ Status skin_gaussians(B& backend, const SkinningArgs<S, Out>& args) {
   return {};
 }
 
-/// The same for many avatars (stage::SkinAll: a GPU takes one launch). The bits are those of one avatar
-/// at a time. Errors: invalid_argument naming the avatar by its place and the array; nothing is skinned
-/// then.
+/// Skins many avatars, with the same bits as skin_gaussians on each. On a GPU it takes one launch
+/// (stage::SkinAll).
+/// @return invalid_argument naming the avatar's index and the array; then nothing is skinned.
 template <class S, Backend B, class Out = float>
 Status skin_all(B& backend, std::span<const SkinningArgs<S, Out>> avatars) {
   for (std::size_t i = 0; i < avatars.size(); ++i) {

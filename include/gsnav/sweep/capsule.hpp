@@ -5,48 +5,49 @@
 #include "gsnav/math/capsule.hpp"
 #include "gsnav/math/vec.hpp"
 
-// Distance and time of impact of capsules, for scalars and lane packs. Nothing here branches on data,
-// except where no lane needs what a branch computes. Float inputs must be relative to an origin near the
-// agent (subtract in double first): at 1000 m a float cannot hold a millimetre.
+// Distance and time of impact of capsules, for scalars and SIMD packs. Nothing branches on data, except
+// to skip work that no lane needs. Float inputs must be relative to an origin near the agent (subtract
+// in double first): at 1000 m a float cannot represent a millimetre.
 
 namespace gsnav {
 
-/// Rules of a sweep. All lengths in metres.
+/// Tolerances of a sweep. All lengths in metres.
 template <class S>
 struct SweepRules {
-  /// A moving agent comes to rest this far from a body. Contact is declared at half of it, so that
-  /// rounding does not stop an agent that slides along a body.
+  /// Distance to a body at which a moving agent comes to rest. Contact is declared at half of it, so
+  /// that rounding does not stop an agent that slides along a body.
   S skin = S(1e-4);
-  /// The advance ends when the gap is within this of its target.
+  /// The search ends when the gap is within this distance of its target.
   S tolerance = sizeof(S) > 4 ? S(1e-6) : S(4e-6);
-  /// A change of gap smaller than this is rounding.
+  /// Changes of the gap smaller than this are treated as rounding.
   S slack = sizeof(S) > 4 ? S(1e-12) : S(1e-6);
-  /// Most evaluations. Where they do not suffice, the agent stops at the time reached. In double no pair
-  /// of 800,000 with axes of up to 3 km needed more; in float 1 in 10^4 stops short.
+  /// Maximum number of distance evaluations. If they run out, the agent stops at the time reached so
+  /// far. In double none of 800,000 pairs with axes up to 3 km long needed more; in float 1 pair in 10^4
+  /// stops short.
   int max_iterations = sizeof(S) > 4 ? 512 : 64;
 };
 
-/// Outcome of a sweep over the unit interval.
+/// Result of a sweep over the unit time interval.
 template <class L>
 struct SweepResult {
-  mask_of<L> hit;            ///< the agent has to stop
-  mask_of<L> pushed;         ///< in contact, the body came closer by its own motion alone
-  L time;                    ///< when the agent comes to rest, in [0, 1]; 1 without a hit
-  L contact_time;            ///< when contact was declared, >= time
-  L start_gap;               ///< signed gap at time 0
-  L gap;                     ///< signed gap at the last evaluation
-  Vec3<L> normal;            ///< unit, from the body to the agent, at contact
-  Vec3<L> point;             ///< on the body's surface, at contact
-  mask_of<L> agent_closing;  ///< at contact the agent itself moved towards the body
+  mask_of<L> hit;            ///< the agent must stop
+  mask_of<L> pushed;         ///< while in contact, the body came closer by its own motion alone
+  L time;                    ///< Time at which the agent comes to rest, in [0, 1]. 1 without a hit.
+  L contact_time;            ///< time at which contact was declared, >= time
+  L start_gap;               ///< signed gap at time 0, metres
+  L gap;                     ///< signed gap at the last evaluation, metres
+  Vec3<L> normal;            ///< unit vector from the body to the agent at contact
+  Vec3<L> point;             ///< point of contact on the body's surface
+  mask_of<L> agent_closing;  ///< True if the agent itself was moving towards the body at contact.
 };
 
 namespace detail {
 
-/// Velocities of the ends of two moving capsules and growth of their radii, a unit of time.
+/// Velocities of the ends of two moving capsules, and growth rates of their radii, per unit of time.
 template <class L>
 struct PairMotion {
-  Vec3<L> agent[2], body[2];
-  L agent_growth, growth;  ///< of the agent's radius; of both radii together
+  Vec3<L> agent[2], body[2];  ///< velocities of the ends p0 and p1
+  L agent_growth, growth;     ///< growth of the agent's radius, and of the sum of both radii
 
   GSNAV_HD PairMotion(const MovingCapsule<L>& a, const MovingCapsule<L>& b) noexcept
       : agent{a.end.p0 - a.begin.p0, a.end.p1 - a.begin.p1},
@@ -54,12 +55,12 @@ struct PairMotion {
         agent_growth(a.end.radius - a.begin.radius),
         growth(agent_growth + (b.end.radius - b.begin.radius)) {}
 
-  /// By how much the agent itself can reduce the gap.
+  /// Upper bound of the rate at which the agent alone can reduce the gap.
   GSNAV_HD L agent_speed() const noexcept {
     return sqrt(max(dot(agent[0], agent[0]), dot(agent[1], agent[1]))) + abs(agent_growth);
   }
 
-  /// Greatest speed of an end of one capsule relative to an end of the other; more than 0.
+  /// Greatest relative speed between an end of one capsule and an end of the other. Always positive.
   GSNAV_HD L fastest_pair() const noexcept {
     using S = scalar_of<L>;
     L speed2(S(0));
@@ -71,8 +72,8 @@ struct PairMotion {
   }
 };
 
-/// Closest points of the axes. Where the axes meet, both directions across them are normals: the one
-/// against which the agent leaves on the side that it is heading for.
+/// Closest points of the two axes. If the axes intersect, both directions perpendicular to them are
+/// valid normals. The one chosen lets the agent leave on the side it is heading for.
 template <class L>
 GSNAV_HD SegmentDistance<L> axis_distance(const Capsule<L>& a, const Capsule<L>& b,
                                           const PairMotion<L>& motion) noexcept {
@@ -84,12 +85,12 @@ GSNAV_HD SegmentDistance<L> axis_distance(const Capsule<L>& a, const Capsule<L>&
   return d;
 }
 
-/// The plane across the closest points of two moving capsules, which separates them: for each pair of
-/// ends, the distance along the plane's normal and how fast it shrinks.
+/// The plane that separates two moving capsules at their closest points. For each of the four pairs of
+/// ends it holds the distance along the normal and the rate at which it shrinks.
 template <class L>
 struct PlaneBetween {
-  L sep[4], closing[4];
-  L agent[2];  ///< speed of the agent's ends towards the body
+  L sep[4], closing[4];  ///< metres, and metres per unit of time
+  L agent[2];            ///< speed of the agent's ends towards the body
 
   GSNAV_HD PlaneBetween(const SegmentDistance<L>& d, L gap, const Capsule<L>& a, const Capsule<L>& b,
                         const PairMotion<L>& motion) noexcept
@@ -98,14 +99,15 @@ struct PlaneBetween {
     const Vec3<L> pa[2] = {a.p0 - d.on_a, a.p1 - d.on_a}, pb[2] = {b.p0 - d.on_b, b.p1 - d.on_b};
     for (int k = 0; k < 4; ++k) {
       const int ia = k >> 1, ib = k & 1;
-      // Relative to the witness points, whose separation is the gap: large offsets cancel exactly.
+      // Measured from the closest points, whose separation is the gap. Large offsets then cancel
+      // exactly.
       sep[k] = gap + dot(d.normal, pb[ib]) - dot(d.normal, pa[ia]);
       closing[k] = agent[ia] - nb[ib] + motion.growth;
     }
   }
 
-  /// A time before which the gap is more than `to`, because the plane still separates the capsules by
-  /// that; `never` where no pair of ends comes closer.
+  /// Time for which the plane keeps the capsules more than `to` metres apart. Returns `never` if no pair
+  /// of ends approaches.
   GSNAV_HD L time_to(L to, L never) const noexcept {
     using S = scalar_of<L>;
     const L zero(S(0)), one(S(1));
@@ -119,8 +121,9 @@ struct PlaneBetween {
   }
 };
 
-/// How long before contact the agent has to rest to be `half` a skin further away, along at most two
-/// skins of relative motion: at grazing speed a little gap can be a long way.
+/// How long before contact the agent must stop in order to be `half` of the skin further away. Limited
+/// to the time of two skins of relative motion, because at grazing speed a small gap can be a long way
+/// back.
 template <class L>
 GSNAV_HD L time_back(const PlaneBetween<L>& plane, const PairMotion<L>& motion, L half,
                      L skin) noexcept {
@@ -131,10 +134,10 @@ GSNAV_HD L time_back(const PlaneBetween<L>& plane, const PairMotion<L>& motion, 
   return min(half / max(fastest, tiny), (skin + skin) / motion.fastest_pair());
 }
 
-/// How long an agent that a body has pushed may go on before the next check whether it goes deeper by
-/// itself. The direction between two axes turns by about relative speed / distance. An agent that moves
-/// away at `-rate` cannot come closer before that direction has turned far enough. One that moves along
-/// the body gets deeper with the square of time, which is limited to about the skin.
+/// Time until the next check whether an agent that was pushed by a body goes deeper by itself. The
+/// direction between two axes turns by about relative speed / distance. An agent that moves away at
+/// `-rate` cannot come closer until the direction has turned far enough. One that moves along the body
+/// gets deeper with the square of time; the interval limits that depth to about the skin.
 template <class L>
 GSNAV_HD L time_to_look(L skin, L agent_speed, L rate, L axes_apart, L relative_speed) noexcept {
   using S = scalar_of<L>;
@@ -145,12 +148,15 @@ GSNAV_HD L time_to_look(L skin, L agent_speed, L rate, L axes_apart, L relative_
   return max(max(along, away), least);
 }
 
-/// `sweep`, up to `steps` evaluations of it. Lanes outside of `unfinished` have their result.
+/// Runs at most `steps` evaluations of `sweep`. On return, `unfinished` marks the lanes that need more;
+/// the others have their result.
 ///
-/// A lane is `strict` once its agent has been clear of the body: then contact stops it. Until then
-/// `floor` is the least gap so far. A body may reduce it: the next check is a little later (`looking`).
-/// Where that check finds that the agent itself went deeper, the time since which it did is searched for
-/// between `good` and `over` (`narrowing`).
+/// States of a lane:
+/// - `strict`: the agent has been clear of the body, so contact stops it.
+/// - Not strict: `floor` is the smallest gap so far. The body may reduce it; then the next check follows
+///   a little later (`looking`).
+/// - `narrowing`: a check found that the agent itself went deeper. The time at which that began is
+///   searched for between `good` and `over`.
 template <class L, class S = scalar_of<L>>
 GSNAV_HD SweepResult<L> sweep_steps(const MovingCapsule<L>& agent, const MovingCapsule<L>& body,
                                     const SweepRules<S>& rules, int steps,
@@ -159,7 +165,7 @@ GSNAV_HD SweepResult<L> sweep_steps(const MovingCapsule<L>& agent, const MovingC
   const L skin(rules.skin), target(rules.skin * S(0.5)), tolerance(rules.tolerance), slack(rules.slack);
   const PairMotion<L> motion(agent, body);
   const L agent_speed = motion.agent_speed();
-  const L enough = max(tolerance, skin * L(S(0.0625)));  // how much deeper a search may leave the agent
+  const L enough = max(tolerance, skin * L(S(0.0625)));  // depth that the search may leave uncorrected
 
   SweepResult<L> out{};
   auto active = zero < one;
@@ -234,18 +240,18 @@ GSNAV_HD SweepResult<L> sweep_steps(const MovingCapsule<L>& agent, const MovingC
 
 }  // namespace detail
 
-/// First time at which `agent`, moving linearly, would come within half a skin of `body`, moving
-/// linearly in endpoints and radius, over a common interval mapped to [0, 1].
+/// First time at which a moving agent comes within half a skin of a moving body. Endpoints and radii of
+/// both move linearly over a common interval, mapped to [0, 1].
 ///
-/// Directional conservative advancement: along the normal n of the closest points each of the four
-/// endpoint pairs separates at a constant rate. Before the first of them reaches the target distance,
-/// the plane still separates the two, so an advance cannot overshoot at any speed. `time` is at or
-/// before `contact_time`, and every earlier time is free.
+/// The method is directional conservative advancement. Along the normal n of the closest points, each of
+/// the four pairs of endpoints separates at a constant rate. Until the first pair reaches the target
+/// distance, the plane still separates the capsules, so an advance cannot overshoot at any speed. `time`
+/// <= `contact_time`, and every earlier time is free of contact.
 ///
-/// From a start closer than skin/4, overlap included, the agent goes on as long as it does not itself
-/// reduce the gap below what it has been so far, within about twice the skin (1.1e-4 m in 12,600 steps
-/// with pushes at the default skin). A gap that the body alone reduces does not stop it; `pushed`
-/// reports that.
+/// The agent may start closer than skin/4, or overlapping. It then continues as long as it does not
+/// itself reduce the gap below its smallest value so far. The tolerance is about twice the skin (1.1e-4
+/// m in 12,600 steps with pushes, at the default skin). A gap that only the body reduces does not stop
+/// the agent; `pushed` reports it.
 template <class L, class S = scalar_of<L>>
 GSNAV_HD SweepResult<L> sweep(const MovingCapsule<L>& agent, const MovingCapsule<L>& body,
                               const SweepRules<S>& rules = {}) noexcept {
@@ -253,9 +259,9 @@ GSNAV_HD SweepResult<L> sweep(const MovingCapsule<L>& agent, const MovingCapsule
   return detail::sweep_steps(agent, body, rules, rules.max_iterations, unfinished);
 }
 
-/// The least gap of two capsules that move linearly over the unit interval, at most `tolerance` (metres,
-/// > 0) too large; `best` where that is less. The plane between them tells for how long they cannot come
-/// nearer.
+/// Smallest gap of two linearly moving capsules over the unit interval, or `best` if that is smaller. It
+/// is too large by at most `tolerance` (metres, > 0). The plane between the capsules bounds how long
+/// they cannot come closer.
 template <class S>
 GSNAV_HD S least_gap(const MovingCapsule<S>& agent, const MovingCapsule<S>& body, S best,
                      S tolerance) noexcept {

@@ -12,18 +12,19 @@
 #include "gsnav/core/view.hpp"
 #include "gsnav/detail/sweep/capsule_batch.hpp"
 
-// One agent against many capsules: the outcome does not depend on the order of the capsules, equal
-// times and equal gaps are decided by (avatar, bone). And many pairs at once, on a backend.
+// Sweeps of one agent against many capsules, and of many pairs at once on a backend. Results do not
+// depend on the order of the capsules: ties of time or gap go to the smallest (avatar, bone).
 
 namespace gsnav {
 
 namespace detail {
 
+/// The capsule relative to `origin`, in scalar type S.
 template <class S>
 GSNAV_HD Capsule<S> local_capsule(const Capsule<double>& c, const Vec3d& origin) noexcept {
   return {vec_cast<S>(c.p0 - origin), vec_cast<S>(c.p1 - origin), static_cast<S>(c.radius)};
 }
-/// The part [u0, u1] of a body's motion, relative to `origin`, in the sweep's scalar.
+/// The part [u0, u1] of a body's motion, relative to `origin`, in scalar type S.
 template <class S>
 GSNAV_HD MovingCapsule<S> local_motion(const MovingCapsule<double>& m, double u0, double u1,
                                        const Vec3d& origin) noexcept {
@@ -31,7 +32,8 @@ GSNAV_HD MovingCapsule<S> local_motion(const MovingCapsule<double>& m, double u0
           local_capsule<S>(lerp(m.begin, m.end, u1), origin)};
 }
 
-/// True where the boxes that two motions sweep are further apart than `margin`: they cannot touch.
+/// True if the boxes swept by the two motions are further apart than `margin` metres, so that they
+/// cannot touch.
 GSNAV_HD bool swept_apart(const MovingCapsule<double>& a, const MovingCapsule<double>& b,
                           double margin) noexcept {
   const double reach = margin + max(a.begin.radius, a.end.radius) + max(b.begin.radius, b.end.radius);
@@ -45,6 +47,7 @@ GSNAV_HD bool swept_apart(const MovingCapsule<double>& a, const MovingCapsule<do
   return false;
 }
 
+/// True if capsule a comes before capsule b: by avatar, then by bone.
 GSNAV_HD bool id_less(std::uint32_t avatar_a, std::uint32_t bone_a, std::uint32_t avatar_b,
                       std::uint32_t bone_b) noexcept {
   return avatar_a != avatar_b ? avatar_a < avatar_b : bone_a < bone_b;
@@ -55,23 +58,25 @@ GSNAV_HD bool id_less(std::uint32_t avatar_a, std::uint32_t bone_a, std::uint32_
 /// The first body that an agent's motion runs into.
 template <class S>
 struct FirstImpact {
-  SweepResult<S> sweep{};  ///< relative to the interval swept; meaningful where `hit`
-  bool hit = false;
-  std::uint32_t avatar = 0, bone = 0;  ///< whom, where `hit`
-  bool started_overlapping = false;    ///< some body overlapped the agent at the start
-  bool pushed = false;                 ///< some body came closer from contact by its own motion
-  std::uint32_t pushed_avatar = 0, pushed_bone = 0;  ///< the least id that did
+  SweepResult<S> sweep{};            ///< Relative to the swept interval. Valid if `hit`.
+  bool hit = false;                  ///< true if the agent must stop
+  std::uint32_t avatar = 0,          ///< avatar that was hit, if `hit`
+      bone = 0;                      ///< index of the capsule within the avatar
+  bool started_overlapping = false;  ///< true if some body overlapped the agent at the start
+  bool pushed = false;               ///< true if some body in contact came closer by its own motion
+  std::uint32_t pushed_avatar = 0,   ///< smallest avatar of those bodies, if `pushed`
+      pushed_bone = 0;               ///< smallest capsule of that avatar
 };
 
-/// Sweeps `agent` over the part [u0, u1] of the bodies' motion and merges the outcome into `best`.
-/// Positions are made relative to the agent's start in double before they become S.
+/// Sweeps `agent` against the part [u0, u1] of the bodies' motion and merges the result into `best`.
+/// Positions are taken relative to the agent's start, in double, before they are converted to S.
 template <class S = double>
 GSNAV_HD void first_impact(const MovingCapsule<double>& agent, View<const DynamicCapsule> bodies,
                            double u0, double u1, const SweepRules<S>& rules,
                            FirstImpact<S>& best) noexcept {
   const Vec3d origin = agent.begin.p0;
   const MovingCapsule<S> a = detail::local_motion<S>(agent, 0.0, 1.0, origin);
-  // Wider than any contact by far more than rounding: leaving a body out changes no bit.
+  // Much wider than any contact plus rounding, so that skipping a body changes no bit.
   const double margin = 2.0 * static_cast<double>(rules.skin) + 1e-3;
   for (const DynamicCapsule& body : bodies) {
     if (detail::swept_apart(agent, body.motion, margin)) continue;
@@ -102,14 +107,17 @@ GSNAV_HD void first_impact(const MovingCapsule<double>& agent, View<const Dynami
 
 /// The body nearest to an agent.
 struct Clearance {
-  double distance = std::numeric_limits<double>::infinity();  ///< metres, negative: depth of overlap
-  std::uint32_t avatar = 0, bone = 0;                         ///< meaningful where distance is finite
-  Vec3d on_agent{}, on_body{};                                ///< points of the two surfaces, world
-  Vec3d normal{};                                             ///< unit, from the body to the agent
+  /// Metres. Negative: depth of overlap. Infinite: no body.
+  double distance = std::numeric_limits<double>::infinity();
+  std::uint32_t avatar = 0,  ///< avatar of the body, if distance is finite
+      bone = 0;              ///< index of the capsule within the avatar
+  Vec3d on_agent{},          ///< closest point of the agent's surface, world frame
+      on_body{};             ///< closest point of the body's surface, world frame
+  Vec3d normal{};            ///< unit vector from the body to the agent
 };
 
-/// Signed gap of a standing agent and the nearest body at the part u in [0, 1] of the bodies' motion,
-/// merged into `best`.
+/// Computes the signed gap between a standing agent and the nearest body, and merges it into `best`. The
+/// bodies are at the fraction u in [0, 1] of their motion.
 template <class S = double>
 void nearest_body(const Capsule<double>& agent, View<const DynamicCapsule> bodies, double u,
                   Clearance& best) noexcept {
@@ -134,7 +142,7 @@ void nearest_body(const Capsule<double>& agent, View<const DynamicCapsule> bodie
 
 namespace detail {
 
-/// Notes the first view that has another size than it must.
+/// Checks that views have `want` elements and keeps the error of the first that does not.
 class SizeCheck {
  public:
   SizeCheck(const char* args, std::size_t want) : args_(args), want_(want) {}
@@ -166,9 +174,10 @@ class SizeCheck {
 
 }  // namespace detail
 
-/// Gaps of N pairs of capsules on a backend, whose memory the arrays are in (stage::CapsuleGaps). The
-/// bits are those of capsule_gap. The result is there after `backend.synchronize()`. Errors:
-/// invalid_argument naming the array.
+/// Computes the gaps of N pairs of capsules on a backend (stage::CapsuleGaps), with the same bits as
+/// capsule_gap. Arrays are in the backend's memory. The result is complete after
+/// `backend.synchronize()`.
+/// @return invalid_argument naming the array whose length is wrong.
 template <Backend B, class S>
 Status capsule_gaps(B& backend, const CapsuleGapArgs<S>& args) {
   detail::SizeCheck check("CapsuleGapArgs", args.size());
@@ -184,9 +193,9 @@ Status capsule_gaps(B& backend, const CapsuleGapArgs<S>& args) {
   return {};
 }
 
-/// Sweeps of N pairs of moving capsules on a backend, whose memory the arrays are in
-/// (stage::SweepCapsules). The bits are those of sweep. The result is there after
-/// `backend.synchronize()`. Errors: invalid_argument naming the array.
+/// Sweeps N pairs of moving capsules on a backend (stage::SweepCapsules), with the same bits as sweep.
+/// Arrays are in the backend's memory. The result is complete after `backend.synchronize()`.
+/// @return invalid_argument naming the array whose length is wrong.
 template <Backend B, class S>
 Status sweep_capsules(B& backend, const SweepArgs<S>& args) {
   detail::SizeCheck check("SweepArgs", args.size());

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The compiled component gsnav::openmp has the lane kernels for SSE2, AVX2 and AVX-512 and chooses at
-// run time. CMake's target sets GSNAV_OPENMP_COMPILED. Header-only use is possible, but must be asked
-// for: every translation unit then compiles the kernels itself (about a minute and 1 GB), for the one
-// instruction set of its own flags (-march=...), and without optimisation they are many times slower.
+// The compiled component gsnav::openmp has SIMD kernels for SSE2, AVX2 and AVX-512 and chooses at run
+// time. Its CMake target sets GSNAV_OPENMP_COMPILED.
+//
+// Header-only use must be requested with GSNAV_OPENMP_HEADER_ONLY. Every translation unit then compiles
+// the kernels itself (about a minute and 1 GB), for the instruction set of its own flags (-march=...).
+// Without optimisation they are many times slower.
 #if defined(GSNAV_OPENMP_HEADER_ONLY)
 #undef GSNAV_OPENMP_COMPILED
 #elif !defined(GSNAV_OPENMP_COMPILED)
@@ -41,137 +43,176 @@
 namespace gsnav {
 
 #if !defined(GSNAV_OPENMP_COMPILED)
-// Names of its own for each instruction set: a program may link units that were compiled for several of
-// them, and others that use the component.
+// A namespace per instruction set, so that a program may link units compiled for several sets, and
+// others that use the component.
 inline namespace GSNAV_LANES_TAG {
 #endif
 
-/// The lane kernels of one instruction set: Gaussians, meshes (which a frame draws first), skinning and
-/// capsules. lanes::kernel_table fills it.
+/// SIMD kernels of one instruction set, for Gaussians, meshes, skinning and capsules.
+/// lanes::kernel_table fills it.
 struct LaneKernels {
+  /// Name of the instruction set: "baseline", "avx2", "avx512", "neon" or "native".
   const char* name;
+  /// Number of float lanes.
   int width;
+  /// Projects a chunk of Gaussians.
   void (*project_chunk)(const ViewedSet<float>&, const ProjectOutputs<float>&,
                         std::size_t chunk) noexcept;
+  /// Counts the splats of each tile for one block of splats.
   void (*count_tiles)(const CountTileIntersections<float>&, std::size_t block) noexcept;
+  /// Like count_tiles, without splats behind a mesh.
   void (*count_tiles_before_mesh)(const CountTileIntersections<float, MeshCull<float>>&,
                                   std::size_t block) noexcept;
+  /// Writes the splats of one block to the lists of their tiles.
   void (*scatter_tiles)(const ScatterTileIntersections<float>&, std::size_t block) noexcept;
+  /// Like scatter_tiles, without splats behind a mesh.
   void (*scatter_tiles_before_mesh)(const ScatterTileIntersections<float, MeshCull<float>>&,
                                     std::size_t block) noexcept;
+  /// Blends a tile of a frame without meshes.
   void (*rasterize_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
+  /// Blends a tile of a frame with meshes.
   void (*composite_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
+  /// Projects a chunk of mesh vertices.
   void (*project_mesh_vertices)(const ProjectMeshVertices<float>&, std::size_t chunk) noexcept;
+  /// Counts the visible pieces of a chunk of triangles.
   void (*count_mesh_triangles)(const CountMeshTriangles<float>&, std::size_t chunk) noexcept;
+  /// Writes the visible pieces of a chunk of triangles.
   void (*write_mesh_triangles)(const WriteMeshTriangles<float>&, std::size_t chunk) noexcept;
+  /// Finds the nearest triangle at each pixel of a tile.
   void (*rasterize_mesh_tile)(const RasterizeMeshTile<float>&, std::size_t tile) noexcept;
+  /// Shades a row of pixels.
   void (*shade_mesh_row)(const ShadeMeshRow<float>&, std::size_t row) noexcept;
+  /// Skins the Gaussians [begin, end).
   void (*skin_range)(const SkinningArgs<float>&, std::size_t begin, std::size_t end) noexcept;
+  /// Computes the gaps of the pairs [begin, end) of capsules.
   void (*gap_range)(const CapsuleGapArgs<float>&, std::size_t begin, std::size_t end) noexcept;
+  /// Sweeps the pairs [begin, end) of capsules.
   void (*sweep_range)(const SweepArgs<float>&, std::size_t begin, std::size_t end) noexcept;
 };
 
 #if defined(GSNAV_OPENMP_COMPILED)
-/// The widest lane kernels in gsnav::openmp that this processor runs (baseline, AVX2, AVX-512). The
-/// environment variable GSNAV_ISA=baseline|avx2|avx512 lowers the choice.
+/// Kernels of gsnav::openmp for the widest instruction set that this processor supports (baseline, AVX2,
+/// AVX-512). The environment variable GSNAV_ISA=baseline|avx2|avx512 can lower the choice.
 const LaneKernels& lane_kernels() noexcept;
 #else
-/// Header only: the lane kernels that this translation unit's flags give.
+/// Kernels for this translation unit's flags (header-only use).
 inline const LaneKernels& lane_kernels() noexcept {
   static constexpr LaneKernels k = lanes::kernel_table<LaneKernels>("native");
   return k;
 }
 #endif
 
-/// Runs on the processor's cores. float32 frames go through lane kernels; every other scalar through
-/// the generic ones. Results do not depend on the number of threads. The threads are a pool of the
-/// backend's own, which copies share (detail/core/thread_pool.hpp says what holds for them): OpenMP only
-/// tells how many.
+/// Backend for all CPU cores. float32 frames use SIMD kernels; other scalars use the generic ones.
+/// Results do not depend on the number of threads.
+///
+/// Threads are a pool that the backend owns and its copies share (see detail/core/thread_pool.hpp).
+/// OpenMP only determines the default number.
 class OpenMPBackend : public HostMemory {
  public:
-  /// `threads` = 0 takes OpenMP's default (OMP_NUM_THREADS), without OpenMP the number of cores.
+  /// @param threads number of threads. 0: OpenMP's default (OMP_NUM_THREADS), or without OpenMP the
+  ///   number of cores.
   explicit OpenMPBackend(int threads = 0)
       : threads_(threads > 0 ? threads : default_threads()),
         pool_(threads_ > 1 ? std::make_shared<ThreadPool>(threads_) : nullptr) {}
 
+  /// Number of threads, including the caller.
   int threads() const noexcept { return threads_; }
+  /// Number of threads: work is cut into that many pieces.
   std::size_t concurrency() const noexcept { return static_cast<std::size_t>(threads_); }
 
-  /// Optional member: batches of cameras go by whole frames, each on one thread.
+  /// Backend for one thread. With it, batches of cameras run one frame per thread.
   OpenMPBackend one_thread() const { return OpenMPBackend(1); }
 
-  /// An exception that leaves f on more than one thread ends the process.
+  /// Calls f(i) for i in [0, n), in any order. An exception that leaves f terminates the process if
+  /// there is more than one thread.
   template <class F>
   void parallel_for(std::size_t n, const F& f) {
     if (threads_ < 2 || n < 2) {
       for (std::size_t i = 0; i < n; ++i) f(i);
       return;
     }
-    // Pieces are handed out as threads come free: work items differ in cost.
+    // More pieces than threads, because work items differ in cost.
     const std::size_t piece = n / (concurrency() * 32) + 1;
     pool_->run(static_cast<std::uint32_t>((n + piece - 1) / piece), [&f, n, piece](std::uint32_t p) {
       const std::size_t begin = p * piece, end = std::min(n, begin + piece);
       for (std::size_t i = begin; i < end; ++i) f(i);
     });
   }
+  /// Returns success: work is done when the call returns.
   Status synchronize() { return {}; }
 
-  // Stages in lanes (core/stages.hpp).
+  // Stages with SIMD kernels (core/stages.hpp).
+  /// Projects a set.
   void run(stage::Project, const ViewedSet<float>& args, const ProjectOutputs<float>& out) {
     const auto kernel = lane_kernels().project_chunk;
     parallel_for(args.chunk_count(), [&args, &out, kernel](std::size_t c) { kernel(args, out, c); });
   }
-  /// Some of the chunks. Leaves out what reaches no open cell (ProjectOutputs::open).
+  /// Projects the listed chunks. Skips splats that reach no open cell (ProjectOutputs::open).
   void run(stage::Project, const ViewedSet<float>& args, const ProjectOutputs<float>& out,
            View<const std::uint32_t> chunks) {
     const auto kernel = lane_kernels().project_chunk;
     parallel_for(chunks.size,
                  [&args, &out, chunks, kernel](std::size_t i) { kernel(args, out, chunks[i]); });
   }
+  /// Binning reads the tiles that projection found (BinArgs::spans).
   static constexpr bool bins_in_lanes = true;
+  /// Counts the splats of each tile.
   void run(stage::Each, std::size_t n, const CountTileIntersections<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().count_tiles});
   }
+  /// Counts the splats of each tile that are not behind a mesh.
   void run(stage::Each, std::size_t n, const CountTileIntersections<float, MeshCull<float>>& k) {
     parallel_for(n, Compiled{k, lane_kernels().count_tiles_before_mesh});
   }
+  /// Writes the splats to the lists of their tiles.
   void run(stage::Each, std::size_t n, const ScatterTileIntersections<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().scatter_tiles});
   }
+  /// Writes the splats that are not behind a mesh to the lists of their tiles.
   void run(stage::Each, std::size_t n, const ScatterTileIntersections<float, MeshCull<float>>& k) {
     parallel_for(n, Compiled{k, lane_kernels().scatter_tiles_before_mesh});
   }
+  /// Blends a frame without meshes.
   void run(stage::Blend, const RasterArgs<float>& args) {
     parallel_for(args.grid.count(), Compiled{args, lane_kernels().rasterize_tile});
   }
+  /// Blends a frame with meshes.
   void run(stage::BlendWithMeshes, const RasterArgs<float>& args) {
     parallel_for(args.grid.count(), Compiled{args, lane_kernels().composite_tile});
   }
+  /// Projects the vertices of meshes.
   void run(stage::Each, std::size_t n, const ProjectMeshVertices<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().project_mesh_vertices});
   }
+  /// Counts the visible pieces of triangles.
   void run(stage::Each, std::size_t n, const CountMeshTriangles<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().count_mesh_triangles});
   }
+  /// Writes the visible pieces of triangles.
   void run(stage::Each, std::size_t n, const WriteMeshTriangles<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().write_mesh_triangles});
   }
+  /// Finds the nearest triangle at each pixel.
   void run(stage::Each, std::size_t n, const RasterizeMeshTile<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().rasterize_mesh_tile});
   }
+  /// Shades the pixels of meshes.
   void run(stage::Each, std::size_t n, const ShadeMeshRow<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().shade_mesh_row});
   }
+  /// Skins the Gaussians of an avatar.
   void run(stage::Skin, const SkinningArgs<float>& args) { in_ranges(args, lane_kernels().skin_range); }
+  /// Computes gaps of pairs of capsules.
   void run(stage::CapsuleGaps, const CapsuleGapArgs<float>& args) {
     in_ranges(args, lane_kernels().gap_range);
   }
+  /// Sweeps pairs of capsules.
   void run(stage::SweepCapsules, const SweepArgs<float>& args) {
     in_ranges(args, lane_kernels().sweep_range);
   }
 
  private:
-  /// A kernel as it was compiled for the processor's lanes.
+  /// A kernel compiled for the processor's lanes, with its arguments.
   template <class Args>
   struct Compiled {
     const Args& args;
@@ -181,7 +222,7 @@ class OpenMPBackend : public HostMemory {
   template <class Args>
   Compiled(const Args&, void (*)(const Args&, std::size_t) noexcept) -> Compiled<Args>;
 
-  /// kernel(args, begin, end) over all of args.size().
+  /// Calls kernel(args, begin, end) for ranges that cover [0, args.size()).
   template <class Args>
   void in_ranges(const Args& args, void (*kernel)(const Args&, std::size_t, std::size_t) noexcept) {
     constexpr std::size_t kRange = 1024;
@@ -208,7 +249,7 @@ static_assert(Backend<OpenMPBackend>);
 #if !defined(GSNAV_OPENMP_COMPILED)
 }  // namespace GSNAV_LANES_TAG
 #else
-// Compiled in gsnav::openmp: whoever renders or skins need not.
+// Compiled in gsnav::openmp, so that users need not compile them.
 extern template Status render_camera<float, OpenMPBackend>(OpenMPBackend&,
                                                            RenderWorkspace<float, OpenMPBackend>&,
                                                            std::span<const GaussianSet>, const Camera&,

@@ -8,14 +8,16 @@
 
 namespace gsnav {
 
-/// Runs everything in order on the calling thread, by the generic kernels, in any scalar. In double it
-/// is the reference that every other backend is measured against.
+/// Backend that runs everything in order on the calling thread, with the generic kernels, in any scalar.
+/// In double it is the reference for all other backends.
 class SerialBackend : public HostMemory {
  public:
+  /// Calls f(i) for i in [0, n), in order.
   template <class F>
   void parallel_for(std::size_t n, const F& f) {
     for (std::size_t i = 0; i < n; ++i) f(i);
   }
+  /// Returns success: work is done when the call returns.
   Status synchronize() { return {}; }
 };
 

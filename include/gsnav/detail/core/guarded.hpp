@@ -8,9 +8,9 @@
 
 namespace gsnav::detail {
 
-/// Calls f, which returns a Status or a Result, and turns what it throws into one: gsnav::Error keeps
-/// its code, all else is out_of_memory. For parallel regions, which no exception may leave, and for
-/// calls that promise a Status.
+/// Calls f, which returns a Status or Result, and converts exceptions to a Status. gsnav::Error keeps
+/// its code; other exceptions become out_of_memory. Used in parallel regions, which no exception may
+/// leave, and in functions that promise a Status.
 template <class F>
 auto guarded(const F& f) noexcept -> decltype(f()) {
 #if defined(__cpp_exceptions)

@@ -15,23 +15,24 @@
 
 namespace gsnav {
 
-/// Backends with host memory that they copy to and from by themselves (page-locked, for a GPU).
+/// Backends with their own host memory (page-locked, for a GPU), from which copies run asynchronously.
 template <class B>
 concept HasHostMemory = requires(void* p, std::size_t n) {
   { B::allocate_host(n) } -> std::same_as<void*>;
   B::deallocate_host(p);
 };
 
-/// Array in host memory that results of a backend are copied into: of its own kind where the backend has
-/// one and there is room for it, so that a copy does not wait for the host. It never shrinks, so that a
-/// steady frame allocates nothing.
+/// Array in host memory that receives results of a backend. It uses the backend's own host memory if
+/// there is any, so that copies do not block the host. It never shrinks, so frames of a steady size
+/// allocate nothing.
 template <class T, Backend B>
 class HostArray {
   static_assert(std::is_trivially_copyable_v<T>);
 
  public:
-  /// Makes room for n elements. What was in it stays, but where it has to grow: then all are zero.
-  /// Throws gsnav::Error (out_of_memory, naming the bytes).
+  /// Sets the size to n. If the array has to grow, all elements become zero; else they keep their
+  /// values.
+  /// @throws gsnav::Error (out_of_memory, naming the number of bytes) if there is no memory.
   void resize(std::size_t n) {
     if (n > capacity_) grow(n);
     size_ = n;

@@ -10,7 +10,7 @@
 
 namespace gsnav {
 
-/// The memory members of a backend that works in host memory.
+/// Memory functions of a backend that works in host memory. Large arrays lie in huge pages.
 struct HostMemory {
   using memory_space = HostSpace;
 

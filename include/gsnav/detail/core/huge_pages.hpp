@@ -12,12 +12,12 @@
 
 namespace gsnav {
 
-/// Size of the pages that large arrays are best kept in.
+/// Size of a huge page, 2 MiB.
 inline constexpr std::size_t kHugePage = std::size_t{2} << 20;
 
-/// Asks for huge pages in memory that has not been written yet. Rendering walks tens of megabytes a
-/// frame: by pages of 4 KiB, and more so in a virtual machine, looking addresses up halves the bandwidth
-/// and worse. Where the system has none to give, nothing changes.
+/// Requests huge pages for memory that has not been written yet. A frame reads tens of megabytes; with 4
+/// KiB pages, address translation halves the bandwidth, and worse in virtual machines. Has no effect if
+/// the system has no huge pages.
 inline void advise_huge_pages([[maybe_unused]] void* p, [[maybe_unused]] std::size_t bytes) noexcept {
 #if defined(__linux__) && defined(MADV_HUGEPAGE)
   const std::uintptr_t begin =
@@ -28,8 +28,8 @@ inline void advise_huge_pages([[maybe_unused]] void* p, [[maybe_unused]] std::si
 #endif
 }
 
-/// Gives the system back the whole pages of memory that is not read again before it is written; what was
-/// there is lost.
+/// Returns the whole pages of a memory range to the system. The content is lost; write before you read
+/// again.
 inline void discard_pages([[maybe_unused]] void* p, [[maybe_unused]] std::size_t bytes) noexcept {
 #if defined(__linux__)
   constexpr std::uintptr_t kPage = 4096;
@@ -40,7 +40,7 @@ inline void discard_pages([[maybe_unused]] void* p, [[maybe_unused]] std::size_t
 #endif
 }
 
-/// n values in huge pages where there are enough of them.
+/// Vector of n values, in huge pages if it is large enough.
 template <class T>
 std::vector<T> huge_vector(std::size_t n) {
   std::vector<T> v;
@@ -50,14 +50,14 @@ std::vector<T> huge_vector(std::size_t n) {
   return v;
 }
 
-/// Empties a vector and gives its memory back; `v = {}` would keep it.
+/// Empties a vector and frees its memory, which `v = {}` would keep.
 template <class T>
 void release(std::vector<T>& v) noexcept {
   std::vector<T>().swap(v);
 }
 
-/// The first n values of `from`, each through f, in memory of just their size. That of `from`, which is
-/// empty then, goes back to the system on the way: what both take is never there at once.
+/// Converts the first n values of `from` with f, into memory of exactly their size. `from` is returned
+/// to the system piece by piece and ends up empty, so that both arrays are never in memory at once.
 template <class To, class From, class F>
 std::vector<To> moved_through(std::vector<From>& from, std::size_t n, const F& f) {
   constexpr std::size_t kPiece = std::size_t{1} << 22;

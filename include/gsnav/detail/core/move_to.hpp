@@ -10,13 +10,14 @@
 
 namespace gsnav::detail {
 
-/// Copies an array of the host to a backend's memory, adds the copy to `held`, and lets `v` show it. The
-/// copy stays where it is when the vector grows.
+/// Copies an array from the host to a backend's memory, appends the copy to `held` and makes `v` point
+/// to it. The pointer stays valid when `held` grows.
 template <class T, Backend B>
 void move_to(B& backend, View<const T>& v, std::vector<Buffer<T, B>>& held) {
   held.emplace_back(backend).upload(v.data, v.size);
   v = {held.back().data(), v.size};
 }
+/// Copies K arrays to a backend's memory, as above.
 template <class T, std::size_t K, Backend B>
 void move_to(B& backend, Planes<const T, K>& planes, std::vector<Buffer<T, B>>& held) {
   for (std::size_t k = 0; k < K; ++k) {

@@ -11,13 +11,13 @@
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/view.hpp"
 
-// Scan and stable sort written over `parallel_for` alone: what a backend without its own gets.
-// Work is cut into blocks whose results are put together in block order, so the outcome does not
-// depend on how many blocks there are or which thread runs them.
+// Stable radix sort that uses only `parallel_for`, for backends without a sort of their own. Work is cut
+// into blocks whose results are combined in block order. The result depends neither on the number of
+// blocks nor on the thread that runs each.
 
 namespace gsnav {
 
-/// [begin, end) of block b when n items are cut into `blocks` nearly equal pieces.
+/// The range [begin, end) of block b when n items are cut into `blocks` nearly equal pieces.
 struct BlockRange {
   std::size_t begin = 0, end = 0;
   GSNAV_HD static BlockRange of(std::size_t b, std::size_t blocks, std::size_t n) noexcept {
@@ -27,10 +27,10 @@ struct BlockRange {
 
 namespace detail {
 
-/// How n records are cut into blocks such that the block of a place costs one product.
+/// Division of n records into blocks. One multiplication gives the block of a position.
 struct SortBlocks {
   std::size_t size = 0, blocks = 1;
-  std::uint64_t inverse = 0;  ///< blocks / size in 32 bits of fraction
+  std::uint64_t inverse = 0;  ///< blocks / size as a fixed-point number with 32 fractional bits
 
   static SortBlocks of(std::size_t n, std::size_t blocks) noexcept {
     return {n, blocks, (std::uint64_t{blocks} << 32) / n};
@@ -45,7 +45,7 @@ struct SortBlocks {
   }
 };
 
-/// One digit of all keys.
+/// Bits [shift, shift + bits) of a key.
 struct RadixDigit {
   int shift = 0, bits = 0;
   GSNAV_HD std::size_t size() const noexcept { return std::size_t{1} << bits; }
@@ -54,7 +54,7 @@ struct RadixDigit {
   }
 };
 
-/// Keys and values that lie beside each other, as the sort's first source.
+/// Keys and values in two arrays: the source of the first pass.
 struct PairSource {
   View<const std::uint32_t> keys, values;
   SortBlocks split;
@@ -65,7 +65,8 @@ struct PairSource {
   }
 };
 
-/// What a pass left, as the source of the next: key in the upper half.
+/// Records written by a pass, the source of the next pass. The key is in the upper 32 bits, the value in
+/// the lower.
 struct RecordSource {
   View<const std::uint64_t> records;
   SortBlocks split;
@@ -78,14 +79,15 @@ struct RecordSource {
   }
 };
 
-/// Counts the first digit of a block's keys, in row [block][block] of `counts`, and ors its keys.
+/// Counts the first digit of the keys of a block, in row [block][block] of `counts`, and computes the
+/// bitwise or of its keys.
 template <class Source>
 struct RadixCount {
   Source source;
   SortBlocks split;
   RadixDigit digit;
   View<std::uint32_t> counts;  ///< [blocks][blocks][digit]
-  View<std::uint32_t> used;    ///< [blocks]
+  View<std::uint32_t> used;    ///< [blocks], bitwise or of the keys
   GSNAV_HD void operator()(std::size_t block) const noexcept {
     const std::size_t row = split.blocks * digit.size();
     std::uint32_t* const own = counts.data + block * row;
@@ -100,12 +102,12 @@ struct RadixCount {
   }
 };
 
-/// Turns what each block counted of each block into where that block's records of each digit go.
+/// Converts the counts into positions: for each block, where its first record with each digit goes.
 struct RadixOffsets {
   SortBlocks split;
   RadixDigit digit;
-  View<const std::uint32_t> counts;  ///< [by][of][digit]
-  View<std::uint32_t> cursors;       ///< [of][digit]
+  View<const std::uint32_t> counts;  ///< [counting block][block of the records][digit]
+  View<std::uint32_t> cursors;       ///< [block of the records][digit]
   GSNAV_HD void operator()(std::size_t) const noexcept {
     const std::size_t row = split.blocks * digit.size();
     for (std::size_t i = 0; i < row; ++i) cursors[i] = counts[i];
@@ -124,8 +126,8 @@ struct RadixOffsets {
   }
 };
 
-/// Moves a block's records to their places by one digit, and counts the next digit by the block that a
-/// record comes to lie in: no pass reads its records twice.
+/// Moves the records of a block to their positions by one digit. It also counts the next digit per
+/// destination block, so that no pass reads its records twice.
 template <class Source>
 struct RadixScatter {
   Source source;
@@ -147,7 +149,7 @@ struct RadixScatter {
   }
 };
 
-/// The last pass.
+/// Last pass: moves keys and values to their final positions, as separate arrays.
 template <class Source>
 struct RadixFinish {
   Source source;
@@ -166,15 +168,16 @@ struct RadixFinish {
 
 }  // namespace detail
 
-/// Scratch of sorts.
+/// Scratch memory of sorts.
 template <Backend B>
 struct SortScratch {
   explicit SortScratch(B& b) : keys(b), values(b), first(b), second(b), counts(b), cursors(b), used(b) {}
-  Buffer<std::uint32_t, B> keys, values;   ///< where sort_pairs puts the result before it swaps
+  Buffer<std::uint32_t, B> keys, values;   ///< result of sort_pairs before it is swapped with the
+                                           ///< caller's arrays
   Buffer<std::uint64_t, B> first, second;  ///< records between passes
   Buffer<std::uint32_t, B> counts, cursors, used;
 
-  /// f(a.member, b.member) for each buffer.
+  /// Calls f(a.member, b.member) for each buffer.
   template <class A, class C, class F>
   static void for_each(A& a, C& b, const F& f) {
     f(a.keys, b.keys), f(a.values, b.values), f(a.first, b.first), f(a.second, b.second);
@@ -182,7 +185,7 @@ struct SortScratch {
   }
 };
 
-/// Pieces that a sort of n pairs is cut into: tables grow by their square.
+/// Number of blocks for a sort of n pairs. At most 8, because tables grow with the square of it.
 template <Backend B>
 std::size_t sort_blocks(const B& backend, std::size_t n) noexcept {
   constexpr std::size_t kMost = 8, kLeast = 8192;
@@ -190,13 +193,13 @@ std::size_t sort_blocks(const B& backend, std::size_t n) noexcept {
   return n / kLeast + 1 < blocks ? n / kLeast + 1 : blocks;
 }
 
-/// Sorts what `source` gives, cut into the blocks of `split`, by the lowest `bits` of the key (the
-/// others zero), stably, to `keys` and `values`; 1 to 2^32 - 1 pairs. LSD radix in as many passes as the
-/// keys in use need.
+/// Sorts the pairs of `source` stably by the lowest `bits` bits of the key into `keys` and `values`.
+/// Higher bits must be zero. `split` cuts the source into blocks; it holds 1 to 2^32 - 1 pairs. LSD
+/// radix sort with as many passes as the bits in use need.
 template <class Source, Backend B>
 void sort_from(B& backend, const Source& source, const detail::SortBlocks& split, int bits,
                SortScratch<B>& s, View<std::uint32_t> keys, View<std::uint32_t> values) {
-  // Two passes where they do; a digit of 9 bits else, whose 512 write positions stay in the nearest
+  // Two passes if 22 bits suffice. Otherwise digits of 9 bits, whose 512 write positions stay in the L1
   // cache.
   const int digit_bits = bits <= 22 ? (bits + 1) / 2 : 9;
   const auto digit = [digit_bits](int pass) {
@@ -236,8 +239,8 @@ void sort_from(B& backend, const Source& source, const detail::SortBlocks& split
   for (int pass = 1; pass < passes; ++pass) run_pass(detail::RecordSource{s.first.view(), split}, pass);
 }
 
-/// Sorts (key, value) pairs by the lowest `bits` of the key (the others zero), stably; fewer than 2^32
-/// of them.
+/// Sorts fewer than 2^32 (key, value) pairs stably by the lowest `bits` bits of the key. Higher bits
+/// must be zero.
 template <Backend B>
 void sort_pairs(B& backend, Buffer<std::uint32_t, B>& keys, Buffer<std::uint32_t, B>& values,
                 SortScratch<B>& scratch, int bits = 32) {

@@ -12,14 +12,14 @@
 
 namespace gsnav {
 
-/// Moves rows of `stride` values each, on all threads: row i becomes what row order[i] was. Wide rows go
-/// by columns through `room`, so that a scene's largest array is not there twice: fresh memory costs
-/// more than moving does. `room` may be used again.
+/// Reorders rows of `stride` values in parallel: new row i is old row order[i]. Wide rows are moved a
+/// few columns at a time through `room`, so that a second copy of a scene's largest array is never
+/// needed. Fresh memory costs more than the moves. `room` can be reused between calls.
 template <Backend B, class T>
 void permute_rows(B& backend, std::span<const std::uint32_t> order, std::size_t stride,
                   std::vector<T>& values, std::vector<T>& room) {
   static_assert(is_host_backend<B>);
-  constexpr std::size_t kColumns = 9;  // a fifth of SH of degree 3
+  constexpr std::size_t kColumns = 9;  // a fifth of the SH coefficients of degree 3
   if (values.empty()) return;
   const std::size_t width = std::min(stride, kColumns), n = order.size();
   if (room.empty()) {
@@ -45,6 +45,7 @@ void permute_rows(B& backend, std::span<const std::uint32_t> order, std::size_t 
   backend.synchronize().throw_if_error();
   if (width == stride) values.swap(room);
 }
+/// Reorders rows as above, with scratch memory of its own.
 template <Backend B, class T>
 void permute_rows(B& backend, std::span<const std::uint32_t> order, std::size_t stride,
                   std::vector<T>& values) {

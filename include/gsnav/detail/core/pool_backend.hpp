@@ -12,16 +12,16 @@
 
 namespace gsnav {
 
-/// Threads that so many rows are worth, for a PoolBackend; 0: whatever there are.
+/// Number of threads for a PoolBackend that handles `rows` rows. 0: the default number.
 inline std::size_t threads_for(std::size_t rows) noexcept {
   return rows < (std::size_t{1} << 16) ? 1 : 0;
 }
 
-/// Threads of its own for what is done to a scene around its rendering: f(i) in any order, by the
-/// generic kernels.
+/// Host backend with its own thread pool, for scene processing outside of rendering. Uses the generic
+/// kernels; parallel_for calls f(i) in any order.
 class PoolBackend : public HostMemory {
  public:
-  /// `threads` together with the caller; 0: one a core, at most 16.
+  /// @param threads number of threads including the caller. 0: one per core, at most 16.
   explicit PoolBackend(std::size_t threads = 0) noexcept
       : threads_(threads != 0 ? threads
                               : std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, 16)),

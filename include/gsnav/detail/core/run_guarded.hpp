@@ -11,8 +11,8 @@
 
 namespace gsnav::detail {
 
-/// guarded(f(p)) for each p in [0, pieces), shared out among the threads of a pool. Of several failures
-/// that of the lowest p is returned.
+/// Runs guarded(f(p)) for each p in [0, pieces) on the threads of a pool. If several fail, returns the
+/// error of the lowest p.
 template <class F>
 Status run_guarded(ThreadPool& pool, std::uint32_t pieces, const F& f) {
   std::vector<Status> statuses(pieces);

@@ -10,9 +10,9 @@
 
 namespace gsnav {
 
-/// A vector whose first N elements lie in the object itself: nothing is allocated for up to N of them.
-/// It is contiguous, so that it converts to std::span. Growing beyond N throws std::bad_alloc where
-/// there is no memory.
+/// Vector that stores its first N elements inside the object, so that up to N elements need no
+/// allocation. Contiguous; converts to std::span. Growing beyond N throws std::bad_alloc if there is no
+/// memory.
 template <class T, std::size_t N>
 class SmallVector {
   static_assert(std::is_trivially_copyable_v<T> && N > 0);
@@ -55,7 +55,7 @@ class SmallVector {
   T& back() noexcept { return data()[size_ - 1]; }
   const T& back() const noexcept { return data()[size_ - 1]; }
 
-  /// Room for n elements, so that the next n - size() are added without an allocation.
+  /// Reserves room for n elements in total.
   void reserve(std::size_t n) {
     if (n <= capacity_) return;
     auto more = std::make_unique<T[]>(n);
@@ -64,7 +64,7 @@ class SmallVector {
     capacity_ = n;
   }
   void push_back(const T& value) {
-    const T copy = value;  // which may be one of these
+    const T copy = value;  // `value` may be an element of this vector
     if (size_ == capacity_) reserve(2 * capacity_);
     std::construct_at(data() + size_++, copy);
   }
@@ -85,7 +85,7 @@ class SmallVector {
   }
 
   std::size_t size_ = 0, capacity_ = N;
-  std::unique_ptr<T[]> more_;  ///< all elements, where they are more than N
+  std::unique_ptr<T[]> more_;  ///< all elements, if there are more than N
   alignas(T) std::byte own_[N * sizeof(T)];
 };
 

@@ -21,21 +21,23 @@
 
 namespace gsnav {
 
-/// Threads that share out the pieces of a job. The caller works too and never waits for a thread that
-/// has not begun a piece, so that on a busy machine it does the job itself; whoever has nothing to do
-/// spins for a bounded time and then sleeps.
+/// Thread pool that distributes the pieces of one job at a time.
 ///
-/// Any thread may call, also from within a piece and several at once: whoever finds the pool taken runs
-/// its job alone. Threads are started by the first job and joined by the destructor. In the child of a
-/// fork the pool has none left and the caller does it all. A steady job asks the heap for nothing.
+/// The caller works too, and never waits for a thread that has not started a piece. On a busy machine it
+/// does the whole job itself. Idle threads spin for a bounded time and then sleep.
+///
+/// Any thread may call run(), also from within a piece and several at once. A call that finds the pool
+/// busy runs its job on the calling thread alone. The first job starts the threads; the destructor joins
+/// them. In the child of a fork no threads are left, and the caller does all the work. Repeated jobs
+/// allocate nothing.
 class ThreadPool {
  public:
-  /// `threads` together with the caller.
+  /// @param threads number of threads including the caller
   explicit ThreadPool(int threads) noexcept : threads_(threads) {}
   ~ThreadPool() {
     if (workers_.empty()) return;
     if (process_ != this_process()) {
-      // The child of a fork: the threads are not there to be joined, their handles are left behind.
+      // In the child of a fork the threads do not exist and cannot be joined. Leak their handles.
       new std::vector<std::thread>(std::move(workers_));
       return;
     }
@@ -46,8 +48,8 @@ class ThreadPool {
   ThreadPool(const ThreadPool&) = delete;
   ThreadPool& operator=(const ThreadPool&) = delete;
 
-  /// f(p) once for each p in [0, pieces), in no order; what the pieces wrote is seen on return. An
-  /// exception that leaves f ends the process.
+  /// Calls f(p) once for each p in [0, pieces), in any order. Memory that the pieces wrote is visible on
+  /// return. An exception that leaves f terminates the process.
   template <class F>
   void run(std::uint32_t pieces, const F& f) noexcept {
     if (pieces < 2 || threads_ < 2 || taken_.exchange(true, std::memory_order_acquire)) {
@@ -55,8 +57,8 @@ class ThreadPool {
       return;
     }
     if (!started_) start();
-    // Closed before the job is written: a thread late from the last job that reads the new one finds its
-    // claim void.
+    // Invalidate the ticket before writing the job. A thread still late from the last job that reads the
+    // new fields then finds its claim void.
     const std::uint64_t epoch = (ticket_.load(std::memory_order_relaxed) & ~(kEpoch - 1)) + kEpoch;
     ticket_.store(epoch - 1, std::memory_order_relaxed);
     call_.store([](const void* g, std::uint32_t p) noexcept { (*static_cast<const F*>(g))(p); },
@@ -73,10 +75,10 @@ class ThreadPool {
 
  private:
   static constexpr std::uint64_t kEpoch = std::uint64_t{1} << 32;
-  /// Longer than what lies between two jobs of a frame and than most pieces, shorter than a slice of the
-  /// scheduler by far.
+  /// Spinning time. Longer than the pause between two jobs of a frame and than most pieces, but far
+  /// shorter than a time slice of the scheduler.
   static constexpr std::chrono::microseconds kSpin{50};
-  static constexpr std::size_t kLine = 128;  ///< two lines of a cache, which are fetched in pairs
+  static constexpr std::size_t kLine = 128;  ///< two cache lines, because processors prefetch pairs
 
   static void pause() noexcept {
 #if defined(__x86_64__) || defined(__i386__)
@@ -105,13 +107,13 @@ class ThreadPool {
       workers_.reserve(static_cast<std::size_t>(threads_ - 1));
       for (int i = 1; i < threads_; ++i) workers_.emplace_back([this, seen] { work(seen); });
 #if defined(__cpp_exceptions)
-    } catch (const std::exception&) {  // as many as the system gives
+    } catch (const std::exception&) {  // continue with the threads that the system gave
     }
 #endif
   }
 
-  /// Returns the value that satisfies `enough`: spins, then sleeps. More threads than cores do not spin:
-  /// who waits would keep others from working.
+  /// Waits until a value satisfies `enough` and returns it: spins, then sleeps. With more threads than
+  /// cores it sleeps at once, because a spinning thread would keep others from working.
   template <class Enough>
   std::uint32_t await(const std::atomic<std::uint32_t>& value, const Enough& enough) const noexcept {
     std::uint32_t v = value.load(std::memory_order_acquire);
@@ -135,10 +137,10 @@ class ThreadPool {
 
   void announce(std::uint32_t epoch) noexcept {
     epoch_.store(epoch, std::memory_order_seq_cst);
-    epoch_.notify_all();  // asks the system only where somebody sleeps
+    epoch_.notify_all();  // makes a system call only if a thread sleeps
   }
 
-  /// Does pieces of the present job until none is left; returns how many.
+  /// Runs pieces of the current job until none is left. Returns the number of pieces run.
   std::uint32_t take_pieces() noexcept {
     std::uint64_t t = ticket_.load(std::memory_order_acquire);
     const std::uint64_t epoch = t / kEpoch;
@@ -169,15 +171,17 @@ class ThreadPool {
     }
   }
 
-  alignas(kLine) std::atomic<std::uint64_t> ticket_{0};  ///< epoch of the job, next piece
-  alignas(kLine) std::atomic<std::uint32_t> done_{0};    ///< pieces done by others than the caller
-  alignas(kLine) std::atomic<std::uint32_t> epoch_{0};   ///< of the last job announced
+  /// epoch of the job (upper half) and next piece (lower half)
+  alignas(kLine) std::atomic<std::uint64_t> ticket_{0};
+  alignas(kLine) std::atomic<std::uint32_t> done_{0};   ///< pieces done by threads other than the caller
+  alignas(kLine) std::atomic<std::uint32_t> epoch_{0};  ///< epoch of the last announced job
   alignas(kLine) std::atomic<void (*)(const void*, std::uint32_t) noexcept> call_{nullptr};
   std::atomic<const void*> context_{nullptr};
   std::atomic<std::uint32_t> pieces_{0};
   std::atomic<bool> stop_{false};
   alignas(kLine) std::atomic<bool> taken_{false};
-  // Of whoever has taken the pool; threads read what was written before they were started.
+  // Owned by the thread that has taken the pool. Workers read only values that were written before they
+  // started.
   const int threads_;
   bool started_ = false, crowded_ = false;
   long process_ = 0;

@@ -12,16 +12,17 @@
 
 namespace gsnav {
 
-/// Where tiles are kept between the slices of depth that a frame is blended in.
+/// State of tiles that is kept between the slices of depth of one frame.
 template <class S>
 struct TileProgress {
-  View<std::uint64_t> open;  ///< [tiles]: bits of cells (OpenCells) in row order, 0 where the pixels are
-                             ///< written. Empty: one slice is all
+  View<std::uint64_t> open;  ///< [tiles], one bit per cell of the tile in row order (OpenCells), set if
+                             ///< the cell is open. 0 once the pixels are written. Empty: the frame has
+                             ///< one slice.
   View<S> states;            ///< [tiles][blend_state_values * pixels of a tile]
   bool first = true, last = true;
 };
 
-/// Values of a pixel that a slice leaves to the next.
+/// Number of values per pixel that a slice passes to the next.
 GSNAV_HD constexpr std::size_t blend_state_values(DepthMode mode) noexcept {
   const std::size_t bytes = mode == DepthMode::none     ? sizeof(BlendState<float, DepthMode::none>)
                             : mode == DepthMode::median ? sizeof(BlendState<float, DepthMode::median>)
@@ -34,17 +35,18 @@ template <class S>
 struct RasterArgs {
   TileGrid grid;
   View<const std::uint64_t> tile_offsets;  ///< [tiles + 1]
-  View<const std::uint32_t> tile_splats;   ///< per tile, front to back
+  View<const std::uint32_t> tile_splats;   ///< splats of each tile, front to back
   View<const SplatGeometry<S>> geometry;
-  View<const SplatColor<S>> colors;              ///< empty: no colour asked for
-  View<const SplatDepth<S>> depths;              ///< empty: no depth asked for
-  View<const SplatPerspective<S>> perspectives;  ///< empty: Response::ewa
+  View<const SplatColor<S>> colors;              ///< empty: colour is not requested
+  View<const SplatDepth<S>> depths;              ///< empty: no depth is requested
+  View<const SplatPerspective<S>> perspectives;  ///< empty for Response::ewa
   BlendRules<S> rules;
   Vec3<S> background;
   Exp2 exp2_method = Exp2::degree5;
   FrameImages<S> images;
   TileProgress<S> progress;
-  MeshLayer<S> mesh;  ///< empty: no meshes (detail/frame/composite.hpp blends frames that have some)
+  MeshLayer<S> mesh;  ///< Empty: no meshes. Frames with meshes are blended by
+                      ///< detail/frame/composite.hpp.
 
   GSNAV_HD DepthMode depth_mode() const noexcept { return images.depth_mode(); }
   GSNAV_HD SplatRecords<S> records(std::size_t splat) const noexcept {
@@ -54,8 +56,8 @@ struct RasterArgs {
   }
 };
 
-/// Applies BlendRules::normalize_closed to a finished pixel (or a pack of them): a closed pixel becomes
-/// opaque, and its sums are divided by the alpha that it had.
+/// Applies BlendRules::normalize_closed to a finished pixel, or to a pack of pixels: a closed pixel
+/// becomes opaque, and its sums are divided by the alpha that it had.
 template <class State, class S>
 GSNAV_HD State finished(const BlendRules<S>& rules, State state) noexcept {
   if (!rules.normalize_closed) return state;
@@ -71,7 +73,7 @@ GSNAV_HD State finished(const BlendRules<S>& rules, State state) noexcept {
   return state;
 }
 
-/// What a pixel (or a pack of them) ends as.
+/// Final colour of a pixel, or of a pack of pixels, over the background.
 template <class S, class L>
 GSNAV_HD Vec3<L> pixel_color(const RasterArgs<S>& args, const BlendColor<L>& state) noexcept {
   const L t = abs(state.transmittance);
@@ -94,7 +96,7 @@ GSNAV_HD L pixel_accumulated_depth(const BlendState<L, DepthMode::any>& state) n
   return fma(pixel_alpha(state), state.z_ref, state.accumulated);
 }
 
-/// What a pixel (or a pack of them) that ends in `state` has in an image; a Vec3 for kRgb.
+/// Final value of a pixel, or of a pack of pixels, in the image O. A Vec3 for kRgb, else one number.
 template <Output O, class S, class State>
 GSNAV_HD auto pixel_value(const RasterArgs<S>& args, const State& state) noexcept {
   if constexpr (O == kRgb) {
@@ -113,7 +115,7 @@ GSNAV_HD auto pixel_value(const RasterArgs<S>& args, const State& state) noexcep
   }
 }
 
-/// Writes a finished pixel.
+/// Writes a finished pixel to all requested images.
 template <class S, DepthMode D>
 GSNAV_HD void write_pixel(const RasterArgs<S>& args, std::size_t pixel,
                           const BlendState<S, D>& blended) noexcept {
@@ -131,11 +133,11 @@ GSNAV_HD void write_pixel(const RasterArgs<S>& args, std::size_t pixel,
   });
 }
 
-/// A pixel and the list of its tile: how kernels start that have one work item a pixel.
+/// A pixel and the splats of its tile. Kernels with one work item per pixel start from it.
 template <class S>
 struct PixelWalk {
   S px, py;                  ///< pixel centre
-  std::uint64_t begin, end;  ///< of the list in RasterArgs::tile_splats
+  std::uint64_t begin, end;  ///< range of its tile's splats in RasterArgs::tile_splats
 
   GSNAV_HD PixelWalk(const RasterArgs<S>& args, std::size_t pixel) noexcept {
     const std::size_t width = static_cast<std::size_t>(args.grid.width);
@@ -147,7 +149,7 @@ struct PixelWalk {
     end = args.tile_offsets[tile + 1];
   }
 
-  /// Calls blend(records) with each splat of the list, front to back, until it has closed the pixel.
+  /// Calls blend(records) for each splat of the list, front to back, until the pixel is closed.
   template <class State, class F>
   GSNAV_HD void for_each_splat(const RasterArgs<S>& args, const State& state,
                                const F& blend) const noexcept {
@@ -157,7 +159,7 @@ struct PixelWalk {
   }
 };
 
-/// Blends one pixel: the generic fallback, one work item a pixel, on any backend and scalar.
+/// Generic kernel that blends one pixel per work item, on any backend and in any scalar.
 template <class S, bool Color, DepthMode D, Exp2 M, bool General>
 struct RasterizePixel {
   RasterArgs<S> args;
@@ -172,8 +174,8 @@ struct RasterizePixel {
   }
 };
 
-/// Calls f with compile-time <Color, DepthMode, Exp2, General> for what `args` asks for. General: a
-/// response other than Response::ewa, or an exclusive stop; the cubic exp2 does not serve these.
+/// Calls f with the compile-time arguments <Color, DepthMode, Exp2, General> that fit `args`. General is
+/// true for a response other than Response::ewa and for an exclusive stop. It excludes the cubic exp2.
 template <class S, class F>
 void dispatch_raster(const RasterArgs<S>& args, const F& f) {
   const auto with_exp2 = [&]<bool C, DepthMode D>() {

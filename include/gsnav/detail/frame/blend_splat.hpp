@@ -13,38 +13,40 @@
 
 namespace gsnav {
 
-/// The rules of blending, in the scalar of the kernel.
+/// Constants of blending, in the scalar of the kernel.
 template <class S>
 struct BlendRules {
   S max_alpha{S(0.99)};
-  S transmittance_min{S(1e-4)};  ///< a pixel is closed by the Gaussian that takes T below this
+  S transmittance_min{S(1e-4)};  ///< A pixel is closed by the Gaussian that makes its transmittance less
+                                 ///< than this.
   S first_hit_tau{S(0.5)};
   S log2_alpha_min{S(-7.9943534368588579)};  ///< log2 of the smallest alpha that is blended
-  S return_alpha{S(0)};           ///< expected depth has no return where alpha is not above this
-  bool exclusive_stop = false;    ///< the Gaussian that closes a pixel is not blended (Compat)
-  bool normalize_closed = false;  ///< a closed pixel counts as opaque: its sums are divided by 1 - T
+  S return_alpha{S(0)};         ///< Expected depth is 0 (no return) unless alpha exceeds this.
+  bool exclusive_stop = false;  ///< The Gaussian that closes a pixel is not blended (Compat).
+  bool normalize_closed =
+      false;  ///< A closed pixel counts as opaque: its sums are divided by its alpha.
 };
 
-/// Transmittance of a pixel (or a pack of them) before and after a splat or a surface, and the weight
-/// that this has in the sums: before - after where it is blended, else 0.
+/// Transmittance of a pixel, or of a pack of pixels, before and after a splat or surface. `weight` is
+/// its weight in the sums: before - after if it is blended, else 0.
 template <class L>
 struct TransmittanceStep {
   L before, after, weight;
 };
 
-/// Whether transmittance goes from above a level to the level or below it: what decides median and
-/// first-hit depth.
+/// True if transmittance falls from above `level` to `level` or less. This decides median and first-hit
+/// depth.
 template <class L>
 GSNAV_HD mask_of<L> falls_through(L before, L after, scalar_of<L> level) noexcept {
   return (before > L(level)) && (after <= L(level));
 }
 
-/// The transmittance whose crossing is the median depth.
+/// Transmittance at whose crossing the median depth is taken.
 template <class S>
 inline constexpr S kMedianLevel = S(0.5);
 
-/// The depths of one pixel (or a pack of them) that a DepthMode keeps. `accumulate` adds what lies at
-/// depth z(), metres; z is called only where it is needed. Where the weight is 0, z() may be any finite
+/// Depths of one pixel, or of a pack of pixels, for a DepthMode. `accumulate` adds a contribution at
+/// depth z(), in metres. z is called only if it is needed; if the weight is 0, it may return any finite
 /// number.
 template <class L, DepthMode D>
 struct DepthState {
@@ -64,7 +66,8 @@ struct DepthState<L, DepthMode::median> {
 template <class L>
 struct DepthState<L, DepthMode::any> {
   L median{scalar_of<L>(0)};
-  /// sum w (z - z_ref), z_ref the first depth blended: a far wall's depths lose no digits to their size.
+  /// Sum of w (z - z_ref), where z_ref is the first blended depth. The difference keeps precision for
+  /// distant walls.
   L accumulated{scalar_of<L>(0)}, z_ref{scalar_of<L>(0)};
   L first_hit{scalar_of<L>(0)};
 
@@ -80,31 +83,31 @@ struct DepthState<L, DepthMode::any> {
   }
 };
 
-/// The number of the splat that the median depth is of, for loops that compute one depth a pixel: the
-/// last one that is met while transmittance is above kMedianLevel, if transmittance falls through that
-/// level at all.
+/// Index of the splat that determines the median depth, for loops that compute only one depth per pixel.
+/// It is the last splat met while transmittance is above kMedianLevel. It is valid only if transmittance
+/// falls through that level.
 template <class L, class Id>
 GSNAV_HD Id last_above_half(L before, Id met, Id last) noexcept {
   return select(before > L(kMedianLevel<scalar_of<L>>), met, last);
 }
 
-/// Transmittance and colour so far of one pixel (or a pack of them).
+/// Transmittance and accumulated colour of one pixel, or of a pack of pixels.
 template <class L>
 struct BlendColor {
   L transmittance{scalar_of<L>(1)};
   L r{scalar_of<L>(0)}, g{scalar_of<L>(0)}, b{scalar_of<L>(0)};
 
-  /// No Gaussian has closed the pixel yet.
+  /// True until a Gaussian has closed the pixel.
   template <class S>
   GSNAV_HD mask_of<L> open(const BlendRules<S>& rules) const noexcept {
     return transmittance >= L(rules.transmittance_min);
   }
 };
 
-/// Running state of one pixel (or a pack of them), front to back.
+/// Blending state of one pixel, or of a pack of pixels, front to back.
 template <class L, DepthMode D>
 struct BlendState : BlendColor<L>, DepthState<L, D> {
-  /// Adds what has color() and lies at depth z(); each is called only where it is needed.
+  /// Adds a contribution with colour color() at depth z(). Each callable is called only if it is needed.
   template <bool Color, class C, class Z>
   GSNAV_HD void accumulate(const TransmittanceStep<L>& step, scalar_of<L> first_hit_tau, const C& color,
                            const Z& z) noexcept {
@@ -118,7 +121,7 @@ struct BlendState : BlendColor<L>, DepthState<L, D> {
   }
 };
 
-/// The records of one splat that blending may read; null where no output needs them.
+/// Records of one splat that blending may read. Null if no requested output needs them.
 template <class S>
 struct SplatRecords {
   const SplatGeometry<S>* geometry;
@@ -127,8 +130,8 @@ struct SplatRecords {
   const SplatPerspective<S>* perspective;
 };
 
-/// The terms of log2 alpha that are constant in one column of pixels. In the row at dy from the
-/// reference, log2 alpha = column - (b dy + w2)^2.
+/// Terms of log2 alpha that are constant in one column of pixels. At pixel centre py, log2 alpha =
+/// column - (b (py - ref_y) + w2)^2.
 template <class L>
 struct ColumnTerms {
   L column, w2;
@@ -141,15 +144,15 @@ GSNAV_HD ColumnTerms<L> column_terms(const SplatGeometry<S>& g, L px) noexcept {
   return {fma(-w1, w1, L(g.log2_opacity)), fma(dx, L(g.k), L(g.w2))};
 }
 
-/// log2 alpha at the pixel centre `py` of a column: never above log2 of the opacity.
+/// log2 alpha at the pixel centre `py` of a column. Never greater than log2 of the opacity.
 template <class L>
 GSNAV_HD L column_exponent(const ColumnTerms<L>& terms, L ref_y, L b, L py) noexcept {
   const L w2 = fma(py - ref_y, b, terms.w2);
   return fma(-w2, w2, terms.column);
 }
 
-/// log2 alpha where the response is not linearised (Response): far below any that is drawn behind the
-/// camera.
+/// log2 alpha for responses that are not linearised (Response). Behind the camera it is far below any
+/// that is drawn.
 template <class L, class S>
 GSNAV_HD L perspective_exponent(const SplatGeometry<S>& g, const SplatPerspective<S>& v, L px,
                                 L py) noexcept {
@@ -162,8 +165,8 @@ GSNAV_HD L perspective_exponent(const SplatGeometry<S>& g, const SplatPerspectiv
   return select(f > L(S(0)), exponent, L(S(-1e30)));
 }
 
-/// log2 alpha of a splat at pixel centres: of the response along each ray if `along_rays`, else of the
-/// splat's ellipse. `perspective` is read in the first case only.
+/// log2 alpha of a splat at pixel centres. If `along_rays`, of the response along each ray, with
+/// `perspective`; else of the splat's ellipse.
 template <class L, class S>
 GSNAV_HD L splat_exponent(bool along_rays, const SplatGeometry<S>& g,
                           const SplatPerspective<S>* perspective, L px, L py) noexcept {
@@ -171,19 +174,20 @@ GSNAV_HD L splat_exponent(bool along_rays, const SplatGeometry<S>& g,
   return column_exponent(column_terms(g, px), L(g.ref_y), L(g.b), py);
 }
 
-/// Whether pixels are in the footprint, which is alpha >= 2^log2_alpha_min. The exponent decides it, so
-/// that it does not depend on tiles; and alpha is positive wherever it is drawn.
+/// True for pixels in the footprint: alpha >= 2^log2_alpha_min. The comparison uses the exponent, so the
+/// result does not depend on tiles and alpha is positive wherever it is drawn.
 template <class L, class S>
 GSNAV_HD mask_of<L> in_footprint(const BlendRules<S>& rules, L exponent) noexcept {
   return exponent >= L(rules.log2_alpha_min);
 }
 
-/// Alpha of log2 alpha in the footprint. Outside it may be any value, also NaN.
+/// Alpha in the footprint, from log2 alpha. Outside the footprint it may be any value, also NaN.
 template <Exp2 M, class L, class S>
 GSNAV_HD L alpha_in_footprint(const BlendRules<S>& rules, L exponent) noexcept {
   const L alpha = exp2_in_range<M>(exponent), largest(rules.max_alpha);
 #if GSNAV_DEVICE_CODE
-  // The hardware's minimum. `min`, which has a rule for NaN, compares and selects.
+  // The hardware's minimum instruction. gsnav's `min` defines the result for NaN, which costs a
+  // comparison and a selection.
   if constexpr (std::is_same_v<L, float>) {
     return ::fminf(alpha, largest);
   } else
@@ -193,15 +197,16 @@ GSNAV_HD L alpha_in_footprint(const BlendRules<S>& rules, L exponent) noexcept {
   }
 }
 
-/// Alpha of a splat at a pixel, from log2 alpha (`exponent`): 0 outside the footprint.
+/// Alpha of a splat at a pixel, from log2 alpha (`exponent`). 0 outside the footprint.
 template <Exp2 M, class L, class S>
 GSNAV_HD L footprint_alpha(const BlendRules<S>& rules, L exponent) noexcept {
   return select(in_footprint(rules, exponent), alpha_in_footprint<M>(rules, exponent), L(S(0)));
 }
 
-/// Blends one splat onto the pixels that are `drawn`, open ones of its footprint, where it has `alpha`.
-/// (px, py): pixel centres. Other pixels keep their state bit for bit. `General` obeys
-/// rules.exclusive_stop: a pixel that it closed keeps its transmittance, negated.
+/// Blends one splat with `alpha` onto the pixels in `drawn`. These must be open pixels in its footprint.
+/// Other pixels keep their state bit for bit. `General` obeys rules.exclusive_stop; a pixel closed that
+/// way keeps its transmittance, negated.
+/// @param px, py pixel centres
 template <bool Color, DepthMode D, bool General, class L, class S>
 GSNAV_HD void blend_drawn(BlendState<L, D>& state, const BlendRules<S>& rules, mask_of<L> drawn, L alpha,
                           const SplatColor<S>* color, const SplatDepth<S>* depth, L px, L py) noexcept {
@@ -225,14 +230,14 @@ GSNAV_HD void blend_drawn(BlendState<L, D>& state, const BlendRules<S>& rules, m
       [&]() GSNAV_INLINED { return ray_depth(*depth, px, py); });
 }
 
-/// Blends one splat onto the open pixels. `alpha` is already 0 outside its footprint.
+/// Blends one splat onto the open pixels. `alpha` must already be 0 outside its footprint.
 template <bool Color, DepthMode D, bool General, class L, class S>
 GSNAV_HD void blend_alpha(BlendState<L, D>& state, const BlendRules<S>& rules, L alpha,
                           const SplatColor<S>* color, const SplatDepth<S>* depth, L px, L py) noexcept {
   blend_drawn<Color, D, General>(state, rules, state.open(rules), alpha, color, depth, px, py);
 }
 
-/// The `visible` of blend_splat() for a splat that nothing hides in part: keeps all of its alpha.
+/// Default of `visible` in blend_splat(): the whole splat is visible.
 struct WholeSplat {
   template <class L>
   GSNAV_HD L operator()(L alpha) const noexcept {
@@ -240,8 +245,10 @@ struct WholeSplat {
   }
 };
 
-/// Blends one splat onto pixels at (px, py). visible(alpha): what is left of its alpha, 0 where it
-/// is not seen. Returns the open pixels of its footprint.
+/// Blends one splat onto pixels with centres (px, py).
+/// @param visible callable that returns the remaining alpha of visible(alpha); 0 where the splat is
+///   hidden
+/// @return mask of the open pixels in its footprint
 template <bool Color, DepthMode D, Exp2 M, bool General, class L, class S, class Visible = WholeSplat>
 GSNAV_HD mask_of<L> blend_splat(BlendState<L, D>& state, const BlendRules<S>& rules,
                                 const SplatRecords<S>& splat, L px, L py,
@@ -249,7 +256,7 @@ GSNAV_HD mask_of<L> blend_splat(BlendState<L, D>& state, const BlendRules<S>& ru
   const L exponent = splat_exponent(General && splat.perspective != nullptr, *splat.geometry,
                                     splat.perspective, px, py);
   const auto hit = state.open(rules) && in_footprint(rules, exponent);
-  // Lanes are rarely all missed; asking costs them more than it saves.
+  // For packs, testing whether all lanes miss costs more than it saves: they rarely do.
   if constexpr (LaneTraits<L>::width == 1) {
     if (!hit) return hit;
   }

@@ -11,7 +11,7 @@
 
 namespace gsnav {
 
-/// The sRGB-encoded value of a linear one >= 0.
+/// sRGB-encoded value of a linear one. Negative input is treated as 0.
 template <class S>
 GSNAV_HD S srgb_encoded(S linear) noexcept {
   const S small = S(0.0031308);
@@ -19,7 +19,7 @@ GSNAV_HD S srgb_encoded(S linear) noexcept {
   return linear > small ? curve : S(12.92) * max(linear, S(0));
 }
 
-/// The linear value of an sRGB-encoded one >= 0.
+/// Linear value of an sRGB-encoded one. Negative input is treated as 0.
 template <class S>
 GSNAV_HD S srgb_decoded(S encoded) noexcept {
   const S small = S(0.04045);
@@ -27,22 +27,23 @@ GSNAV_HD S srgb_decoded(S encoded) noexcept {
   return encoded > small ? curve : S(1 / 12.92) * max(encoded, S(0));
 }
 
-/// A colour's value in another space.
+/// Converts a colour value from one space to another.
 template <class S>
 GSNAV_HD S converted(S value, ColorSpace from, ColorSpace to) noexcept {
   if (from == to) return value;
   return to == ColorSpace::linear ? srgb_decoded(value) : srgb_encoded(value);
 }
 
-/// Takes the colours of one set's projected Gaussians to the space that they are blended in, chunk by
-/// chunk.
+/// Kernel that converts the colours of one chunk of projected Gaussians to the space of blending.
 template <class S>
 struct ConvertSplatColors {
-  View<SplatColor<S>> colors;
-  View<const std::uint32_t> counts;
-  std::size_t first_chunk = 0;
-  ColorSpace from{}, to{};
+  View<SplatColor<S>> colors;        ///< [slots], colours of all sets
+  View<const std::uint32_t> counts;  ///< [chunks], number of splats per chunk
+  std::size_t first_chunk = 0;       ///< index of the first chunk of the set among those of all sets
+  ColorSpace from{},                 ///< space of the set
+      to{};                          ///< space of the frame
 
+  /// Converts the colours of chunk c of the set.
   GSNAV_HD void operator()(std::size_t c) const noexcept {
     const std::size_t base = (first_chunk + c) * kProjectChunk;
     for (std::size_t i = base; i < base + counts[first_chunk + c]; ++i) {
@@ -54,10 +55,11 @@ struct ConvertSplatColors {
   }
 };
 
-/// Decodes a display-referred image in place, one value a work item.
+/// Kernel that decodes one value of an sRGB-encoded image in place.
 template <class S>
 struct DecodeImage {
-  S* values = nullptr;
+  S* values = nullptr;  ///< image, in sRGB encoding
+  /// Decodes value i.
   GSNAV_HD void operator()(std::size_t i) const noexcept { values[i] = srgb_decoded(values[i]); }
 };
 

@@ -8,13 +8,13 @@
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/image/mesh_layer.hpp"
 
-// Gaussians and meshes in one image (docs/composition.md). Frames without a mesh run none of this.
+// Composites Gaussians and meshes (docs/composition.md). Frames without a mesh do not run this code.
 
 namespace gsnav {
 
-/// alpha where a splat lies before the mesh at depth `mesh`, 0 where it lies behind. A splat is looked
-/// at closely only where its reach spans the mesh: its depth along a ray is within it, also when
-/// rounded.
+/// Returns alpha where a splat lies in front of the mesh at depth `mesh`, and 0 where it lies behind.
+/// The exact depth is computed only if the splat's reach spans the mesh: its depth along any ray is
+/// within the reach, rounding included.
 template <class L, class S>
 GSNAV_HD L alpha_before_mesh(L alpha, const SplatDepth<S>& depth, L mesh, L px, L py) noexcept {
   const auto unsure = may_reach_behind(L(farthest_depth(depth)), mesh);
@@ -22,14 +22,14 @@ GSNAV_HD L alpha_before_mesh(L alpha, const SplatDepth<S>& depth, L mesh, L px, 
   return select(unsure && (ray_depth(depth, px, py) > mesh), L(S(0)), alpha);
 }
 
-/// Whether a pixel has a mesh.
+/// True where a pixel has a mesh.
 template <class L>
 GSNAV_HD mask_of<L> has_mesh(L depth) noexcept {
   return depth <= L(scalar_of<L>(3.4e38));
 }
 
-/// Blends a surface of a mesh at depth z, metres, also where too little transmittance is left for
-/// Gaussians. Alpha 0: there is none, z must be finite; 1: transmittance becomes 0.
+/// Blends a mesh surface at depth z metres, also where the pixel is closed for Gaussians. Alpha 0 means
+/// no surface, and z must still be finite. With alpha 1 the transmittance becomes 0.
 template <bool Color, class L, DepthMode D, class S>
 GSNAV_HD void blend_surface(BlendState<L, D>& state, const BlendRules<S>& rules, L alpha, L z,
                             const Vec3<L>& color) noexcept {
@@ -40,7 +40,7 @@ GSNAV_HD void blend_surface(BlendState<L, D>& state, const BlendRules<S>& rules,
   state.transmittance = select(state.transmittance < L(S(0)), -after, after);
 }
 
-/// The mesh takes what transmittance the Gaussians left.
+/// Blends the opaque mesh with the remaining transmittance.
 template <bool Color, class L, DepthMode D, class S>
 GSNAV_HD void close_by_mesh(BlendState<L, D>& state, const BlendRules<S>& rules, L depth,
                             const Vec3<L>& color) noexcept {
@@ -50,7 +50,7 @@ GSNAV_HD void close_by_mesh(BlendState<L, D>& state, const BlendRules<S>& rules,
                        color);
 }
 
-/// The same with the layer's depth and colour at a pixel.
+/// Blends the opaque mesh with the layer's depth and colour at a pixel.
 template <bool Color, DepthMode D, class S>
 GSNAV_HD void close_by_mesh(BlendState<S, D>& state, const BlendRules<S>& rules,
                             const MeshLayer<S>& mesh, std::size_t pixel) noexcept {
@@ -62,7 +62,7 @@ GSNAV_HD void close_by_mesh(BlendState<S, D>& state, const BlendRules<S>& rules,
   close_by_mesh<Color>(state, rules, mesh.depth[pixel], color);
 }
 
-/// blend_splat before a mesh at depth `mesh`.
+/// blend_splat in front of a mesh at depth `mesh`.
 template <bool Color, DepthMode D, Exp2 M, bool General, class S>
 GSNAV_HD void composite_splat(BlendState<S, D>& state, const BlendRules<S>& rules,
                               const SplatRecords<S>& splat, S mesh, S px, S py) noexcept {
@@ -71,7 +71,8 @@ GSNAV_HD void composite_splat(BlendState<S, D>& state, const BlendRules<S>& rule
   });
 }
 
-/// Blends one pixel of a frame with a mesh: RasterizePixel, but for what the mesh hides.
+/// Kernel that blends one pixel of a frame with a mesh. Equals RasterizePixel, except that the mesh
+/// hides the splats behind it.
 template <class S, bool Color, DepthMode D, bool General>
 struct CompositePixel {
   RasterArgs<S> args;
@@ -89,8 +90,9 @@ struct CompositePixel {
   }
 };
 
-/// Blends a pixel that has fragments. They cut it into stretches of depth; in each the list is walked
-/// for the splats whose depths along the ray lie there, as a mesh at its far end would have it walked.
+/// Kernel that blends a pixel with fragments. The fragments divide its ray into intervals of depth. For
+/// each interval the tile's list is walked once, as if a mesh lay at the far end of the interval. Splats
+/// with a depth in the interval are blended.
 template <class S, bool Color, DepthMode D, bool General>
 struct FragmentPixel {
   RasterArgs<S> args;
@@ -105,7 +107,7 @@ struct FragmentPixel {
       const MeshFragment<S>* const f =
           k < range.count ? args.mesh.fragments.data + range.begin + k : nullptr;
       const S far = f != nullptr ? f->depth : args.mesh.depth[pixel];
-      // Splats were binned by where the opaque mesh is.
+      // Also in the last interval: splats were binned against the opaque mesh.
       walk.for_each_splat(args, state, [&](const SplatRecords<S>& splat) GSNAV_INLINED {
         blend_within(state, splat, near, far, walk.px, walk.py);
       });
@@ -118,7 +120,7 @@ struct FragmentPixel {
   }
 
  private:
-  /// blend_splat where its depth is in (near, far].
+  /// Blends a splat where its depth is in (near, far].
   GSNAV_HD void blend_within(BlendState<S, D>& state, const SplatRecords<S>& splat, S near, S far, S px,
                              S py) const noexcept {
     const SplatDepth<S>& depth = *splat.depth;
@@ -131,8 +133,8 @@ struct FragmentPixel {
   }
 };
 
-/// dispatch_raster for frames with a mesh: calls f with compile-time <Color, DepthMode, General>. The
-/// cubic exp2 does not serve these.
+/// dispatch_raster for frames with a mesh: calls f with the compile-time arguments <Color, DepthMode,
+/// General>. These frames never use the cubic exp2.
 template <class S, class F>
 void dispatch_composite(const RasterArgs<S>& args, const F& f) {
   const auto with_depth = [&]<bool C, bool G>() {
@@ -156,11 +158,12 @@ void dispatch_composite(const RasterArgs<S>& args, const F& f) {
   }
 }
 
-/// Composite::hard_depth: the images of Gaussians alone, over black, become those of the frame.
+/// Kernel of Composite::hard_depth. Converts the images of the Gaussians alone, rendered over black, to
+/// the images of the frame.
 template <class S>
 struct HardDepthPixel {
-  FrameImages<S> images;     ///< what was asked for; filled by the Gaussians
-  const S* alpha = nullptr;  ///< of the Gaussians
+  FrameImages<S> images;     ///< requested images, filled with the Gaussians
+  const S* alpha = nullptr;  ///< alpha of the Gaussians
   const S* expected = nullptr;
   MeshLayer<S> mesh;
   Vec3<S> background{};
@@ -179,7 +182,7 @@ struct HardDepthPixel {
       } else if constexpr (O == kAlpha) {
         image[pixel] = covered ? S(1) : (lost ? S(0) : a);
       } else {
-        // One depth is written for a pixel, whatever is asked for.
+        // hard_depth has one depth per pixel, which goes to all depth images.
         image[pixel] = lost ? (covered ? z : S(0)) : d;
       }
     });

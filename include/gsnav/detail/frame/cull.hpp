@@ -9,12 +9,12 @@ namespace gsnav {
 
 namespace detail {
 
-/// Linear functions over a chunk's box of means, relative to a camera, with margins that are larger than
-/// all rounding, in float too.
+/// Extremes of linear functions over a chunk's box of means, relative to a camera. Margins exceed all
+/// rounding, also in float.
 ///
-/// With R the largest |w| of a footprint in standard deviations and L >= |(1, u)| for the u that the
-/// Jacobian is limited to, its half-width is at most R (f sigma L / z + sqrt(h)): in pixels times z the
-/// footprint reaches R f sigma L (`wide`) beyond its mean, and R sqrt(h) (`fixed`) pixels more.
+/// Let R be the largest |w| of a footprint in standard deviations, and L >= |(1, u)| for the u that the
+/// Jacobian is limited to. A footprint's half-width is at most R (f sigma L / z + sqrt(h)). In pixels
+/// times z, it reaches R f sigma L (`wide`) beyond its mean, and R sqrt(h) (`fixed`) pixels more.
 struct ChunkInView {
   const ProjectionCamera<double>& camera;
   const ChunkBounds& bounds;
@@ -23,8 +23,8 @@ struct ChunkInView {
 
   GSNAV_HD ChunkInView(const ProjectionCamera<double>& c, const ChunkBounds& b) noexcept
       : camera(c), bounds(b), center((b.low + b.high) * 0.5 - c.position), half((b.high - b.low) * 0.5) {
-    // What float may add: means are rounded to 2e-6 m (offsets of up to 64 m), the camera's offset
-    // relatively.
+    // Bound of the float errors: means are rounded to 2e-6 m (offsets are at most 64 m), and the
+    // camera's offset relatively.
     size = abs(center.x) + abs(center.y) + abs(center.z) + half.x + half.y + half.z;
     slack = 1e-6 * size + 1e-5;
   }
@@ -36,13 +36,14 @@ struct ChunkInView {
   GSNAV_HD double z_min() const noexcept {
     return max(-largest(-camera.rotation.row[2]) - slack, camera.near_plane / camera.scale);
   }
-  /// |w|^2 at the edge of the largest footprint, kernel units.
+  /// |w|^2 at the edge of the largest footprint, in kernel units.
   GSNAV_HD double s_max() const noexcept {
     return log2(max(static_cast<double>(bounds.opacity_max), 1e-30)) - camera.log2_alpha_min;
   }
 
-  /// How far footprints reach along one axis of the image, whose focal length, principal point, size and
-  /// limit of the Jacobian these are.
+  /// Reach of footprints beyond their means along one image axis: `wide` in pixels times depth, plus
+  /// `fixed` in pixels. The arguments of reach() are the focal length, principal point, limit of the
+  /// Jacobian and image size of the axis.
   struct Reach {
     double wide, fixed;
   };
@@ -51,7 +52,7 @@ struct ChunkInView {
     const double radius = sqrt(max(s_max, 0.0)) / kWhitenScale;
     const double h = sqrt(camera.eps2d);
     const double reach = f * bounds.scale_max * sqrt(1 + limit * limit);
-    // splat_bounds' own padding: relative, by 5e-7 of the aspect ratio more, and absolute.
+    // At least the padding of splat_bounds: relative, plus 5e-7 of the aspect ratio, and absolute.
     const double pad = 1.002 + 5e-7 * (reach / (z_min * h) + 1);
     return {pad * radius * reach + 1e-5 * (f + abs(c) + extent) * (size + slack),
             pad * radius * h + 0.01};
@@ -60,23 +61,27 @@ struct ChunkInView {
 
 }  // namespace detail
 
-/// Whether a Gaussian within the bounds may be visible (`Projected::visible`). Never no where one is.
-/// Anything that is not finite may be. "Left of the image" is linear in the mean once multiplied by z:
-/// f x + (cx + fixed) z < -wide; such a function is largest at a corner of the box.
-/// `s_max`: ChunkInView::s_max of the bounds, or of larger ones that they are a part of.
+/// True if a Gaussian within the bounds may be visible (`Projected::visible`). Conservative: never false
+/// if one is visible, and true if anything is not finite.
+///
+/// "Left of the image" is linear in the mean after multiplying by z: f x + (cx + fixed) z < -wide. Such
+/// a function has its maximum at a corner of the box.
+/// @param s_max ChunkInView::s_max of the bounds, or of larger bounds that contain them
 GSNAV_HD bool may_be_visible(const ProjectionCamera<double>& camera, const ChunkBounds& b,
                              double s_max) noexcept {
   const detail::ChunkInView chunk(camera, b);
   if (chunk.z_max() * camera.scale * (1 + 1e-6) <= camera.near_plane) return false;
-  if (camera.response != Response::ewa) return true;  // those footprints are not bounded by this
+  // the reach computed here does not bound other responses
+  if (camera.response != Response::ewa) return true;
   const double z_min = chunk.z_min();
   if (s_max < -1e-5) return false;
   const auto outside = [&](const Vec3d& axis, double f, double c, double limit,
                            double extent) GSNAV_INLINED {
     const auto [wide, fixed] = chunk.reach(z_min, s_max, f, c, limit, extent);
     const Vec3d& z = camera.rotation.row[2];
-    return chunk.largest(axis * f + z * (c + fixed)) < -wide ||          // below the first pixel
-           chunk.largest(axis * -f + z * (extent - c + fixed)) < -wide;  // beyond the last
+    return chunk.largest(axis * f + z * (c + fixed)) < -wide ||  // left of (above) the first pixel
+                                                                 // right of (below) the last pixel
+           chunk.largest(axis * -f + z * (extent - c + fixed)) < -wide;
   };
   const double limit_u = max(abs(camera.u_min), abs(camera.u_max));
   const double limit_v = max(abs(camera.v_min), abs(camera.v_max));
@@ -90,8 +95,8 @@ GSNAV_HD bool may_be_visible(const ProjectionCamera<double>& camera, const Chunk
   return may_be_visible(camera, b, detail::ChunkInView(camera, b).s_max());
 }
 
-/// Whether all means of a box are before the camera and in the image, so that tests of its parts would
-/// leave out little: a matter of speed alone.
+/// True if all means of a box are in front of the camera and inside the image. Testing its parts would
+/// then skip little. The result affects speed only.
 GSNAV_HD bool lies_in_view(const ProjectionCamera<double>& camera, const ChunkBounds& b) noexcept {
   const detail::ChunkInView chunk(camera, b);
   const Vec3d& z = camera.rotation.row[2];
@@ -103,19 +108,20 @@ GSNAV_HD bool lies_in_view(const ProjectionCamera<double>& camera, const ChunkBo
          inside(camera.rotation.row[1], camera.fy, camera.cy, static_cast<double>(camera.height));
 }
 
-/// What the Gaussians of a chunk may at most be, seen from a camera.
+/// Bounds of the sort keys and footprints of a chunk, for one camera.
 struct ChunkExtent {
-  float nearest;          ///< no sort key of theirs is below
-  double x0, y0, x1, y1;  ///< no footprint reaches beyond, pixels; may lie outside the image
+  float nearest;          ///< lower bound of the sort keys
+  double x0, y0, x1, y1;  ///< bounds of all footprints in pixels; may lie outside the image
 };
 
-/// The extent of a chunk that may_be_visible, Response::ewa.
+/// Extent of a chunk for which may_be_visible() is true. Response::ewa only.
 GSNAV_HD ChunkExtent chunk_extent(const ProjectionCamera<double>& camera,
                                   const ChunkBounds& b) noexcept {
   const detail::ChunkInView chunk(camera, b);
   const double z_min = chunk.z_min(), z_max = chunk.z_max(), s_max = chunk.s_max();
   ChunkExtent e;
-  // A distance is z at least only where the view axis has unit length: a viewmat need not be that rigid.
+  // A distance is at least z only if the view axis has unit length. A viewmat may deviate from that
+  // within its tolerance.
   const double row =
       camera.sort_order == SortOrder::z_depth ? 1.0 : max(1.0, norm(camera.rotation.row[2]));
   e.nearest = static_cast<float>(z_min / row * camera.scale * (1 - 1e-6));

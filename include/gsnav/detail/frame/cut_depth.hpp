@@ -8,7 +8,7 @@
 
 namespace gsnav {
 
-/// What a sensor does not see: a depth (metres) beyond the far plane becomes 0, no return.
+/// Kernel that applies a sensor's far plane: depths (metres) beyond it become 0, which means no return.
 struct CutDepth {
   CutDepth(float* of, double far_plane) noexcept : depth(of), last(static_cast<float>(far_plane)) {
     if (static_cast<double>(last) > far_plane) last = std::nextafter(last, 0.0f);

@@ -6,14 +6,17 @@
 
 namespace gsnav {
 
-/// Depth along a pixel's ray at which a Gaussian responds most, clamped to centre z +- reach.
-/// (px, py): pixel centre.
+/// Depth along a pixel's ray at which a Gaussian's response is greatest, in metres. Clamped to the depth
+/// of the centre +- reach.
 ///
-/// With camera-space axes M (columns) and cofactor columns c_i = m_j x m_k, the maximum of the response
-/// along the ray t r, r = (u, v, 1), is at t = sum (c_i.r)(c_i.m) / sum (c_i.r)^2, m the mean. Nothing
-/// is inverted, so flat (s = 0) Gaussians give their plane. Written as z + delta relative to the ray
-/// through the mean: delta = -z sum h_i p_i / sum h_i^2 with p_i the change of c_i.r from that ray to
-/// the pixel's and h_i = g_i + p_i, so that rounding is relative to delta and not to z.
+/// Let M be the camera-space axes (columns m_i), c_i = m_j x m_k their cofactor columns, and m the mean.
+/// Along the ray t r with r = (u, v, 1), the response has its maximum at t = sum (c_i.r)(c_i.m) / sum
+/// (c_i.r)^2. Nothing is inverted, so flat Gaussians (s = 0) give the depth of their plane.
+///
+/// It is evaluated as z + delta, relative to the ray through the mean. delta = -z sum h_i p_i / sum
+/// h_i^2, where p_i is the change of c_i.r from that ray to the pixel's ray, and h_i = g_i + p_i.
+/// Rounding is then relative to delta and not to z.
+/// @param px, py pixel centre
 template <class L, class S>
 GSNAV_HD L ray_depth(const SplatDepth<S>& d, L px, L py) noexcept {
   const L dx = px - L(d.mean_x), dy = py - L(d.mean_y);
@@ -26,25 +29,25 @@ GSNAV_HD L ray_depth(const SplatDepth<S>& d, L px, L py) noexcept {
   }
   const L reach(d.reach);
   const L delta = (L(-d.z) * numerator) / denominator;
-  // An edge-on disk has no response along the ray (0/0): its centre's depth stands.
+  // For an edge-on disk the response along the ray is undefined (0/0). Use the depth of its centre.
   const L defined = select(denominator > L(S(0)), delta, L(S(0)));
   return L(d.z) + clamp(defined, -reach, reach);
 }
 
-/// No ray_depth of a splat is beyond, metres; also when rounded.
+/// Upper bound of ray_depth of a splat, in metres, rounding included.
 template <class S>
 GSNAV_HD S farthest_depth(const SplatDepth<S>& d) noexcept {
   return d.z + d.reach;
 }
 
-/// Whether a splat lies behind `depth`, metres, at every pixel.
+/// True if a splat lies behind `depth` (metres) at every pixel.
 template <class S>
 GSNAV_HD bool behind(const SplatDepth<S>& d, S depth) noexcept {
   return d.z - d.reach > depth;
 }
 
-/// Whether a splat of this farthest_depth may lie behind `depth` at some pixel; else it is before it at
-/// all.
+/// True if a splat with this farthest_depth may lie behind `depth` at some pixel. If false, it is in
+/// front at all pixels.
 template <class L>
 GSNAV_HD mask_of<L> may_reach_behind(const L& farthest, const L& depth) noexcept {
   return farthest > depth;

@@ -6,34 +6,35 @@
 
 namespace gsnav {
 
-/// Pixels of a strip: from the one that holds `first` to the one before `end`, a whole number.
+/// Range of pixel columns. It starts with the column that contains `first` and ends before `end`, which
+/// is an integer.
 template <class L>
 struct PixelColumns {
   mask_of<L> any;
-  L first, end;  ///< where there are any
+  L first, end;  ///< valid if `any`
 };
 
-/// The columns that the ellipse of a splat's footprint covers within horizontal strips of an area: what
-/// tiles, and blocks of a tile, are listed by. L: one splat, or one a lane. Never less than the pixels
-/// that pass the pixel test in scalar_of<L>: the ellipse is enlarged by the rounding of that test, and
-/// of this one.
+/// Columns that the ellipse of a splat's footprint covers in horizontal strips. Tiles, and blocks of a
+/// tile, are listed by it. L is one splat, or a pack with one splat per lane. The result contains all
+/// pixels that pass the pixel test in scalar_of<L>, because the ellipse is enlarged by the rounding of
+/// both computations.
 ///
-/// About the centre, |w|^2 = (a X)^2 + (k X + b Y)^2 = r^2 has its right edge at
-/// X(Y) = -s Y + sqrt((r^2 - (beta Y)^2) / alpha^2), alpha^2 = a^2 + k^2, s = k b / alpha^2, beta = a b
-/// / alpha: concave, with its maximum at Y* = -k r / (a b). So a strip's rightmost point is at Y*
-/// limited to the strip, and its leftmost at -Y*.
+/// About the centre, the ellipse is |w|^2 = (a X)^2 + (k X + b Y)^2 = r^2. Its right edge is X(Y) = -s Y
+/// + sqrt((r^2 - (beta Y)^2) / alpha^2), where alpha^2 = a^2 + k^2, s = k b / alpha^2 and beta = a b /
+/// alpha. The edge is concave with its maximum at Y* = -k r / (a b). A strip's rightmost point is
+/// therefore at Y* clamped to the strip, and its leftmost point at -Y* clamped.
 ///
-/// `Rough` takes sqrt_above for roots, and reciprocal_near: an ellipse up to 3e-3 larger, in less time.
+/// @tparam Rough uses sqrt_above and reciprocal_near: faster, with an ellipse up to 3e-3 larger
 template <class L, bool Rough = false>
 class FootprintStrips {
   using S = scalar_of<L>;
 
  public:
-  /// Strips will lie within the pixels of the box.
+  /// For strips within the pixels of `box`.
   GSNAV_HD FootprintStrips(const SplatGeometry<L>& g, S log2_alpha_min, const PixelBox<L>& box) noexcept
       : FootprintStrips(g, log2_alpha_min, box.x0 + L(S(0.5)), box.x1 - L(S(0.5)), box.y0 + L(S(0.5)),
                         box.y1 - L(S(0.5))) {}
-  /// ... within the pixel centres [x0, x1] x [y0, y1].
+  /// For strips within the pixel centres [x0, x1] x [y0, y1].
   GSNAV_HD FootprintStrips(const SplatGeometry<L>& g, S log2_alpha_min, L x0, L x1, L y0,
                            L y1) noexcept {
     const L zero(S(0));
@@ -48,7 +49,7 @@ class FootprintStrips {
     beta2_ = (beta * beta) * inv_aa;
     inv_alpha_ = root(inv_aa);
 
-    // What one w of the pixel test, or the centre here, may be off by is a few roundings of this.
+    // The error of w in the pixel test, and of the centre here, is a few roundings of this size.
     const L far_x = max(abs(x0 - g.ref_x), abs(x1 - g.ref_x));
     const L far_y = max(abs(y0 - g.ref_y), abs(y1 - g.ref_y));
     const L k = abs(g.k);
@@ -70,7 +71,8 @@ class FootprintStrips {
     pad_y_ = fma(abs(g.ref_y) + abs(mean_y), L(S(1e-6)), L(S(1e-3)));
   }
 
-  /// Pixel centres [y0, y1]: whether any may be covered there, and between which x.
+  /// Range [left, right] of x that the ellipse covers for pixel centres in the rows [y0, y1]. Returns
+  /// false (per lane) if it covers none.
   GSNAV_HD mask_of<L> columns(L y0, L y1, L& left, L& right) const noexcept {
     const L low = max(y0 - pad_y_ - center_y_, -half_height_);
     const L high = min(y1 + pad_y_ - center_y_, half_height_);
@@ -85,12 +87,12 @@ class FootprintStrips {
     return low <= high;
   }
 
-  /// Rows [top, end) of the box: which of its pixels may be covered there.
+  /// Pixels of the box that the ellipse may cover in the rows [top, end).
   GSNAV_HD PixelColumns<L> pixels(const PixelBox<L>& box, L top, L end) const noexcept {
     const L half(S(0.5));
     L left, right;
     const auto covered = columns(max(top, box.y0) + half, min(end, box.y1) - half, left, right);
-    // The padding of left and right is more than what rounding to a pixel may lose.
+    // The padding of left and right exceeds what rounding to a pixel may lose.
     const L first = clamp(left + half, box.x0, box.x1),
             behind = truncated(clamp(right + half, box.x0, box.x1));
     return {covered && (first < behind), first, behind};

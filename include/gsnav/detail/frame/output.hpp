@@ -7,32 +7,34 @@
 
 #include "gsnav/math/functions.hpp"
 
-// The images of a frame. A new one is
+// The images of a frame. A new image needs:
 // - here: a bit of Output, a pointer in FrameImages and a row of kImages;
-// - its value in pixel_value (detail/frame/blend.hpp), and what that needs in BlendState
+// - its value in pixel_value (detail/frame/blend.hpp), and the state for it in BlendState
 //   (detail/frame/blend_splat.hpp);
-// - a vector in Frames, in kVectors too, in the order of kImages (render/frames.hpp);
-// - where a pixel has it before the last Gaussian: the transmittance at which, in blend_rules
-//   (detail/render/rules.hpp);
-// - where it is no depth: its rule in HardDepthPixel (detail/frame/composite.hpp);
-// - for tests, its truth in the oracles (detail/eval/oracle_config.hpp, oracle_blend.hpp).
+// - a vector in Frames, and in kVectors in the order of kImages (render/frames.hpp);
+// - if a pixel's value is known before the last Gaussian: the transmittance at which it is, in
+//   blend_rules (detail/render/rules.hpp);
+// - if it is not a depth: its rule in HardDepthPixel (detail/frame/composite.hpp);
+// - for tests, its definition in the oracles (detail/eval/oracle_config.hpp, oracle_blend.hpp).
 
 namespace gsnav {
 
-/// Images a render may produce; combine with |. Nothing that is not asked for is computed.
+/// Images that a render can produce. Combine them with |. Images that are not requested are not
+/// computed.
 enum Output : unsigned {
-  kRgb = 1u << 0,               ///< [H][W][3], unclamped, over the background
-  kAlpha = 1u << 1,             ///< [H][W], 1 - transmittance
-  kMedianDepth = 1u << 2,       ///< [H][W] metres, where transmittance crosses 1/2; 0: no return
-  kExpectedDepth = 1u << 3,     ///< [H][W] metres, sum(w z) / sum(w); 0 where sum(w) = 0
+  kRgb = 1u << 0,            ///< [H][W][3], not clamped, over the background
+  kAlpha = 1u << 1,          ///< [H][W], 1 - transmittance
+  kMedianDepth = 1u << 2,    ///< [H][W] metres, where transmittance falls through 1/2; 0 if it does not
+  kExpectedDepth = 1u << 3,  ///< [H][W] metres, sum(w z) / sum(w); 0 if sum(w) = 0
   kAccumulatedDepth = 1u << 4,  ///< [H][W] metres, sum(w z)
-  kFirstHitDepth = 1u << 5,     ///< [H][W] metres, where alpha first reaches first_hit_tau; 0: never
+  kFirstHitDepth = 1u << 5,     ///< [H][W] metres, where alpha first reaches first_hit_tau; 0 if it does
+                                ///< not
 };
 
-/// What a compiled blend loop keeps of depth; less is cheaper.
+/// Depths that a compiled blend loop computes. Fewer are faster.
 enum class DepthMode { none, median, any };
 
-/// Images of one camera; a null pointer is an image not asked for.
+/// Pointers to the images of one camera. Null: the image is not requested.
 template <class S>
 struct FrameImages {
   S* rgb = nullptr;
@@ -49,8 +51,9 @@ struct FrameImages {
 template <class S>
 using ImagePointer = S* FrameImages<S>::*;
 
-/// One image: values a pixel, the mode that a blend loop needs for it, and whether it is a sum over all
-/// Gaussians of a pixel, so that the pixel is not done before the last of them.
+/// Description of one image: its bit, values per pixel, the DepthMode that it needs, and its member of
+/// FrameImages. `sums` is true for a sum over all Gaussians of a pixel, which is complete only after the
+/// last one.
 template <class S>
 struct ImageKind {
   Output output;
@@ -78,7 +81,7 @@ constexpr std::size_t channels_of(Output output) noexcept {
   return kImages<float>[i].channels;
 }
 
-/// Values a pixel of all images that there are.
+/// Number of values per pixel of all requested images.
 template <class S>
 std::size_t channel_count(const FrameImages<S>& images) noexcept {
   std::size_t n = 0;
@@ -86,7 +89,8 @@ std::size_t channel_count(const FrameImages<S>& images) noexcept {
   return n;
 }
 
-/// The same images as `like` has, one behind the other from `memory` on, of `pixels` pixels each.
+/// Images like those requested in `like`, stored one after the other from `memory` on, with `pixels`
+/// pixels each.
 template <class S>
 FrameImages<S> images_in(S* memory, const FrameImages<S>& like, std::size_t pixels) noexcept {
   FrameImages<S> images;
@@ -98,8 +102,8 @@ FrameImages<S> images_in(S* memory, const FrameImages<S>& like, std::size_t pixe
   return images;
 }
 
-/// Calls f.operator()<Output>(image) for each image that a state of mode D has values for: null where it
-/// was not asked for.
+/// Calls f.operator()<Output>(image) for each image that a blending state of mode D has values for.
+/// `image` is null if it is not requested.
 template <DepthMode D, class S, class F>
 GSNAV_HD void for_each_image(const FrameImages<S>& images, const F& f) noexcept {
   const auto call = [&]<std::size_t I>() GSNAV_INLINED {

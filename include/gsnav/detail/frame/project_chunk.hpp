@@ -16,32 +16,32 @@
 
 namespace gsnav {
 
-/// One set as one camera sees it: what projection reads.
+/// One set of Gaussians as seen by one camera: the input of projection.
 template <class S>
 struct ViewedSet {
   GaussianRows gaussians;
   Selection selection;
   ProjectionCamera<S> camera;
-  ProjectionCamera<double>
-      camera64;                  ///< for sort keys, and for Gaussians whose geometry float cannot hold
-  View<const Vec3d> offsets;     ///< origin - camera position, one an origin
-  int sh_degree = 0;             ///< highest degree to evaluate, <= gaussians.color.degree
-  std::size_t first_chunk = 0;   ///< among the chunks of all sets
-  std::uint32_t first_rank = 0;  ///< of the set's first Gaussian among all
+  ProjectionCamera<double> camera64;  ///< for sort keys, and for Gaussians that are too inexact in float
+  View<const Vec3d> offsets;          ///< one per origin: origin - camera position, asset frame
+  int sh_degree = 0;                  ///< highest SH degree to evaluate, <= gaussians.color.degree
+  std::size_t first_chunk = 0;        ///< index of the set's first chunk among the chunks of all sets
+  std::uint32_t first_rank = 0;       ///< rank of the set's first Gaussian
 
-  /// How many chunks are drawn.
+  /// Number of chunks to draw.
   GSNAV_HD std::size_t chunk_count() const noexcept { return selection.count(gaussians.chunk_count()); }
-  /// Which rows may be seen of a chunk, by its number.
+  /// Rows of chunk `id` that may be visible.
   GSNAV_HD SeenRows seen_rows(std::size_t id) const noexcept {
     return selection.seen_rows(gaussians.chunk_count(), id);
   }
-  /// What decides between equal keys: the set's first Gaussian plus the row as it was read.
+  /// Rank of a row, which decides between equal keys: that of the set's first Gaussian plus the row's
+  /// id.
   GSNAV_HD std::uint32_t rank_of(std::uint32_t row) const noexcept {
     return first_rank + (gaussians.row_ids.empty() ? row : gaussians.row_ids[row]);
   }
 };
 
-/// Of a set for a camera, but for `offsets` and the set's place in the frame. Host code.
+/// Makes the ViewedSet of a set for a camera, except `offsets`, first_chunk and first_rank. Host code.
 template <class S>
 ViewedSet<S> view_set(const Camera& camera, const GaussianSet& set, const ProjectionRules& rules,
                       int max_sh_degree) noexcept {
@@ -54,37 +54,38 @@ ViewedSet<S> view_set(const Camera& camera, const GaussianSet& set, const Projec
   return args;
 }
 
-/// Origins of a set: at least one, at zero.
+/// Number of origins of a set. Without origins it is 1, at zero.
 inline std::size_t origin_count(const GaussianRows& gs) noexcept {
   return gs.origins.empty() ? 1 : gs.origins.size;
 }
-/// Value o of ViewedSet::offsets, in double: small where the camera is near, wherever both are in the
-/// world. Host code.
+/// Value o of ViewedSet::offsets. Computed in double, so it is exact to a rounding even far from the
+/// world's origin. Host code.
 template <class S>
 Vec3d origin_offset(const ViewedSet<S>& args, std::size_t o) noexcept {
   const View<const Vec3d> table = args.gaussians.origins;
   return (table.empty() ? Vec3d{} : table[o]) - args.camera64.position;
 }
 
-/// What projection writes: the records of all sets of a frame, kProjectChunk slots for each chunk. Chunk
-/// c of a set writes its survivors, in row order, from slot (first_chunk + c) * kProjectChunk on, and
-/// their number to counts[first_chunk + c].
+/// Outputs of the projection: records of all sets of a frame, with kProjectChunk slots per chunk. Chunk
+/// c of a set writes its visible splats in row order, from slot (first_chunk + c) * kProjectChunk on. It
+/// writes their number to counts[first_chunk + c].
 template <class S>
 struct ProjectOutputs {
   View<SplatGeometry<S>> geometry;
-  View<SplatColor<S>> colors;              ///< empty: not asked for
-  View<SplatDepth<S>> depths;              ///< empty: not asked for
+  View<SplatColor<S>> colors;              ///< empty: colour is not requested
+  View<SplatDepth<S>> depths;              ///< empty: depth is not requested
   View<SplatPerspective<S>> perspectives;  ///< empty for Response::ewa
   View<SplatBounds> bounds;
   View<std::uint32_t> keys;   ///< camera.key_code of the float32 key
-  View<std::uint32_t> ranks;  ///< what decides between equal keys; empty: the slot does
+  View<std::uint32_t> ranks;  ///< decides between equal keys; empty: the slot decides
   View<std::uint32_t> counts;
-  TileGrid grid;          ///< read where `spans` is not empty
-  View<TileSpans> spans;  ///< tiles of each slot's splat, for backends that find them here; else empty
-  OpenCells open;         ///< backends may leave out what reaches none of these
+  TileGrid grid;          ///< read if `spans` is not empty
+  View<TileSpans> spans;  ///< Tiles of each slot's splat, for backends that find them during projection;
+                          ///< else empty.
+  OpenCells open;         ///< Backends may skip splats that reach none of these cells.
 };
 
-/// Whether any Gaussian of chunk c may be visible. Never no where one is.
+/// True if some Gaussian of chunk c may be visible. Conservative: never false if one is visible.
 template <class S>
 GSNAV_HD bool chunk_is_candidate(const ViewedSet<S>& args, std::size_t c) noexcept {
   const View<const ChunkBounds> bounds = args.gaussians.chunk_bounds;
@@ -92,9 +93,9 @@ GSNAV_HD bool chunk_is_candidate(const ViewedSet<S>& args, std::size_t c) noexce
   return args.selection.may_be_seen(id) && (bounds.empty() || may_be_visible(args.camera64, bounds[id]));
 }
 
-/// Which parts of chunk c have Gaussians that may be visible: bit p for the kChunkPart rows from p
-/// kChunkPart on. Never without one that is; no bit where chunk_is_candidate says no, or where
-/// seen_rows() has none of them.
+/// Parts of chunk c that may have visible Gaussians. Bit p stands for the kChunkPart rows from p *
+/// kChunkPart on. Conservative: the bit of a part with a visible Gaussian is always set. Returns 0 if
+/// chunk_is_candidate() is false; bits of parts without any row in seen_rows() are 0.
 template <class S>
 GSNAV_HD std::uint32_t candidate_parts(const ViewedSet<S>& args, std::size_t c) noexcept {
   static_assert(kProjectChunk / kChunkPart <= 32);
@@ -115,19 +116,20 @@ GSNAV_HD std::uint32_t candidate_parts(const ViewedSet<S>& args, std::size_t c) 
   return in_view;
 }
 
-/// Unit vector along `delta` (mean - camera, asset frame), the direction that SH is evaluated in.
+/// Unit vector along `delta` (mean - camera, asset frame): the direction at which SH is evaluated.
 template <class L>
 GSNAV_HD Vec3<L> view_direction(const Vec3<L>& delta) noexcept {
   using S = scalar_of<L>;
   const L n = norm(delta);
-  // A camera at the mean sees no direction; z stands in, so that the colour is finite.
+  // A camera at the mean has no view direction. Use z, so that the colour is finite.
   const auto defined = n > L(S(1e-12));
   const Vec3<L> unit = delta * (L(S(1)) / n);
   return {select(defined, unit.x, L(S(0))), select(defined, unit.y, L(S(0))),
           select(defined, unit.z, L(S(1)))};
 }
 
-/// Colour of Gaussian i seen along `delta` (mean - camera, asset frame, any length), SH to `degree`.
+/// Colour of Gaussian i seen along `delta` (mean - camera, asset frame, any length), with SH up to
+/// `degree`.
 template <class S>
 GSNAV_HD SplatColor<S> gaussian_color(const ColorRows& rows, int degree, std::size_t i,
                                       Vec3<S> delta) noexcept {
@@ -162,16 +164,16 @@ GSNAV_HD SplatColor<S> gaussian_color(const ColorRows& rows, int degree, std::si
   return {c.x, c.y, c.z, S(0)};
 }
 
-/// What is written of a row.
+/// A projected row: its key, its records, and the direction for its colour.
 template <class S>
 struct RowSplat {
   float key;      ///< sort_key
-  Vec3<S> delta;  ///< for its colour: mean - camera, asset frame
+  Vec3<S> delta;  ///< for the colour: mean - camera, asset frame
   Splat<S> splat;
 };
 
-/// Projects row i in the precision that its geometry needs. False where it may not be seen. `depth`:
-/// whether its depth record is asked for.
+/// Projects row i in the precision that its geometry needs. Returns false if it is not visible. `depth`
+/// requests the depth record.
 template <class S>
 GSNAV_HD bool project_row(const ViewedSet<S>& args, bool depth, std::size_t i,
                           RowSplat<S>& out) noexcept {
@@ -187,7 +189,7 @@ GSNAV_HD bool project_row(const ViewedSet<S>& args, bool depth, std::size_t i,
       return make_splat64(args.camera64, depth, row, key, out.splat);
     return make_splat<false>(args.camera, args.camera64, depth, key, seen, out.splat);
   } else {
-    // The float64 reference has depths of its own, so that a fault of `row_key` shows beside it.
+    // The float64 reference computes its own depths, so that an error in `row_key` shows in comparisons.
     const Vec3d position = args.camera.rotation * key.delta64;
     key.z = static_cast<float>(position.z * args.camera.scale);
     const SeenRow<double> seen(args.camera, row, key);
@@ -216,7 +218,7 @@ GSNAV_HD void write_splat(const ViewedSet<S>& args, const ProjectOutputs<S>& out
   }
 }
 
-/// Projects row i to `slot`. Returns whether it may be seen.
+/// Projects row i and writes it to `slot`. Returns false, having written nothing, if it is not visible.
 template <class S>
 GSNAV_HD bool project_gaussian(const ViewedSet<S>& args, const ProjectOutputs<S>& out, std::size_t slot,
                                std::size_t i) noexcept {
@@ -226,7 +228,7 @@ GSNAV_HD bool project_gaussian(const ViewedSet<S>& args, const ProjectOutputs<S>
   return true;
 }
 
-/// Projects chunk `c` of a set, one Gaussian after the other.
+/// Kernel that projects chunk `c` of a set, one Gaussian after the other.
 template <class S>
 struct ProjectChunk {
   ViewedSet<S> args;

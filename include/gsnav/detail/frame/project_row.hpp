@@ -9,17 +9,17 @@
 #include "gsnav/detail/frame/splat.hpp"
 #include "gsnav/math/functions.hpp"
 
-// The formulas between a row of a set and the records of its splat, for one row or a pack of rows.
-// Drivers (the serial kernel, the lanes and the CUDA kernels) call them in this order: row_key, near
-// plane, SeenRow, needs_double and pixel_box, splat_geometry. Drivers have the loops, masks and memory.
+// Formulas that turn a row of a set into the records of its splat, for one row or a pack of rows. The
+// drivers (serial kernel, SIMD kernels, CUDA kernels) contribute loops, masks and memory. They call the
+// formulas in this order: row_key, near plane, SeenRow, needs_double and pixel_box, splat_geometry.
 
 namespace gsnav {
 
-/// Rows of a set that a camera sees: what row_key and SeenRow read.
+/// Rows of a set relative to a camera: the input of row_key and SeenRow.
 template <class At>
 struct ViewedRows : SetRows<At> {
   using L = typename At::lane;
-  View<const Vec3d> offsets;  ///< origin - camera position, asset frame, one an origin
+  View<const Vec3d> offsets;  ///< one per origin: origin - camera position, asset frame
 
   GSNAV_HD ViewedRows(const At& of, const View<const Vec3d>& from) noexcept
       : SetRows<At>{of}, offsets(from) {}
@@ -30,15 +30,15 @@ struct ViewedRows : SetRows<At> {
 };
 using ViewedRow = ViewedRows<OneRow>;
 
-/// Where the centre of a row lies. F: float, or a pack of floats.
+/// Position of a row's centre relative to the camera. F is float or a pack of floats.
 template <class F>
 struct RowKey {
   Vec3<doubles_of<F>> delta64;  ///< mean - camera position, asset frame
-  Vec3<F> delta;                ///< the same in float32
-  F z;  ///< depth along the view axis, metres: what near planes and sort keys compare
+  Vec3<F> delta;                ///< delta64 in float32
+  F z;  ///< depth along the view axis, metres; near planes and sort keys compare it
 };
 
-/// The depth is computed in double and rounded to float32 once.
+/// Computes the position of a row's centre. The depth is computed in double and rounded to float32 once.
 template <class F, class Row>
 GSNAV_HD RowKey<F> row_key(const ProjectionCamera<double>& camera, const Row& row) noexcept {
   using D = doubles_of<F>;
@@ -47,14 +47,14 @@ GSNAV_HD RowKey<F> row_key(const ProjectionCamera<double>& camera, const Row& ro
   return {delta64, mean + row.rounded_offset(offset), static_cast<F>(depth_key(camera, delta64))};
 }
 
-/// The float32 sort key, metres.
+/// Sort key in float32, metres.
 template <class F>
 GSNAV_HD F sort_key(const ProjectionCamera<double>& camera, const RowKey<F>& key) noexcept {
   if (camera.sort_order == SortOrder::z_depth) return key.z;
   return static_cast<F>(distance_key(camera, key.delta64));
 }
 
-/// mean - camera position in L.
+/// mean - camera position, in the precision of L.
 template <class L, class F>
 GSNAV_HD Vec3<L> delta_of(const RowKey<F>& key) noexcept {
   if constexpr (sizeof(scalar_of<L>) > sizeof(float)) {
@@ -64,19 +64,20 @@ GSNAV_HD Vec3<L> delta_of(const RowKey<F>& key) noexcept {
   }
 }
 
-/// The shape of a row in camera axes.
+/// Shape of a row in camera axes.
 template <class L, class Row>
 GSNAV_HD SplatAxes<L> row_axes(const Mat3<scalar_of<L>>& rotation, const Vec3<L>& delta,
                                const Row& row) noexcept {
   if (row.has_factor()) return splat_axes(rotation, delta, mat_cast<L>(row.factor()));
   Quat<L> quat = quat_cast<L>(row.quat());
-  // A unit quaternion rounded to float32 is off by 6e-8: nothing in float, but too much for a reference.
+  // A unit quaternion rounded to float32 is off by 6e-8: negligible in float, too much for the float64
+  // reference.
   if constexpr (sizeof(scalar_of<L>) > sizeof(float)) normalize(quat);
   return splat_axes(rotation, delta, quat, vec_cast<L>(row.scales()));
 }
 
-/// A row in the image. L: what it is computed in. The members are built in place: lanes that are
-/// assigned to a struct are copied through memory.
+/// A row projected to the image, computed in L. Members are initialised in place: packs assigned to a
+/// struct are copied through memory.
 template <class L>
 struct SeenRow {
   SplatAxes<L> axes;
@@ -91,7 +92,7 @@ struct SeenRow {
 
 namespace detail {
 
-/// The mean alone, in double.
+/// Projects only the mean, in double.
 template <class L>
 GSNAV_HD void project_mean(const ProjectionCamera<double>& camera, const Vec3<L>& delta, L& mean_x,
                            L& mean_y) noexcept {
@@ -103,7 +104,7 @@ GSNAV_HD void project_mean(const ProjectionCamera<double>& camera, const Vec3<L>
   mean_y = fma(L(camera.fy), dot(row(1), delta) * inv_z, L(camera.cy));
 }
 
-/// Centre of the pixel of [0, size) that is nearest to x.
+/// Centre of the pixel in [0, size) that is nearest to x.
 template <class L>
 GSNAV_HD L reference_pixel(L x, int size) noexcept {
   using S = scalar_of<L>;
@@ -112,16 +113,16 @@ GSNAV_HD L reference_pixel(L x, int size) noexcept {
 
 }  // namespace detail
 
-/// The pixel that the records of a splat are relative to (detail/frame/splat.hpp), and its centre's
-/// offset from the mean.
+/// Pixel that the records of a splat are relative to (detail/frame/splat.hpp), and its centre's offset
+/// from the mean.
 template <class L>
 struct ReferencePixel {
   L x, y;
   L dx, dy;
 };
 
-/// U: what the mean is known in. Drivers take double: float32 rounding of the mean, 3e-5 px, would be
-/// the largest error of the exponent.
+/// Reference pixel of a mean. U is the type of the mean. Drivers use double: float32 rounding of the
+/// mean (3e-5 px) would dominate the error of the exponent.
 template <class L, class U>
 GSNAV_HD ReferencePixel<L> reference_of(int width, int height, const U& mean_x,
                                         const U& mean_y) noexcept {
@@ -131,8 +132,8 @@ GSNAV_HD ReferencePixel<L> reference_of(int width, int height, const U& mean_x,
 
 namespace detail {
 
-/// Whether the whitened form loses too much in float: k dx + b dy cancels over a long needle's visible
-/// length, or between a far mean and the image. Such rows are projected in double.
+/// True if the whitened form is too inexact in float. k dx + b dy then cancels over the visible length
+/// of a long needle, or between a distant mean and the image. Such rows are projected in double.
 template <class L>
 GSNAV_HD mask_of<L> needs_double(const ProjectionCamera<scalar_of<L>>& camera,
                                  const Projected<L>& p) noexcept {
@@ -144,19 +145,20 @@ GSNAV_HD mask_of<L> needs_double(const ProjectionCamera<scalar_of<L>>& camera,
          (fma(abs(p.k), abs(ref.dx), p.b * abs(ref.dy)) > L(S(16)));
 }
 
-/// Pixels whose centre lies within [center - half, center + half], clipped to [0, size): half-open.
+/// Pixels of [0, size) whose centre is within [center - half, center + half], as a half-open range.
 template <class L>
 GSNAV_HD void pixel_range(L center, L half, int size, L& low, L& high) noexcept {
   using S = scalar_of<L>;
   const L one(S(1)), end(static_cast<S>(size));
   const L first = clamp(center - half - L(S(0.5)), -one, end);
   const L last = clamp(center + half - L(S(0.5)), -one, end);
-  const L f = truncated(first), l = truncated(last);  // towards zero: made a ceiling, and a floor
+  // truncated() rounds toward zero. Correct it to ceil for the first pixel and floor for the last.
+  const L f = truncated(first), l = truncated(last);
   low = max(select(f < first, f + one, f), L(S(0)));
   high = min(select(l > last, l - one, l) + one, end);
 }
 
-/// The pixels whose centres lie in the box of a footprint.
+/// Pixels whose centres lie in the bounding box of a footprint.
 template <class L>
 GSNAV_HD PixelBox<L> pixel_box(const ProjectionCamera<scalar_of<L>>& camera,
                                const Projected<L>& p) noexcept {
@@ -166,8 +168,9 @@ GSNAV_HD PixelBox<L> pixel_box(const ProjectionCamera<scalar_of<L>>& camera,
   return box;
 }
 
-/// The pixels of the 16-pixel tiles that [center - radius, center + radius] reaches, in a compat mode's
-/// own rounding: `slack` is what INRIA adds to the upper end (tile - 1 pixel) where gsplat rounds up.
+/// Limits a range to the pixels of the 16-pixel tiles that [center - radius, center + radius] reaches,
+/// with the rounding of another renderer. `slack` is what INRIA adds to the upper end (tile - 1 pixels);
+/// with 0, the end is rounded up as in gsplat.
 template <class S>
 GSNAV_HD void clip_to_tiles(S center, S radius, S slack, int size, std::int32_t& low,
                             std::int32_t& high) noexcept {
@@ -182,7 +185,7 @@ GSNAV_HD void clip_to_tiles(S center, S radius, S slack, int size, std::int32_t&
   high = high < end_px ? high : end_px;
 }
 
-/// Whole number not below x >= 0.
+/// Smallest integer >= x, for x >= 0.
 template <class S>
 GSNAV_HD S ceiling(S x) noexcept {
   if (!(x < S(8388608))) return x;
@@ -190,7 +193,7 @@ GSNAV_HD S ceiling(S x) noexcept {
   return whole < x ? whole + S(1) : whole;
 }
 
-/// Narrows bounds to the tiles that the renderer named by `compat` visits.
+/// Narrows the bounds to the tiles that the renderer `compat` visits.
 template <class S>
 GSNAV_HD void narrow_to_compat(const ProjectionCamera<S>& camera, const Projected<S>& p,
                                SplatBounds& b) noexcept {
@@ -201,7 +204,7 @@ GSNAV_HD void narrow_to_compat(const ProjectionCamera<S>& camera, const Projecte
     clip_to_tiles(p.mean_y, ceiling(extent * sqrt(p.variance_y)), S(0), camera.height, b.y0, b.y1);
     return;
   }
-  // det = (scale^2 / (a b))^2; the larger eigenvalue by INRIA's formula with its floor of 0.1.
+  // det = (scale^2 / (a b))^2. The larger eigenvalue is by INRIA's formula with its lower limit of 0.1.
   const S root_det = scale2 / (p.a * p.b);
   const S mid = S(0.5) * (p.variance_x + p.variance_y);
   const S radius = ceiling(S(3) * sqrt(mid + sqrt(max(S(0.1), fma(mid, mid, -(root_det * root_det))))));
@@ -209,7 +212,7 @@ GSNAV_HD void narrow_to_compat(const ProjectionCamera<S>& camera, const Projecte
   clip_to_tiles(p.mean_y - S(0.5), radius, S(15), camera.height, b.y0, b.y1);
 }
 
-/// The pixels that a footprint may cover. Returns false where there are none.
+/// Computes the pixels that a footprint may cover. Returns false if there are none.
 template <class T>
 GSNAV_HD bool splat_bounds(const ProjectionCamera<T>& camera, const Projected<T>& p,
                            SplatBounds& b) noexcept {
@@ -222,13 +225,13 @@ GSNAV_HD bool splat_bounds(const ProjectionCamera<T>& camera, const Projected<T>
 
 }  // namespace detail
 
-/// The record that blending reads.
+/// Record that blending reads.
 template <class L>
 GSNAV_HD SplatGeometry<L> splat_geometry(const Projected<L>& p, const ReferencePixel<L>& ref) noexcept {
   return {ref.x, ref.y, p.a, p.k, p.b, p.a * ref.dx, fma(p.k, ref.dx, p.b * ref.dy), p.log2_opacity};
 }
 
-/// The record of a response that is not linearised.
+/// Record of a response that is not linearised.
 template <class L>
 GSNAV_HD SplatPerspective<L> splat_perspective(const Projected<L>& p,
                                                const ReferencePixel<L>& ref) noexcept {
@@ -236,17 +239,18 @@ GSNAV_HD SplatPerspective<L> splat_perspective(const Projected<L>& p,
           p.bend};
 }
 
-/// A projected Gaussian before it is written.
+/// Records of a projected Gaussian before they are written.
 template <class S>
 struct Splat {
   SplatBounds bounds;
   SplatGeometry<S> geometry;
-  SplatDepth<S> depth;              ///< where it is asked for
-  SplatPerspective<S> perspective;  ///< not for Response::ewa
+  SplatDepth<S> depth;              ///< if depth is requested
+  SplatPerspective<S> perspective;  ///< unless Response::ewa
 };
 
-/// The records of a row that was projected in T with its mean in U, rounded to S. False where no pixel
-/// centre lies in its bounds. `GeometryOnly`: neither depth nor perspective is asked for.
+/// Makes the records of a projected row, rounded to S. The row was projected in T and its mean in U.
+/// Returns false if no pixel centre lies in its bounds.
+/// @tparam GeometryOnly neither depth nor perspective is requested
 template <bool GeometryOnly, class T, class U, class S>
 GSNAV_HD bool make_splat(const ProjectionCamera<T>& camera, bool depth, const SeenRow<T>& seen, U mean_x,
                          U mean_y, Splat<S>& out) noexcept {
@@ -261,7 +265,7 @@ GSNAV_HD bool make_splat(const ProjectionCamera<T>& camera, bool depth, const Se
   return true;
 }
 
-/// The same of a row whose geometry float holds: only its mean is computed in double.
+/// Makes the records of a row for which float is precise enough. Only its mean is computed in double.
 template <bool GeometryOnly>
 GSNAV_HD bool make_splat(const ProjectionCamera<float>& camera, const ProjectionCamera<double>& camera64,
                          bool depth, const RowKey<float>& key, const SeenRow<float>& seen,
@@ -271,7 +275,8 @@ GSNAV_HD bool make_splat(const ProjectionCamera<float>& camera, const Projection
   return make_splat<GeometryOnly>(camera, depth, seen, mean_x, mean_y, out);
 }
 
-/// The same of a row in double: of the float64 reference, and where `needs_double` says so.
+/// Makes the records of a row computed in double, for the float64 reference and for rows that need it
+/// (needs_double).
 template <class S, class Row>
 GSNAV_HD bool make_splat64(const ProjectionCamera<double>& camera, bool depth, const Row& row,
                            const RowKey<float>& key, Splat<S>& out) noexcept {

@@ -9,20 +9,20 @@
 
 namespace gsnav {
 
-/// sqrt(log2(e) / 2): |w|^2 in the whitened coordinates of SplatGeometry is log2(e) q / 2.
+/// sqrt(log2(e) / 2). With it, |w|^2 in the whitened coordinates of SplatGeometry is log2(e) q / 2.
 inline constexpr double kWhitenScale = 0.84932180028801904272;
 inline constexpr double kLn2 = 0.69314718055994530942;
 
-/// A Gaussian in camera axes: its mean, its factor M (Sigma = M M^T) and M's cofactors.
+/// A Gaussian in camera axes: mean, factor M of its covariance M M^T, and cofactors of M.
 template <class L>
 struct SplatAxes {
   Vec3<L> position{};   ///< mean relative to the camera, asset units
-  Mat3<L> factor{};     ///< M: columns are the axes times their standard deviations, asset units
-  Mat3<L> cofactors{};  ///< columns c_i = m_j x m_k up to sign, asset units squared
+  Mat3<L> factor{};     ///< M: columns are the axes times their standard deviations, in asset units
+  Mat3<L> cofactors{};  ///< columns c_i = m_j x m_k up to sign, in asset units squared
 };
 
-/// From a unit quaternion and scales: the cofactors are products, exact to a rounding.
-/// `delta`: mean - camera position, asset frame.
+/// Axes from a unit quaternion and scales. The cofactors are products, exact to one rounding.
+/// @param delta mean - camera position, asset frame
 template <class L>
 GSNAV_HD SplatAxes<L> splat_axes(const Mat3<scalar_of<L>>& rotation, const Vec3<L>& delta,
                                  const Quat<L>& quat, const Vec3<L>& scales) noexcept {
@@ -41,8 +41,8 @@ GSNAV_HD SplatAxes<L> splat_axes(const Mat3<scalar_of<L>>& rotation, const Vec3<
   return out;
 }
 
-/// From any factor in asset axes (a skinned Gaussian's blended axes need be neither orthogonal nor
-/// right-handed): cofactors by differences of products with one rounding.
+/// Axes from any factor in asset axes. The blended axes of a skinned Gaussian need be neither orthogonal
+/// nor right-handed. Cofactors are differences of products, rounded once.
 template <class L>
 GSNAV_HD SplatAxes<L> splat_axes(const Mat3<scalar_of<L>>& rotation, const Vec3<L>& delta,
                                  const Mat3<L>& factor) noexcept {
@@ -57,32 +57,38 @@ GSNAV_HD SplatAxes<L> splat_axes(const Mat3<scalar_of<L>>& rotation, const Vec3<
   return out;
 }
 
-/// Result of `project`. `visible` holds where the footprint may reach the image; the rest is
-/// meaningful there only.
+/// Result of `project`. `visible` is true where the footprint may reach the image; the other members are
+/// valid only there.
 template <class L>
 struct Projected {
   mask_of<L> visible{};
   L mean_x{}, mean_y{};  ///< pixels
   L a{}, k{}, b{};       ///< whitened triple about the mean (detail/frame/splat.hpp)
   L log2_opacity{};
-  L s_max{};                       ///< |w|^2 at the edge of the footprint
-  L variance_x{}, variance_y{};    ///< diagonal of the 2D covariance, px^2
-  L center_x{}, center_y{};        ///< of the footprint's bounds: the mean, but under perspective
-  L half_width{}, half_height{};   ///< of the bounds, pixels, padded so that rounding only adds
+  L s_max{};                     ///< |w|^2 at the edge of the footprint
+  L variance_x{}, variance_y{};  ///< diagonal of the 2D covariance, px^2
+  L center_x{}, center_y{};  ///< centre of the footprint's bounds: the mean, except under perspective
+  L half_width{}, half_height{};   ///< half size of the bounds in pixels, padded so that rounding cannot
+                                   ///< shrink them
   L slope_x{}, slope_y{}, bend{};  ///< perspective: f = 1 + slope . d about the mean, and c
 };
 
 namespace detail {
 
-/// Per-ray response of a Gaussian whose linearisation at the mean is whitened by (a, k, b).
+/// Computes the response along each ray, for a Gaussian whose linearisation at the mean is whitened by
+/// (a, k, b).
 ///
-/// Along the ray r = r_c + delta (r_c through the mean, third component 1) the maximum of the response
-/// of covariance S has exponent q = |mu x r|_S^2 / (r . adj(S) r). The numerator is the linearised q_e
-/// times D0 = r_c . adj(S) r_c; and by Sylvester's identity for the minors of adj(S),
+/// Let r = r_c + delta be a ray with third component 1, where r_c goes through the mean mu. Along r the
+/// maximum of the response of covariance S has exponent q = |mu x r|_S^2 / (r . adj(S) r). The numerator
+/// is the linearised q_e times D0 = r_c . adj(S) r_c. By Sylvester's identity for the minors of adj(S),
+///
 ///     D0 (r . adj(S) r) = (r_c . adj(S) r)^2 + q_e D0 det(S) / z^2,
-/// so q = q_e / (f^2 + c q_e), f = r_c . adj(S) r / D0 linear in the pixel and c = det(S) / (z^2 D0):
-/// one division a pixel, no cancellation. S is Sigma dilated by h (z / f)^2 across the view axis, which
-/// is what h px^2 is at the mean's depth. Response::tangent_plane is c = 0 with S isotropic.
+///
+/// so q = q_e / (f^2 + c q_e), where f = r_c . adj(S) r / D0 is linear in the pixel and c = det(S) /
+/// (z^2 D0). That costs one division per pixel and has no cancellation.
+///
+/// S is Sigma dilated by h (z / f)^2 across the view axis, which is h px^2 at the mean's depth.
+/// Response::tangent_plane has c = 0 and isotropic S.
 template <class L, class S>
 GSNAV_HD void add_perspective(const ProjectionCamera<S>& camera, const SplatAxes<L>& axes, L u, L v,
                               Projected<L>& out) noexcept {
@@ -116,14 +122,15 @@ GSNAV_HD void add_perspective(const ProjectionCamera<S>& camera, const SplatAxes
   out.slope_x = slope_u / L(camera.fx);
   out.slope_y = slope_v / L(camera.fy);
 
-  // The footprint |w| <= kappa f is a conic with a focus at the mean: an ellipse while e < 1.
+  // The footprint |w| <= kappa f is a conic with a focus at the mean. It is an ellipse while its
+  // eccentricity is less than 1.
   const L one(S(1)), zero(S(0)), everywhere(S(1e30));
   const L rest = one - out.bend * out.s_max;
   const L kappa2 = out.s_max / rest;
   const L m2 = out.slope_y / out.b;
   const L m1 = (out.slope_x - out.k * m2) / out.a;
   const L open = one - kappa2 * fma(m1, m1, m2 * m2);
-  // Closer to a parabola rounding decides its extent: the whole image bounds it.
+  // Near a parabola, rounding would decide its extent. Use the whole image as bounds.
   const auto ellipse = (rest > zero) && (open > zero) && (rest * open > L(S(0.01)));
   const L along_x = m1 / out.a, along_y = (m2 - out.k * along_x) / out.b;
   const L reach_x = one / (out.a * out.a);
@@ -132,7 +139,7 @@ GSNAV_HD void add_perspective(const ProjectionCamera<S>& camera, const SplatAxes
   const L center_y = out.mean_y + kappa2 * along_y / open;
   const L half_x = sqrt(kappa2 * fma(open, reach_x, kappa2 * along_x * along_x)) / open;
   const L half_y = sqrt(kappa2 * fma(open, reach_y, kappa2 * along_y * along_y)) / open;
-  // What is taken from a difference may be off by its rounding: a thousandth is more.
+  // Values computed as differences carry rounding errors of less than a thousandth.
   const L pad(S(1.001)), pixel(S(0.01));
   out.center_x = select(ellipse, center_x, zero);
   out.center_y = select(ellipse, center_y, zero);
@@ -142,15 +149,16 @@ GSNAV_HD void add_perspective(const ProjectionCamera<S>& camera, const SplatAxes
 
 }  // namespace detail
 
-/// Projection of Gaussians (Zwicker et al. 2001; Kerbl et al. 2023), one or a pack of them.
+/// Projects one Gaussian, or a pack of Gaussians (Zwicker et al. 2001; Kerbl et al. 2023).
 ///
-///  - The Jacobian is taken at the mean; Response::ewa clamps its x/z and y/z to the camera's limits.
-///  - det is built from products, never as AC - B^2 (Cauchy-Binet): det0 = (fx fy / z^2)^2 sum
-///    (c_i.(u, v, 1))^2, c_i the cofactor columns, and det = det0 + h (|l1|^2 + |l2|^2) + h^2, so det >
-///    0 always and its relative error stays near 1e-6 for needles of 1e4 : 1.
-///  - The inverse is kept as a Cholesky factor.
+/// - The Jacobian is taken at the mean. Response::ewa clamps its x/z and y/z to the camera's limits.
+/// - The determinant is built from products, never as AC - B^2 (Cauchy-Binet). det0 = (fx fy / z^2)^2
+///   sum (c_i.(u, v, 1))^2, with the cofactor columns c_i, and det = det0 + h (|l1|^2 + |l2|^2) + h^2.
+///   So det > 0 always, and its relative error stays near 1e-6 for needles of 1e4 : 1.
+/// - The inverse is kept as a Cholesky factor.
 ///
-/// `key_z`: `depth_key` of the centre, rounded to float32, metres. `opacity` in [0, 1].
+/// @param key_z depth_key of the centre, rounded to float32, metres
+/// @param opacity in [0, 1]
 template <class L, class F>
 GSNAV_HD Projected<L> project(const ProjectionCamera<scalar_of<L>>& camera, const SplatAxes<L>& axes,
                               F key_z, L opacity) noexcept {
@@ -191,15 +199,15 @@ GSNAV_HD Projected<L> project(const ProjectionCamera<scalar_of<L>>& camera, cons
     const L det_base = fma(base, (a0 + c0) + base, det0);
     opacity = opacity * max(sqrt(det_base / det), L(camera.min_compensation));
   }
-  // The smallest normal number keeps log2 defined; such lanes fail s_max >= 0.
+  // The smallest normal number keeps log2 defined. Such lanes fail the test s_max >= 0.
   out.log2_opacity = log2(max(opacity, L(S(1.2e-38))));
   out.s_max = out.log2_opacity - L(camera.log2_alpha_min);
 
   if (ewa) {
     const L radius = sqrt(max(out.s_max, L(S(0))));
-    // In x the test's own rounding cannot pass w1^2; in y it may by the cancellation in k dx + b dy.
+    // In x, the rounding of the pixel test cannot exceed w1^2. In y it can, because k dx + b dy cancels.
     const L aspect = a_over_det * sqrt(big_c);
-    // Means are rounded where the principal point is, however near to the image they end up.
+    // Means are rounded at the magnitude of the principal point, however near to the image they end up.
     const L pad_x = fma(abs(out.mean_x) + L(abs(camera.cx)), L(S(1e-6)), L(S(1e-3)));
     const L pad_y = fma(abs(out.mean_y) + L(abs(camera.cy)), L(S(1e-6)), L(S(1e-3)));
     out.center_x = out.mean_x;
@@ -211,7 +219,7 @@ GSNAV_HD Projected<L> project(const ProjectionCamera<scalar_of<L>>& camera, cons
     detail::add_perspective(camera, axes, u, v, out);
   }
 
-  const L huge(S(3e38));  // finite in float: an overflow is culled, never drawn as NaN
+  const L huge(S(3e38));  // finite in float: Gaussians that overflow are culled, never drawn as NaN
   const L half(S(0.5));
   out.visible = (key_z > F(camera.near_plane)) && (out.s_max >= L(S(0))) && (det <= huge) &&
                 (big_a <= huge) && (abs(out.mean_x) <= huge) && (abs(out.mean_y) <= huge) &&
@@ -224,8 +232,8 @@ GSNAV_HD Projected<L> project(const ProjectionCamera<scalar_of<L>>& camera, cons
   return out;
 }
 
-/// The per-ray depth record of a projected Gaussian (detail/frame/depth.hpp). Compat modes know the
-/// depth of the centre only.
+/// Per-ray depth record of a projected Gaussian (detail/frame/depth.hpp). Compat modes use the depth of
+/// the centre only.
 template <class L>
 GSNAV_HD SplatDepth<L> make_splat_depth(const ProjectionCamera<scalar_of<L>>& camera,
                                         const SplatAxes<L>& axes, const Projected<L>& p) noexcept {
@@ -235,7 +243,7 @@ GSNAV_HD SplatDepth<L> make_splat_depth(const ProjectionCamera<scalar_of<L>>& ca
   d.mean_y = p.mean_y;
   d.z = axes.position.z * L(camera.scale);
   if (camera.compat != Compat::none) return d;
-  // Cofactors relative to the largest entry, so that their products stay away from underflow.
+  // Divide the cofactors by the largest entry, so that their products do not underflow.
   L largest(S(0));
   for (int i = 0; i < 3; ++i) {
     const Vec3<L>& c = axes.cofactors.row[i];
@@ -253,19 +261,21 @@ GSNAV_HD SplatDepth<L> make_splat_depth(const ProjectionCamera<scalar_of<L>>& ca
   return d;
 }
 
-/// Sort key for SortOrder::z_depth: the depth of a centre along the view axis, metres, in double.
-/// Callers round it to float32, once. The rounded key has the same bits on every backend and in any
-/// float64 renderer (but where two float64 results lie on different sides of a float32 rounding, about
-/// one key in 1e8), and it depends neither on a set's origins nor on where the world's origin lies.
-/// `delta`: mean - camera position, asset frame, in double. `D`: double, or a pack of them.
+/// Sort key for SortOrder::z_depth: depth of a centre along the view axis, metres, in double. Callers
+/// round it once, to float32.
+///
+/// The rounded key has the same bits on every backend. It has them in any float64 renderer too, unless
+/// two float64 results straddle a float32 rounding boundary (about 1 key in 1e8). It depends neither on
+/// a set's origins nor on the world's origin.
+/// @param delta mean - camera position, asset frame, in double or a pack of doubles
 template <class D>
 GSNAV_HD D depth_key(const ProjectionCamera<double>& camera, const Vec3<D>& delta) noexcept {
   const Vec3d& row = camera.rotation.row[2];
   return dot(Vec3<D>{D(row.x), D(row.y), D(row.z)}, delta) * D(camera.scale);
 }
 
-/// Sort key for SortOrder::camera_distance: the distance of a centre from the camera, metres, in double.
-/// As `depth_key`, it is rounded to float32 once.
+/// Sort key for SortOrder::camera_distance: distance of a centre from the camera, metres, in double.
+/// Callers round it once, to float32, as `depth_key`.
 template <class D>
 GSNAV_HD D distance_key(const ProjectionCamera<double>& camera, const Vec3<D>& delta) noexcept {
   return norm(delta) * D(camera.scale);

@@ -13,21 +13,22 @@
 
 namespace gsnav {
 
-/// What decides which Gaussian is in front.
+/// Measure by which Gaussians are sorted from front to back.
 enum class SortOrder : std::uint8_t {
   z_depth,          ///< depth of the centre along the view axis (INRIA)
   camera_distance,  ///< distance of the centre from the camera (KHR_gaussian_splatting)
 };
 
-/// How a 3D Gaussian answers a pixel's ray.
+/// Response of a 3D Gaussian along a pixel's ray.
 enum class Response : std::uint8_t {
-  ewa,            ///< linearised on the image plane at the mean (Zwicker et al. 2001): the contract
-  tangent_plane,  ///< linearised on the plane across the mean's direction (Huang et al. 2024)
+  ewa,            ///< linearised on the image plane at the mean (Zwicker et al. 2001); the contract
+  tangent_plane,  ///< linearised on the plane perpendicular to the mean's direction (Huang et al. 2024)
   ray,            ///< exact: the maximum along the ray
 };
 
-/// How a float32 key becomes the integer that is sorted: all of its bits, or fewer of them counted from
-/// the near plane on, so that 24 bits keep 20 of the mantissa's from there to 2^16 times farther.
+/// Conversion of a float32 key to the integer that is sorted. It keeps all 32 bits, or n of them: the
+/// bits of the key minus those of the near plane, without the lowest ones. With n = 24, 20 bits of the
+/// mantissa remain, for keys up to 2^16 times the near plane.
 struct KeyCode {
   std::uint32_t base = 0, largest = 0xffffffffu;
   int shift = 0;
@@ -38,13 +39,13 @@ struct KeyCode {
   }
   GSNAV_HD std::uint32_t operator()(float key) const noexcept {
     const std::uint32_t bits = bits_of(key);
-    // A key that is rounded to just below the near plane comes first.
+    // A key that rounding moved below the near plane gets code 0.
     const std::uint32_t code = (bits > base ? bits - base : 0u) >> shift;
     return code < largest ? code : largest;
   }
 };
 
-/// What a render asks of the projection beyond the camera.
+/// Settings of the projection besides the camera.
 struct ProjectionRules {
   SortOrder sort_order = SortOrder::z_depth;
   Response response = Response::ewa;
@@ -53,9 +54,9 @@ struct ProjectionRules {
   int key_bits = 32;
 };
 
-/// A camera as the projection of one set sees it: in the set's own frame, so that no Gaussian is
-/// transformed to place its asset in the world. With x_world = s R x + t, camera coordinates are
-/// s (W R)(x - c), c the camera's position in the asset's frame.
+/// A camera in the frame of one set, so that Gaussians need not be transformed to the world. With
+/// x_world = s R x + t, camera coordinates are s (W R)(x - c), where c is the camera's position in the
+/// asset's frame.
 template <class S>
 struct ProjectionCamera {
   Mat3<S> rotation{};  ///< W R, asset axes to camera axes
@@ -69,7 +70,7 @@ struct ProjectionCamera {
   S eps2d{S(0.3)};
   S base_eps2d{0};        ///< GaussianSet::base_eps2d
   S log2_alpha_min{};     ///< the footprint is alpha >= 2^log2_alpha_min
-  S min_compensation{0};  ///< of the mip filter
+  S min_compensation{0};  ///< lower limit of the mip filter's opacity compensation
   bool mip = false;
   SortOrder sort_order = SortOrder::z_depth;
   Response response = Response::ewa;
@@ -77,7 +78,7 @@ struct ProjectionCamera {
   KeyCode key_code{};
 };
 
-/// Builds the ProjectionCamera of a set (host, in double, rounded once).
+/// Makes the ProjectionCamera of a set. Host code; computed in double and rounded once.
 template <class S>
 ProjectionCamera<S> make_projection_camera(const Camera& camera, const GaussianSet& set,
                                            const ProjectionRules& rules = {}) noexcept {

@@ -10,24 +10,24 @@
 #include "gsnav/math/mat.hpp"
 #include "gsnav/math/quat.hpp"
 
-// The rows of a set in any of its encodings, read as floats (SetRows). Packed rows
-// (scene/packed_cloud.hpp) have the same bits over lanes and one at a time, as every operation is
-// rounded once.
+// Reading the rows of a set as floats, from any of its encodings (SetRows). Every operation is rounded
+// once, so packed rows (scene/packed_cloud.hpp) give the same bits in a pack and one at a time.
 
 namespace gsnav {
 
-/// Largest code of a quaternion's part; half of it is 0.
+/// Largest code of a quaternion component. Half of it encodes 0.
 inline constexpr float kQuatCodes = 32766.0f;
 inline constexpr float kRootHalf = 0.70710678118654752f;
 
-/// Offset of a mean from its origin, metres. Codes are whole numbers of [0, 65535].
+/// Decodes the offset of a mean from its origin, metres. Codes are integers in [0, 65535].
 template <class L>
 GSNAV_HD Vec3<L> unpack_mean(const PackedChunk& chunk, const Vec3<L>& code) noexcept {
   return {fma(L(chunk.step.x), code.x, L(chunk.low.x)), fma(L(chunk.step.y), code.y, L(chunk.low.y)),
           fma(L(chunk.step.z), code.z, L(chunk.low.z))};
 }
 
-/// Standard deviations, metres: steps of their roots, so that small ones are not lost beside large ones.
+/// Decodes standard deviations, metres. Codes are steps of the square root, so that small deviations
+/// keep their precision next to large ones.
 template <class L>
 GSNAV_HD Vec3<L> unpack_scales(const PackedChunk& chunk, const Vec3<L>& code) noexcept {
   const L step(chunk.scale_step);
@@ -35,8 +35,8 @@ GSNAV_HD Vec3<L> unpack_scales(const PackedChunk& chunk, const Vec3<L>& code) no
   return {roots.x * roots.x, roots.y * roots.y, roots.z * roots.z};
 }
 
-/// A unit quaternion from three of its parts, each within +-sqrt(1/2); the fourth, the largest, is
-/// positive. The lowest bits of the first two codes number it.
+/// Decodes a unit quaternion from three components, each within +-sqrt(1/2). The fourth is the largest
+/// and positive. The lowest bits of the first two codes are its index.
 template <class L>
 GSNAV_HD Quat<L> unpack_quat(const Vec3<L>& code) noexcept {
   const L half(0.5f), two(2.0f), zero(0.0f), middle(kQuatCodes / 2), step(kRootHalf / (kQuatCodes / 2));
@@ -50,16 +50,16 @@ GSNAV_HD Quat<L> unpack_quat(const Vec3<L>& code) noexcept {
           select(y, c, d)};
 }
 
-/// In [0, 1].
+/// Decodes an opacity in [0, 1].
 template <class L>
 GSNAV_HD L unpack_opacity(const L& code) noexcept {
   return code / L(65535.0f);
 }
 
-/// Which of a chunk's steps coefficient k = 1, ... of a colour has.
+/// Index in PackedChunk::sh_steps for coefficient k >= 1.
 GSNAV_HD constexpr int packed_band(int k) noexcept { return k < 4 ? 0 : k < 9 ? 1 : 2; }
 
-/// One row of a set, as SetRows reads it.
+/// Reads one row of a set, as SetRows needs it.
 struct OneRow {
   using lane = float;
   const ShapeRows& shape;
@@ -69,30 +69,30 @@ struct OneRow {
   GSNAV_HD float codes(int plane) const noexcept {
     return static_cast<float>(shape.codes.data[static_cast<std::size_t>(plane) * shape.size + i]);
   }
-  /// Null where shapes are floats.
+  /// Constants that decode the row, or null if shapes are floats.
   GSNAV_HD const PackedChunk* chunk() const noexcept {
     return shape.packed() ? &shape.chunks[i / kProjectChunk] : nullptr;
   }
-  /// The row's, of one value an origin.
+  /// The element of `offsets` (one per origin) that belongs to the row.
   GSNAV_HD Vec3d offset(const View<const Vec3d>& offsets) const noexcept {
     return offsets[shape.origin_ids.empty() ? 0 : shape.origin_ids[i]];
   }
 };
 
-/// Reads one row of a set, or a pack of rows, from any storage. Each member reads when it is called. At
-/// says where the rows lie (OneRow; lanes::PackOfRows).
+/// Decodes one row of a set, or a pack of rows, from any encoding. Each member reads memory when it is
+/// called. At selects the rows (OneRow or lanes::PackOfRows).
 template <class At>
 struct SetRows {
   using L = typename At::lane;
   At at;
 
-  /// Offset from the row's origin, metres.
+  /// Offset of the mean from the row's origin, metres.
   GSNAV_HD Vec3<L> mean() const noexcept {
     const PackedChunk* const chunk = at.chunk();
     return chunk != nullptr && at.shape.means.empty() ? unpack_mean(*chunk, codes3(ShapeRows::kMeans))
                                                       : floats3(at.shape.means);
   }
-  /// Whether the shape is a factor M (ShapeRows::axes), in place of a quaternion and scales.
+  /// True if the shape is a factor M (ShapeRows::axes) instead of a quaternion and scales.
   GSNAV_HD bool has_factor() const noexcept { return !at.shape.axes.empty(); }
   GSNAV_HD Mat3<L> factor() const noexcept {
     return {{floats3(at.shape.axes), floats3(at.shape.axes, 3), floats3(at.shape.axes, 6)}};
@@ -122,21 +122,24 @@ struct SetRows {
   }
 };
 
-/// The same of row i by itself.
+/// Mean of row i: its offset from its origin, metres.
 GSNAV_HD Vec3<float> mean_of(const ShapeRows& shape, std::size_t i) noexcept {
   return SetRows<OneRow>{{shape, i}}.mean();
 }
+/// Standard deviations of row i, metres.
 GSNAV_HD Vec3<float> scales_of(const ShapeRows& shape, std::size_t i) noexcept {
   return SetRows<OneRow>{{shape, i}}.scales();
 }
+/// Unit quaternion of row i.
 GSNAV_HD Quat<float> quat_of(const ShapeRows& shape, std::size_t i) noexcept {
   return SetRows<OneRow>{{shape, i}}.quat();
 }
+/// Opacity of row i, in [0, 1].
 GSNAV_HD float opacity_of(const ShapeRows& shape, std::size_t i) noexcept {
   return SetRows<OneRow>{{shape, i}}.opacity();
 }
 
-/// Coefficient k of row i of packed colours, whichever way the bands are kept.
+/// Coefficient k of row i of packed colours, for bands stored as codes, halves or floats.
 GSNAV_HD Vec3<float> packed_coefficient(const ColorRows& rows, std::size_t i, int k) noexcept {
   const auto halves = [](const std::uint16_t* p) GSNAV_INLINED {
     return Vec3<float>{half_to_float(p[0]), half_to_float(p[1]), half_to_float(p[2])};

@@ -8,30 +8,32 @@
 
 namespace gsnav {
 
-/// A projected Gaussian as blending reads it. With d = pixel centre - reference pixel, the whitened
-/// offset from the mean is w = (a dx + w1, k dx + b dy + w2) and alpha = 2^(log2_opacity - |w|^2): the
-/// Cholesky factor of the inverse 2D covariance with sqrt(log2(e) / 2) folded in, so that the exponent
-/// cannot become positive.
+/// A projected Gaussian in the form in which blending reads it. With d = pixel centre - reference pixel,
+/// the whitened offset from the mean is w = (a dx + w1, k dx + b dy + w2), and alpha = 2^(log2_opacity -
+/// |w|^2). (a, k, b) is the Cholesky factor of the inverse 2D covariance, times sqrt(log2(e) / 2). The
+/// exponent can therefore never exceed log2_opacity.
 ///
-/// The reference pixel is the one that holds the mean, or the image's nearest to it: d is exact, and
-/// what a mean far outside the image costs in bits is paid once, in w1 and w2
+/// The reference pixel is the pixel that contains the mean, or the image's nearest one. d is then exact.
+/// The precision lost for a mean far outside the image is lost only once, in w1 and w2
 /// (detail/frame/project_row.hpp).
 template <class S>
 struct SplatGeometry {
   S ref_x{}, ref_y{};  ///< centre of the reference pixel (an integer + 0.5)
-  S a{}, k{}, b{};     ///< whitened (Cholesky) triple
+  S a{}, k{}, b{};     ///< whitened triple: the Cholesky factor
   S w1{}, w2{};        ///< whitened offset of the reference pixel from the mean
   S log2_opacity{};    ///< log2 of the opacity after the filter's compensation
 };
 
-/// Colour of a projected Gaussian, display-referred, >= 0.
+/// Colour of a projected Gaussian, >= 0. In the set's color space until ConvertSplatColors converts it
+/// to the space of the frame.
 template <class S>
 struct SplatColor {
   S r{}, g{}, b{}, pad{};
 };
 
-/// What per-ray depth needs (detail/frame/depth.hpp): cofactor columns of the camera-space axes against
-/// the ray through the mean (g) and its change per pixel in x and y.
+/// Record for per-ray depth (detail/frame/depth.hpp). g holds the products of the cofactor columns of
+/// the camera-space axes with the ray through the mean. gx and gy are their changes per pixel in x and
+/// y.
 template <class S>
 struct SplatDepth {
   S mean_x{}, mean_y{};  ///< pixels
@@ -40,14 +42,15 @@ struct SplatDepth {
   S g[3]{}, gx[3]{}, gy[3]{};
 };
 
-/// What turns the linearised response into one along each ray: with f = f0 + fx dx + fy dy, the exponent
-/// |w|^2 becomes |w|^2 / (f^2 + c |w|^2) where f > 0, and nothing where f <= 0 (behind the camera).
+/// Record that converts the linearised response to the response along each ray. With f = f0 + fx dx + fy
+/// dy, the exponent |w|^2 becomes |w|^2 / (f^2 + c |w|^2) where f > 0. Where f <= 0 the pixel is behind
+/// the camera and has no response.
 template <class S>
 struct SplatPerspective {
   S f0{}, fx{}, fy{}, c{};
 };
 
-/// Records rounded to another scalar.
+/// Converts a record to another scalar, rounding each value.
 template <class S, class T>
 GSNAV_HD SplatGeometry<S> record_cast(const SplatGeometry<T>& g) noexcept {
   return {static_cast<S>(g.ref_x), static_cast<S>(g.ref_y),       static_cast<S>(g.a),
@@ -70,12 +73,12 @@ GSNAV_HD SplatDepth<S> record_cast(const SplatDepth<T>& d) noexcept {
   return out;
 }
 
-/// Half-open pixel rectangle [x0, x1) x [y0, y1) that contains a footprint, clipped to the image.
+/// Half-open rectangle of pixels [x0, x1) x [y0, y1) that contains a footprint, clipped to the image.
 struct SplatBounds {
   std::int32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 };
 
-/// SplatBounds as whole numbers in floating point, for one splat or a pack of splats.
+/// SplatBounds as integers in floating point, for one splat or a pack of splats.
 template <class L>
 struct PixelBox {
   L x0{}, y0{}, x1{}, y1{};

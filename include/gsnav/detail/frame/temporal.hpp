@@ -9,32 +9,33 @@
 
 namespace gsnav {
 
-/// Planes of motion: velocity, acceleration and jerk, three components each.
+/// Number of planes of motion: velocity, acceleration and jerk, three components each.
 inline constexpr std::size_t kMotionPlanes = 9;
 
-/// N Gaussians that move and fade (4D Gaussians, as Habitat-GS draws them). Owns nothing.
+/// N Gaussians that move and fade over time (4D Gaussians, as in Habitat-GS). It owns nothing.
 ///
-/// At the time t, with dt = t - times[i]: the mean is base + v dt + a dt^2 / 2 + j dt^3 / 6, the opacity
-/// base * exp(-dt^2 / (2 (sigma^2 + 1e-8))); shapes, orientations and colours stay.
+/// At time t, with dt = t - times[i], the mean is base + v dt + a dt^2 / 2 + j dt^3 / 6. The opacity is
+/// base * exp(-dt^2 / (2 (sigma^2 + 1e-8))). Shapes, orientations and colours do not change.
 struct TemporalView {
   GaussianRows base;         ///< each Gaussian at its own time
-  View<const float> times;   ///< [N] seconds
-  View<const float> sigmas;  ///< [N] seconds, >= 0; infinity: always there
-  /// x, y, z of velocity (m/s), acceleration (m/s^2), jerk (m/s^3), [N] each; what is empty is zero.
-  /// Those of one kind are all there or all empty.
+  View<const float> times;   ///< [N], seconds
+  View<const float> sigmas;  ///< [N], seconds, >= 0; infinity: never fades
+  /// x, y, z of velocity (m/s), acceleration (m/s^2) and jerk (m/s^3), [N] each. Empty planes are zero.
+  /// The three planes of one quantity are either all present or all empty.
   View<const float> motion[kMotionPlanes];
 };
 
-/// How much of its opacity a Gaussian has `dt` seconds from its own time.
+/// Factor of the opacity `dt` seconds from the Gaussian's own time.
 template <class S>
 GSNAV_HD S temporal_weight(S dt, S sigma) noexcept {
-  // -log2(e) / 2. The limit keeps dt^2 finite in float: nothing is left of anything there.
+  // The constant is -log2(e) / 2. The limit keeps dt^2 finite in float; the factor is 0 there anyway.
   const S rate = static_cast<S>(-0.72134752044448170368);
   const S limited = clamp(dt, S(-1e15), S(1e15));
   return exp2(rate * (limited * limited / fma(sigma, sigma, S(1e-8))));
 }
 
-/// How far a Gaussian with this velocity, acceleration and jerk is from its base after `dt` seconds.
+/// Offset of a Gaussian from its base position after `dt` seconds, given its velocity, acceleration and
+/// jerk.
 template <class S>
 GSNAV_HD Vec3<S> temporal_offset(const Vec3<S>& velocity, const Vec3<S>& acceleration,
                                  const Vec3<S>& jerk, S dt) noexcept {
@@ -42,8 +43,8 @@ GSNAV_HD Vec3<S> temporal_offset(const Vec3<S>& velocity, const Vec3<S>& acceler
   return dt * fma(dt * S(0.5), inner, velocity);
 }
 
-/// Gaussian i at the time t: its offset from the base, metres, and its opacity, 0 where that is below
-/// 1/255. What is not drawn does not move.
+/// State of Gaussian i at time t: returns its offset from the base in metres, and its opacity. An
+/// opacity below 1/255 becomes 0, and the offset is then 0 as well.
 template <class S>
 GSNAV_HD Vec3<S> temporal_state(const TemporalView& in, std::size_t i, double t, S& opacity) noexcept {
   const S dt = static_cast<S>(t - static_cast<double>(in.times[i]));
@@ -60,7 +61,7 @@ GSNAV_HD Vec3<S> temporal_state(const TemporalView& in, std::size_t i, double t,
   return temporal_offset(of[0], of[1], of[2], dt);
 }
 
-/// Writes Gaussian i at a time: mean (offset from its origin) and opacity.
+/// Kernel that writes the mean (offset from its origin) and the opacity of Gaussian i at time t.
 template <class S>
 struct GaussianAt {
   TemporalView in;
@@ -78,7 +79,8 @@ struct GaussianAt {
   }
 };
 
-/// Bounds of chunk c of what GaussianAt wrote, of the Gaussians that are drawn.
+/// Kernel that computes the bounds of chunk c from the results of GaussianAt. Gaussians with opacity 0
+/// are ignored.
 struct BoundChunkAt {
   GaussianRows moment;
   View<ChunkBounds> bounds;
@@ -95,7 +97,8 @@ struct BoundChunkAt {
       for (int k = 0; k < 3; ++k) {
         const std::size_t axis = static_cast<std::size_t>(k);
         const double offset = static_cast<double>(rows.means[axis][i]), x = origin[k] + offset;
-        const double pad = 1e-6 * abs(offset);  // culling knows of offsets within the lattice only
+        // culling assumes offsets within the lattice; these may be larger
+        const double pad = 1e-6 * abs(offset);
         b.low[k] = first ? x - pad : min(b.low[k], x - pad);
         b.high[k] = first ? x + pad : max(b.high[k], x + pad);
         b.scale_max = max(b.scale_max, rows.scales[axis][i]);

@@ -13,23 +13,24 @@
 
 namespace gsnav {
 
-/// Columns and rows of tiles, the last ones included; of an `int`, or of whole numbers in a lane.
+/// Rectangle of tiles, inclusive at both ends. L is int, or a lane type that holds integers.
 template <class L>
 struct TileRange {
   L x0, y0, x1, y1;
 
-  /// Those that a box of pixels [x0, x1) x [y0, y1), not empty, lies in. `tile_of`: the tile of a pixel.
+  /// Tiles that contain the non-empty box of pixels [x0, x1) x [y0, y1). `tile_of` maps a pixel
+  /// coordinate to a tile.
   template <class Box, class F>
   GSNAV_HD static TileRange of(const Box& box, const F& tile_of) noexcept {
     const L one(1);
     return {tile_of(box.x0), tile_of(box.y0), tile_of(box.x1 - one), tile_of(box.y1 - one)};
   }
   GSNAV_HD mask_of<L> single() const noexcept { return x0 >= x1 && y0 >= y1; }
-  /// Whether it has more than `n` columns or rows.
+  /// True if it has more than `n` columns or rows.
   GSNAV_HD bool exceeds(int n) const noexcept { return x1 - x0 >= n || y1 - y0 >= n; }
 };
 
-/// How an image is cut into square tiles.
+/// Division of an image into square tiles.
 struct TileGrid {
   int width = 0, height = 0;  ///< image, pixels
   int tile_size = 16;
@@ -44,12 +45,12 @@ struct TileGrid {
   GSNAV_HD std::size_t count() const noexcept {
     return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
   }
-  /// The tile of a pixel of the image.
+  /// Index of the tile that contains a pixel.
   GSNAV_HD std::size_t tile_of(int x, int y) const noexcept {
     return static_cast<std::size_t>(y / tile_size) * static_cast<std::size_t>(columns) +
            static_cast<std::size_t>(x / tile_size);
   }
-  /// The tiles of a box of pixels that is not empty (SplatBounds, MeshTriangle).
+  /// Tiles that contain a non-empty box of pixels (SplatBounds, MeshTriangle).
   template <class Box>
   GSNAV_HD TileRange<int> tiles_of(const Box& box) const noexcept {
     const int shift = tile_shift();
@@ -58,16 +59,15 @@ struct TileGrid {
   bool operator==(const TileGrid&) const = default;
 };
 
-/// The cells of 4x4 pixels of an image that still take splats, as a summed-area table: what asks for
-/// them asks for rectangles.
+/// Cells of 4 x 4 pixels that still accept splats, as a summed-area table for queries of rectangles.
 struct OpenCells {
   static constexpr int kSize = 4;
   View<const std::uint32_t>
-      sums;                ///< [rows + 1][columns + 1]: open ones above and left of. Empty: all are open
+      sums;  ///< [rows + 1][columns + 1], number of open cells above and left. Empty: all are open.
   std::size_t stride = 0;  ///< columns + 1
 
   GSNAV_HD bool empty() const noexcept { return sums.empty(); }
-  /// Whether a cell of columns [x0, x1) in rows [y0, y1) is open.
+  /// True if some cell in columns [x0, x1) and rows [y0, y1) is open.
   GSNAV_HD bool any(std::size_t x0, std::size_t y0, std::size_t x1, std::size_t y1) const noexcept {
     const std::uint32_t* const top = sums.data + y0 * stride;
     const std::uint32_t* const bottom = sums.data + y1 * stride;
@@ -75,9 +75,9 @@ struct OpenCells {
   }
 };
 
-/// Calls f(row, first, last), columns inclusive, for each row of tiles, in order, of which a splat may
-/// touch some. `elliptic`: within its bounds the footprint is the ellipse of its geometry (not under
-/// perspective), so tiles may be left out.
+/// Calls f(row, first, last), columns inclusive, for each row of tiles that a splat may touch, in order.
+/// `elliptic` is true if the footprint is the ellipse of its geometry (not under perspective). Tiles of
+/// its bounds outside the ellipse are then skipped.
 template <class S, class F>
 GSNAV_HD void for_each_tile_row(const TileGrid& grid, const SplatGeometry<S>& g, const SplatBounds& b,
                                 S log2_alpha_min, bool elliptic, const F& f) noexcept {
@@ -101,7 +101,7 @@ GSNAV_HD void for_each_tile_row(const TileGrid& grid, const SplatGeometry<S>& g,
   }
 }
 
-/// Calls f(tile) for each tile of these, in row order.
+/// Calls f(tile) for each tile that a splat may touch, in row order. Arguments as above.
 template <class S, class F>
 GSNAV_HD void for_each_tile(const TileGrid& grid, const SplatGeometry<S>& g, const SplatBounds& b,
                             S log2_alpha_min, bool elliptic, const F& f) noexcept {
@@ -112,34 +112,35 @@ GSNAV_HD void for_each_tile(const TileGrid& grid, const SplatGeometry<S>& g, con
       });
 }
 
-/// The tiles of a splat that covers few: from `tile` on, columns [columns[r][0], columns[r][1]) of row
-/// r; none of rows that it does not have.
+/// Compact list of the tiles of a splat that covers few. `tile` is the top left one. Row r of tiles has
+/// the columns [columns[r][0], columns[r][1]), counted from it; unused rows are empty.
 struct TileSpans {
   static constexpr int kRows = 5, kColumns = 255;
-  static constexpr std::uint8_t kLarge = 255;  ///< in `rows`: not kept here
+  static constexpr std::uint8_t kLarge = 255;  ///< value of `rows` for a splat with too many tiles
   std::uint32_t tile;
   std::uint8_t rows;
   std::uint8_t columns[kRows][2];
 };
 
-/// Arguments of binning: `order` lists visible splats front to back.
+/// Arguments of binning.
 template <class S>
 struct BinArgs {
   TileGrid grid;
-  View<const std::uint32_t> order;
+  View<const std::uint32_t> order;  ///< visible splats, front to back
   View<const SplatGeometry<S>> geometry;
   View<const SplatBounds> bounds;
   S log2_alpha_min{};
   bool elliptic = true;              ///< footprints are ellipses (Response::ewa)
-  std::size_t blocks = 1;            ///< pieces that `order` is cut into
-  View<std::uint64_t> cursors;       ///< [blocks][tiles]: counts, then write positions
+  std::size_t blocks = 1;            ///< number of pieces that `order` is cut into
+  View<std::uint64_t> cursors;       ///< [blocks][tiles], counts, later write positions
   View<std::uint64_t> tile_offsets;  ///< [tiles + 1]
-  View<std::uint32_t> tile_splats;   ///< splats of all tiles, each tile's in order
-  View<TileSpans> spans;             ///< [slots], found by the projection of such backends; else empty
+  View<std::uint32_t> tile_splats;   ///< splats of all tiles; those of each tile in `order`
+  View<TileSpans> spans;  ///< [slots], filled by the projection of backends with bins_in_lanes; else
+                          ///< empty
 };
 
 namespace detail {
-/// `order` walks the records at random: asked for early, they are there when needed.
+/// Prefetches the records of a later splat, because `order` accesses them at random.
 template <class S>
 GSNAV_HD void prefetch_splat(const BinArgs<S>& args, std::size_t i) noexcept {
 #if !GSNAV_DEVICE_CODE && defined(__GNUC__)
@@ -155,7 +156,7 @@ GSNAV_HD void prefetch_splat(const BinArgs<S>& args, std::size_t i) noexcept {
 #endif
 }
 
-/// Calls f(tile, splat) for the tiles of each splat of one block, in order.
+/// Calls f(tile, splat) for the tiles of each splat in one block, in order.
 template <class S, class F>
 GSNAV_HD void for_each_intersection(const BinArgs<S>& args, std::size_t block, const F& f) noexcept {
   const BlockRange r = BlockRange::of(block, args.blocks, args.order.size);
@@ -168,24 +169,24 @@ GSNAV_HD void for_each_intersection(const BinArgs<S>& args, std::size_t block, c
 }
 }  // namespace detail
 
-/// Hides no splat: for frames without a mesh.
+/// Cull rule that hides no splat, for frames without a mesh.
 struct NoCull {
   GSNAV_HD bool hides(std::size_t, std::uint32_t) const noexcept { return false; }
 };
 
-/// Hides splats that lie behind a mesh.
+/// Cull rule that hides splats behind a mesh.
 template <class S>
 struct MeshCull {
   View<const SplatDepth<S>> depths;
-  View<const S> tile_far;  ///< farthest depth of the mesh per tile, metres (MeshLayer)
+  View<const S> tile_far;  ///< farthest depth of the mesh in each tile, metres (MeshLayer)
 
-  /// Whether every pixel of a tile would skip the splat.
+  /// True if the splat is behind the mesh at every pixel of a tile.
   GSNAV_HD bool hides(std::size_t tile, std::uint32_t splat) const noexcept {
     return behind(depths[splat], tile_far[tile]);
   }
 };
 
-/// Counts the splats of each tile for one block of `order`, less those that `cull` hides.
+/// Kernel that counts the splats of each tile for one block of `order`, without those that `cull` hides.
 template <class S, class Cull = NoCull>
 struct CountTileIntersections {
   BinArgs<S> args;
@@ -200,7 +201,7 @@ struct CountTileIntersections {
   }
 };
 
-/// Turns counts into write positions (block-major within each tile) and tile offsets.
+/// Kernel that converts counts to write positions (block-major within each tile) and tile offsets.
 template <class S>
 struct ScanTileIntersections {
   BinArgs<S> args;
@@ -220,7 +221,8 @@ struct ScanTileIntersections {
   }
 };
 
-/// Writes the splats of one block into their tiles, less those that `cull` hides. Keeps their order.
+/// Kernel that writes the splats of one block to the lists of their tiles, without those that `cull`
+/// hides. Keeps their order.
 template <class S, class Cull = NoCull>
 struct ScatterTileIntersections {
   BinArgs<S> args;

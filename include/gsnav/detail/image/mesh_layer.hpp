@@ -5,32 +5,34 @@
 
 #include "gsnav/core/view.hpp"
 
-// Images of meshes as the blending of Gaussians reads them.
+// Images of meshes, in the form in which the blending of Gaussians reads them.
 
 namespace gsnav {
 
-/// A surface that is seen through, at one pixel.
+/// A see-through surface at one pixel.
 template <class S>
 struct MeshFragment {
-  S depth, alpha;  ///< planar z, metres; alpha in (0, 1]
-  S r, g, b;       ///< display-referred, or linear where the frame is blended so; not times alpha
+  S depth, alpha;  ///< Planar z in metres; alpha in (0, 1].
+  S r, g, b;       ///< Colour in the frame's blend space, not multiplied by alpha.
 };
 
-/// The fragments of a pixel, nearest first.
+/// Fragments of one pixel, nearest first: [begin, begin + count) of MeshLayer::fragments.
 struct FragmentRange {
   std::uint64_t begin = 0;
   std::uint32_t count = 0;
 };
 
-/// What a mesh leaves of a frame for the Gaussians: planes [H][W] in a backend's memory.
+/// Depth, colour and see-through surfaces of the meshes in a frame. Planes of shape [H][W] in a
+/// backend's memory.
 template <class S>
 struct MeshLayer {
   const S* depth =
-      nullptr;  ///< planar z, metres; infinity where there is no mesh. Null: the frame has none
-  const S* color = nullptr;                 ///< [H][W][3] display-referred; null: no colour asked for
-  View<const S> tile_far;                   ///< [tiles], the largest depth of each
-  View<const FragmentRange> ranges{};       ///< [H][W]; empty: nothing is seen through
-  View<const MeshFragment<S>> fragments{};  ///< none behind `depth`
+      nullptr;  ///< Planar z in metres, infinity where there is no mesh. Null: the frame has no meshes.
+  const S* color = nullptr;  ///< [H][W][3] in the frame's blend space. Null: colour is not requested.
+  View<const S> tile_far;    ///< [tiles], largest depth of each tile
+  View<const FragmentRange> ranges{};       ///< [H][W], fragments of each pixel. Empty: no see-through
+                                            ///< surfaces.
+  View<const MeshFragment<S>> fragments{};  ///< fragments of all pixels, none behind `depth`
 
   GSNAV_HD bool empty() const noexcept { return depth == nullptr; }
 };

@@ -10,10 +10,12 @@
 
 namespace gsnav {
 
-/// Largest image side; tile counts and pixel offsets stay well inside their types.
+/// Largest width or height of an image, in pixels. It keeps tile counts and pixel offsets well inside
+/// their types.
 inline constexpr int kMaxImageSide = 16384;
 
-/// Names the field that cannot be, or ok.
+/// Checks all fields of a camera.
+/// @return invalid_argument naming the field, its value and the rule.
 inline Status validate(const Camera& c) {
   const BadArgument bad{"Camera."};
   if (c.width < 1 || c.width > kMaxImageSide) return bad("width", c.width, "must be in [1, 16384]");

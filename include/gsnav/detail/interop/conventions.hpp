@@ -9,13 +9,13 @@
 #include "gsnav/image/camera.hpp"
 #include "gsnav/math/similarity.hpp"
 
-// What the interop headers share: layouts they rely on, camera axes, taking a matrix apart.
+// Shared parts of the interop headers: memory layouts, camera axes, decomposition of matrices.
 
 namespace gsnav::interop {
 
 namespace detail {
-/// True where an array of T is S S S ... without gaps, so that other libraries' matrices can lie over
-/// it.
+/// True if T consists of N values of type S without gaps, so that matrices of other libraries can be
+/// mapped onto it.
 template <class T, class S, int N>
 inline constexpr bool is_packed =
     sizeof(T) == N * sizeof(S) &&
@@ -27,11 +27,11 @@ static_assert(is_packed<Quatf, float, 4> && is_packed<Quatd, double, 4>);
 
 /// Axes of a camera's own frame.
 enum class CameraAxes {
-  opencv,  ///< x right, y down, z forward: gsnav's
+  opencv,  ///< x right, y down, z forward: gsnav's axes
   opengl,  ///< x right, y up, -z forward: OpenGL, glm::lookAt, Habitat
 };
 
-/// World-to-camera map with OpenCV axes from one with the given axes, or the other way: turning a camera
+/// Converts a world-to-camera map from the given camera axes to OpenCV axes, or back. Turning a camera
 /// half round its x axis is its own inverse.
 template <class S>
 Affine3<S> view_with_axes(const Affine3<S>& view, CameraAxes axes) noexcept {
@@ -41,8 +41,9 @@ Affine3<S> view_with_axes(const Affine3<S>& view, CameraAxes axes) noexcept {
   return {{{m.row[0], -m.row[1], -m.row[2]}}, {t.x, -t.y, -t.z}};
 }
 
-/// The similarity that an affine map is. Errors (invalid_argument): the map is not finite, mirrors, or
-/// scales or shears by more than `tolerance` relative, which Gaussians cannot follow.
+/// Decomposes an affine map into a similarity.
+/// @return invalid_argument if the map is not finite, mirrors, or shears or scales unevenly by more than
+///   `tolerance` (relative).
 inline Result<Similarity> similarity_from(const Affine3<double>& a, double tolerance = 1e-4) {
   const BadArgument bad{"not a similarity: the map "};
   const double volume = determinant(a.linear);
@@ -60,7 +61,7 @@ inline Result<Similarity> similarity_from(const Affine3<double>& a, double toler
   return Similarity{quat_from_matrix(rotation), a.translation, scale};
 }
 
-/// The affine map that a similarity is.
+/// Affine map of a similarity.
 inline Affine3<double> affine_from(const Similarity& s) noexcept {
   return {rotation_matrix(s.rotation) * s.scale, s.translation};
 }

@@ -13,7 +13,8 @@ inline namespace GSNAV_LANES_TAG {
 
 namespace detail {
 
-/// Calls small(splat, spans) or large(splat) for each splat of a block of `order`.
+/// Calls small(splat, spans) for each splat of a block of `order` whose tiles are in its TileSpans, and
+/// large(splat) for the others.
 template <class Small, class Large>
 GSNAV_HD void for_each_splat(const BinArgs<float>& args, std::size_t block, const Small& small,
                              const Large& large) noexcept {
@@ -31,7 +32,7 @@ GSNAV_HD void for_each_splat(const BinArgs<float>& args, std::size_t block, cons
   }
 }
 
-/// Calls f(tile, splat) for the tiles of each splat of a block, less those that `cull` hides.
+/// Calls f(tile, splat) for the tiles of each splat of a block, without those that `cull` hides.
 template <class Cull, class F>
 GSNAV_HD void for_each_intersection(const BinArgs<float>& args, const Cull& cull, std::size_t block,
                                     const F& f) noexcept {
@@ -55,14 +56,15 @@ GSNAV_HD void for_each_intersection(const BinArgs<float>& args, const Cull& cull
 
 }  // namespace detail
 
-/// CountTileIntersections with the tiles that the projection found (BinArgs::spans). Notes where each
-/// row of tiles begins and ends and sums up at the end, so that long rows cost no more than short ones.
+/// CountTileIntersections with the tiles that the projection found (BinArgs::spans). It records only
+/// where each row of tiles starts and ends, then computes prefix sums. Long rows therefore cost no more
+/// than short ones.
 inline void count_tiles(const CountTileIntersections<float>& kernel, std::size_t block) noexcept {
   const BinArgs<float>& args = kernel.args;
   const std::size_t tiles = args.grid.count(), columns = static_cast<std::size_t>(args.grid.columns);
   std::uint64_t* change = args.cursors.data + block * tiles;
   for (std::size_t t = 0; t < tiles; ++t) change[t] = 0;
-  std::uint64_t beyond = 0;  // what would be noted behind the last tile
+  std::uint64_t beyond = 0;  // receives the ends beyond the last tile
   const auto note = [=, &beyond](std::size_t begin, std::size_t end) noexcept {
     ++change[begin];
     --*(end < tiles ? change + end : &beyond);
@@ -70,7 +72,7 @@ inline void count_tiles(const CountTileIntersections<float>& kernel, std::size_t
   detail::for_each_splat(
       args, block,
       [=](std::uint32_t, const TileSpans& s) noexcept {
-        // Most have one row or two; an absent second row is a run of none.
+        // Most splats have one row or two. A missing second row is an empty run.
         const std::size_t second = s.tile + (s.rows > 1 ? columns : 0);
         note(s.tile + s.columns[0][0], s.tile + s.columns[0][1]);
         note(second + s.columns[1][0], second + s.columns[1][1]);
@@ -86,7 +88,8 @@ inline void count_tiles(const CountTileIntersections<float>& kernel, std::size_t
   std::uint64_t count = 0;
   for (std::size_t t = 0; t < tiles; ++t) change[t] = count += change[t];
 }
-/// Counts tile by tile, since a mesh hides splats in some of their tiles.
+/// CountTileIntersections for frames with a mesh. Counts tile by tile, because the mesh hides a splat in
+/// only some of its tiles.
 inline void count_tiles_before_mesh(const CountTileIntersections<float, MeshCull<float>>& kernel,
                                     std::size_t block) noexcept {
   const BinArgs<float>& args = kernel.args;

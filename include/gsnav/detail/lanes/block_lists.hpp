@@ -10,26 +10,26 @@
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
-/// Pixels side by side form a small block: small Gaussians waste few lanes on it.
+/// Width of a block in pixels. Blocks are nearly square, so that small Gaussians leave few lanes unused.
 inline constexpr int kBlockWidth = kWidth >= 8 ? 4 : 2;
 inline constexpr int kBlockHeight = kWidth / kBlockWidth;
 inline constexpr int kMaxTile = 32;
 inline constexpr int kMaxBlocks = kMaxTile * kMaxTile / kWidth;
-/// Splats whose blocks are found before any of them is blended; a multiple of kWidth.
+/// Number of splats whose blocks are found before any of them is blended. A multiple of kWidth.
 inline constexpr int kBatch = 128;
 
-/// The splats that each block of a tile meets, of one batch.
+/// For each block of a tile, the splats of one batch that reach it.
 struct BlockLists {
-  std::uint8_t splats[kMaxBlocks][kBatch + kWidth];  // whole packs are written
+  std::uint8_t splats[kMaxBlocks][kBatch + kWidth];  // whole packs are written, beyond the end too
   int counts[kMaxBlocks];
 };
 
-/// Lists the n splats of a batch in the blocks of an image's tile at (tile_x, tile_y) that their
-/// ellipses reach and that are open. The batch is read in whole packs.
+/// Lists the n splats of a batch in the open blocks that their ellipses reach. The tile has its top left
+/// pixel at (tile_x, tile_y). The batch is read in whole packs.
 inline void list_blocks(const SplatGeometry<float>* batch, int n, float log2_alpha_min, int tile_x,
                         int tile_y, int tile_size, const bool* open, BlockLists& lists) noexcept {
   static_assert(sizeof(SplatGeometry<float>) == 8 * sizeof(float));
-  // Between which first columns of a block each splat reaches it, by rows of blocks.
+  // For each row of blocks: range of the first columns of the blocks that a splat reaches.
   alignas(64) float first[kMaxTile / kBlockHeight][kBatch], last[kMaxTile / kBlockHeight][kBatch];
   const float size = static_cast<float>(tile_size - 1);
   const F x0(static_cast<float>(tile_x) + 0.5f), y0(static_cast<float>(tile_y) + 0.5f);

@@ -7,19 +7,21 @@
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
-/// kWidth capsules; `read(plane)` has one plane's values of them.
+/// Reads kWidth capsules. `read(plane)` returns their values of one plane.
 template <class Read>
 GSNAV_HD Capsule<F> read_capsules(const CapsulePlanes<float>& c, const Read& read) noexcept {
   return {{read(c.p0[0]), read(c.p0[1]), read(c.p0[2])},
           {read(c.p1[0]), read(c.p1[1]), read(c.p1[2])},
           read(c.radius)};
 }
+/// Reads kWidth moving capsules.
 template <class Read>
 GSNAV_HD MovingCapsule<F> read_capsules(const MovingCapsulePlanes<float>& c, const Read& read) noexcept {
   return {read_capsules(c.begin, read), read_capsules(c.end, read)};
 }
 
-/// Gaps of whole packs; without points apart, for nothing to be kept that only they need.
+/// Computes the gaps of whole packs of pairs. Without points it is a separate function, so that no
+/// register holds what only they need.
 template <bool Points>
 GSNAV_HD void gap_packs(const CapsuleGapArgs<float>& args, std::size_t begin, std::size_t end) noexcept {
   for (std::size_t i = begin; i < end; i += kWidth) {
@@ -36,7 +38,8 @@ GSNAV_HD void gap_packs(const CapsuleGapArgs<float>& args, std::size_t begin, st
   }
 }
 
-/// GapOfPair<float> for the pairs [begin, end), kWidth side by side; the same bits.
+/// Computes GapOfPair<float> for the pairs [begin, end), kWidth at a time. The bits equal those of the
+/// scalar kernel.
 inline void gap_range(const CapsuleGapArgs<float>& args, std::size_t begin, std::size_t end) noexcept {
   const std::size_t packs = begin + (end - begin) / kWidth * kWidth;
   if (args.asks_for_points()) {
@@ -57,7 +60,8 @@ GSNAV_HD std::uint8_t sweep_outcome(std::uint32_t hit, std::uint32_t pushed, std
                                    bit(closing, kSweepAgentClosing));
 }
 
-/// Writes the lanes of `r`, lane l as pair row(l); `write(plane, values)` does so for one plane.
+/// Writes the first `lanes` lanes of `r`, lane l as pair row(l). `write(plane, values)` writes one
+/// plane.
 template <class Row, class Write>
 GSNAV_HD void write_sweeps(const SweepArgs<float>& args, const SweepResult<F>& r, int lanes,
                            const Row& row, const Write& write) noexcept {
@@ -80,13 +84,14 @@ GSNAV_HD void write_sweeps(const SweepArgs<float>& args, const SweepResult<F>& r
   }
 }
 
-/// Pairs that go together at most.
+/// Largest number of pairs per call of sweep_range.
 inline constexpr std::size_t kSweepRange = 1024;
 
-/// SweepPair<float> for the pairs [begin, end), at most kSweepRange; the same bits.
+/// Computes SweepPair<float> for the pairs [begin, end), at most kSweepRange, kWidth at a time. The bits
+/// equal those of the scalar kernel.
 ///
-/// Most pairs move apart or pass: one evaluation says so. Those that need more are put together
-/// afterwards, so that packs do not wait for one of their lanes.
+/// Most pairs move apart or pass each other and need only one evaluation. The others are collected and
+/// finished together, so that a pack does not wait for a single lane.
 inline void sweep_range(const SweepArgs<float>& args, std::size_t begin, std::size_t end) noexcept {
   std::uint32_t open[kSweepRange + kWidth];
   std::size_t count = 0;
@@ -109,7 +114,7 @@ inline void sweep_range(const SweepArgs<float>& args, std::size_t begin, std::si
     const std::size_t lanes = count - first < kWidth ? count - first : kWidth;
     const std::uint32_t* const rows = open + first;
     for (std::size_t l = lanes; l < kWidth; ++l)
-      open[first + l] = open[first];  // computed and not written
+      open[first + l] = open[first];  // computed, but not written
     const auto read = [rows](const View<const float>& plane) noexcept {
       float v[kWidth];
       for (std::size_t l = 0; l < kWidth; ++l) v[l] = plane[rows[l]];

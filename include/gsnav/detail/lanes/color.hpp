@@ -12,16 +12,15 @@
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
-/// The Gaussians of a chunk that are seen, in row order: row and mean - camera, asset frame.
+/// Visible Gaussians of one chunk, in row order: row, and mean - camera in the asset frame.
 struct Survivors {
   static constexpr std::size_t kRoom = kProjectChunk + static_cast<std::size_t>(kWidth);
   std::uint32_t rows[kRoom];
-  std::uint32_t delta[3][kRoom];  ///< bits of floats
+  std::uint32_t delta[3][kRoom];  ///< bit patterns of floats
 };
 
-/// gaussian_color of kWidth Gaussians of one chunk side by side, the same bits: lane l is row rows[l].
-/// The coefficients lie row by row; each group of 8 columns is transposed into lanes on its way to the
-/// registers.
+/// Colours of kWidth Gaussians of one chunk, with the bits of gaussian_color. Lane l is row rows[l].
+/// Coefficients are stored by rows; groups of 8 columns are transposed into lanes as they are loaded.
 GSNAV_HD SplatColor<F> gaussian_colors(const ColorRows& sh, int degree, const std::uint32_t* rows,
                                        Vec3<F> delta) noexcept {
   constexpr int kGroup = 8;
@@ -36,7 +35,7 @@ GSNAV_HD SplatColor<F> gaussian_colors(const ColorRows& sh, int degree, const st
       delta = rotate(conjugate(turned), delta);
     }
   }
-  // Bare vectors: they need no value before they get theirs.
+  // Plain vectors, because packs would be initialised first.
   typename F::vector c[3 * sh_coefficient_count(kMaxShDegree)];
   const float* at[kWidth];
   float widened[kWidth][kGroup];
@@ -56,7 +55,7 @@ GSNAV_HD SplatColor<F> gaussian_colors(const ColorRows& sh, int degree, const st
   const bool bytes = packed && !sh.shN_codes.empty();
   for (int first = 0; first < columns; first += kGroup) {
     const int from = first + kGroup <= columns ? first : columns - kGroup;
-    if (bytes) {  // all rows are of one chunk
+    if (bytes) {  // all rows belong to the same chunk
       float steps[kGroup];
       const PackedChunk& chunk = sh.chunks[rows[0] / kProjectChunk];
       for (int k = 0; k < kGroup; ++k) steps[k] = chunk.sh_steps[packed_band(1 + (from + k) / 3)];
@@ -84,7 +83,7 @@ GSNAV_HD SplatColor<F> gaussian_colors(const ColorRows& sh, int degree, const st
   return {color.x, color.y, color.z, F(0.0f)};
 }
 
-/// Asks for the coefficients of rows [first, first + kWidth), which color_survivors will read.
+/// Prefetches the coefficients of rows [first, first + kWidth), which color_survivors will read.
 GSNAV_HD void prefetch_colors(const ColorRows& sh, std::size_t size, int degree,
                               std::size_t first) noexcept {
   constexpr std::size_t kLine = 64;
@@ -102,9 +101,9 @@ GSNAV_HD void prefetch_colors(const ColorRows& sh, std::size_t size, int degree,
     __builtin_prefetch(static_cast<const char*>(data) + i, 0, 2);
 }
 
-/// Colours of the `count` survivors of a chunk, to out[0] on. They are read when all of the chunk's
-/// geometry has been written: coefficients are most of what a frame reads, and come fastest as one
-/// stream.
+/// Writes the colours of the `count` survivors of a chunk to out[0], out[1], ... This runs after all
+/// geometry of the chunk has been written. Coefficients are most of the data that a frame reads, and a
+/// single stream reads them fastest.
 GSNAV_STAGE void color_survivors(const ColorRows& sh, int degree, Survivors& s, std::size_t count,
                                  SplatColor<float>* out) noexcept {
   constexpr std::size_t step = static_cast<std::size_t>(kWidth);

@@ -3,9 +3,9 @@
 
 #include "gsnav/detail/math/pack_layout.hpp"
 
-// Code over lanes is compiled once per instruction set and chosen at run time, so every function of it
-// lives in a namespace named after the set: no linker can mix two of them up. Header-only use has names
-// of its own, so that it can be linked with the compiled component.
+// SIMD code is compiled once per instruction set and selected at run time. All its functions are in a
+// namespace named after the set, so that a linker cannot mix them up. Header-only use has other names,
+// so that it can be linked together with the compiled component.
 #if defined(GSNAV_OPENMP_HEADER_ONLY)
 #define GSNAV_LANES_NAMESPACE(set) header_only_##set
 #else
@@ -21,8 +21,8 @@
 #define GSNAV_LANES_TAG GSNAV_LANES_NAMESPACE(baseline)
 #endif
 
-/// A stage of a kernel over lanes. It is called, not inlined: a compiler that sees several stages as one
-/// function spills the registers of each. What a stage calls is inlined (GSNAV_HD).
+/// Marks a stage of a SIMD kernel, which is called and not inlined. A compiler that sees several stages
+/// as one function spills their registers. Functions that a stage calls are inlined (GSNAV_HD).
 #define GSNAV_STAGE [[gnu::noinline]] inline
 
 namespace gsnav::lanes {

@@ -11,21 +11,20 @@
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
-/// Blends one tile in the variant that `args` asks for.
+/// Blends one tile with the variant of TileBlender that `args` needs.
 inline void rasterize_tile_any(const RasterArgs<float>& args, std::size_t tile) noexcept {
   dispatch_raster(
       args, [&]<bool C, DepthMode D, Exp2 M, bool G>() { TileBlender<C, D, M, G>(args, tile).blend(); });
 }
 
-/// The same of frames with a mesh.
+/// Blends one tile of a frame with a mesh.
 inline void composite_tile_any(const RasterArgs<float>& args, std::size_t tile) noexcept {
   dispatch_composite(args, [&]<bool C, DepthMode D, bool G>() {
     TileBlender<C, D, Exp2::degree5, G, true>(args, tile).blend();
   });
 }
 
-/// The kernels of this instruction set as a backend's table of pointers (LaneKernels of
-/// backends/openmp.hpp).
+/// Table of this instruction set's kernels (LaneKernels of backends/openmp.hpp).
 template <class Table>
 constexpr Table kernel_table(const char* name) noexcept {
   return {.name = name,

@@ -6,8 +6,8 @@
 #include "gsnav/detail/lanes/isa.hpp"
 #include "gsnav/detail/mesh/mesh_shade.hpp"
 
-// The kernels of meshes as each instruction set compiles them: their loops over pixels are for its
-// lanes, and fma is an instruction.
+// Kernels of meshes, compiled for each instruction set, so that their loops over pixels use its lanes
+// and fma is one instruction.
 
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {

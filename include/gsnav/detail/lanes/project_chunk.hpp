@@ -9,13 +9,13 @@
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
-/// kWidth rows of a set from row i on, as SetRows reads them. The last pack of a set has `count` rows
-/// and repeats the last: the caller masks those lanes.
+/// kWidth rows of a set from row i on, as SetRows needs them. The last pack of a set has only `count`
+/// rows and repeats the last one; callers mask those lanes.
 struct PackOfRows {
   using lane = F;
   static constexpr std::size_t kStep = static_cast<std::size_t>(kWidth);
   const ShapeRows& shape;
-  const PackedChunk* packed;  ///< null where shapes are floats
+  const PackedChunk* packed;  ///< null if shapes are floats
   std::size_t i, count;
 
   GSNAV_HD const PackedChunk* chunk() const noexcept { return packed; }
@@ -50,13 +50,13 @@ struct PackOfRows {
   }
 };
 
-/// The chunk by rules that are not worth lanes of their own.
+/// Projects a chunk with the serial kernel, for rules that have no SIMD form.
 GSNAV_STAGE void project_chunk_alone(const ViewedSet<float>& args, const ProjectOutputs<float>& out,
                                      std::size_t c) noexcept {
   ProjectChunk<float>{args, out}(c);
 }
 
-/// ProjectChunk<float> with kWidth Gaussians side by side; the same bits.
+/// Computes ProjectChunk<float>, kWidth Gaussians at a time. The bits equal those of the scalar kernel.
 inline void project_chunk(const ViewedSet<float>& args, const ProjectOutputs<float>& out,
                           std::size_t c) noexcept {
   const ShapeRows& shape = args.gaussians.shape;

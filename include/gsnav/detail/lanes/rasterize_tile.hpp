@@ -13,32 +13,36 @@
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
-/// Blends one tile, in batches of splats. For each batch it finds the blocks of pixels that an ellipse
-/// reaches, kWidth splats at a time, and computes the part of the exponents that a column of pixels
-/// shares once a tile. Then it blends each block's list with the block's state in registers. A closed
-/// block takes no more splats, and the tile ends when all blocks are closed. Per pixel, order and
-/// arithmetic are those of RasterizePixel (with `Mesh`: of CompositePixel), and so are the bits.
+/// Blends one tile, in batches of splats.
+///
+/// For each batch it finds the blocks of pixels that each ellipse reaches, kWidth splats at a time. The
+/// part of the exponents that pixels in a column share is computed once per tile. Then it blends the
+/// list of each block, with the block's state in registers. A closed block takes no more splats; the
+/// tile ends when all blocks are closed.
+///
+/// Per pixel, order and arithmetic equal those of RasterizePixel (of CompositePixel with `Mesh`), and so
+/// do the bits.
 template <bool Color, DepthMode D, Exp2 M, bool General, bool Mesh = false>
 class TileBlender {
   static constexpr DepthMode kLoop = TilePixels<Color, D, Mesh>::kLoop;
   static constexpr bool kNeedsId = D != DepthMode::none || General || Mesh;
 
-  /// What blending reads of a splat beside its column terms.
+  /// Values of a splat that blending reads, besides its column terms.
   struct Row {
     float ref_y, b;
     SplatColor<float> color;
-    float number;  ///< in the batch
-    float far;     ///< with a mesh: none of its depths is beyond
+    float number;  ///< index in the batch
+    float far;     ///< with a mesh: its farthest depth
   };
-  /// ColumnTerms in the columns of half a tile of kMaxTile, or of a whole smaller tile.
+  /// ColumnTerms for 16 columns of pixels: half the width of the largest tile, or a whole smaller tile.
   static constexpr int kColumns = 16;
   struct alignas(64) Columns {
     float column[kColumns], w2[kColumns];
   };
   static constexpr int kParts = kMaxTile / kColumns;
-  /// Splats of a list whose alphas are computed side by side.
+  /// Number of splats of a list whose alphas are computed together.
   static constexpr int kGroup = 4;
-  /// Number of a splat that covers no pixel. It fills the last group.
+  /// Index of a splat that covers no pixel. It fills the last group of a list.
   static constexpr int kNothing = kBatch, kStride = kBatch + 1;
 
  public:
@@ -79,10 +83,10 @@ class TileBlender {
   }
 
  private:
-  /// Reads the n splats from `first` on in the tile's list, and lists them by blocks.
+  /// Reads n splats of the tile's list, from `first` on, and lists them by blocks.
   void load_batch(std::uint64_t first, int n) noexcept {
     const std::uint32_t* ids = args_.tile_splats.data + first;
-    // Records lie in the file's order, not in the tile's.
+    // Records are in the order of slots, not of the tile, so prefetch them.
     constexpr std::uint64_t kAhead = 16;
     const std::uint64_t left = args_.tile_splats.size - first;
     for (int j = 0; j < n; ++j) {
@@ -99,8 +103,8 @@ class TileBlender {
       if constexpr (kNeedsId) ids_[j] = ids[j];
       if constexpr (Mesh) rows_[j].far = farthest_depth(args_.depths[ids[j]]);
     }
-    if constexpr (kNeedsId) ids_[kNothing] = ids[0];  // any depth will do
-    if (General && !args_.perspectives.empty()) {     // footprints are no ellipses: every open block
+    if constexpr (kNeedsId) ids_[kNothing] = ids[0];  // unused, but must be a valid index
+    if (General && !args_.perspectives.empty()) {  // footprints are not ellipses: use every open block
       pixels_.for_each_block([&](int block, int, int) {
         lists_.counts[block] = pixels_.open[block] ? n : 0;
         for (int j = 0; j < lists_.counts[block]; ++j)
@@ -108,7 +112,7 @@ class TileBlender {
       });
       return;
     }
-    for (int j = n; j % kWidth != 0; ++j) geometry_[j] = {};  // lanes that are left out
+    for (int j = n; j % kWidth != 0; ++j) geometry_[j] = {};  // lanes beyond n
     list_blocks(&geometry_[0], n, args_.rules.log2_alpha_min, pixels_.left, pixels_.top, pixels_.size,
                 pixels_.open, lists_);
     if constexpr (General) return;
@@ -128,7 +132,8 @@ class TileBlender {
     }
   }
 
-  /// Blends the list of one block. `Near`: transmittance is above 1/2 at some pixel.
+  /// Blends the list of one block. With `Near`, transmittance is above 1/2 at some pixel, so the median
+  /// may be found here.
   template <bool Near>
   void blend_list(int block, int x, int y) noexcept {
     const F px = pixels_.pixel_x(x), py = pixels_.pixel_y(y);
@@ -136,7 +141,7 @@ class TileBlender {
     const Row* const rows = &rows_[0];
     BlendState<F, kLoop> state = pixels_.states[block];
     [[maybe_unused]] const F before = state.transmittance;
-    [[maybe_unused]] F last(0.0f);  // the last splat met with transmittance above 1/2
+    [[maybe_unused]] F last(0.0f);  // last splat met with transmittance above 1/2
     std::uint8_t* const list = lists_.splats[block];
     const int n = lists_.counts[block];
     const auto blend = [&](int j, F alpha) {
@@ -185,7 +190,7 @@ class TileBlender {
     }
     pixels_.states[block] = state;
     if constexpr (Near) {
-      // Other pixels were closed earlier, or their median comes later.
+      // Other pixels passed 1/2 earlier, or will pass it later.
       const auto crossed = falls_through(before, abs(state.transmittance), kMedianLevel<float>);
       F& median = pixels_.medians[block];
       for (std::uint32_t lanes = lane_bits(crossed); lanes != 0;) {

@@ -7,11 +7,11 @@
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
-// One Gaussian's matrix is blended element beside element, as its joints lie in memory: twelve floats,
-// linear part by rows, then translation. The matrices of a pack are then put side by side, in registers.
+// The joint matrix of one Gaussian is blended as it lies in memory: twelve floats, the linear part by
+// rows, then the translation. The matrices of a pack are then transposed in registers.
 static_assert(sizeof(Affine3<float>) == 12 * sizeof(float));
 
-/// One Gaussian's blended matrix, and what blend_influences needs of it.
+/// Blended joint matrix of one Gaussian, with the functions that blend_influences needs.
 struct BlendedRow {
 #if GSNAV_PACK_WIDTH >= 8
   using Weight = Pack<float, 8>;
@@ -57,7 +57,8 @@ GSNAV_HD BlendedRow blend_row(const float* joints, const std::uint16_t* indices,
       [&](int k) GSNAV_INLINED { return BlendedRow::Weight(weights[k]); });
 }
 
-/// The three parts of the rows of every fourth Gaussian, each in a 128-bit part of its pack.
+/// Blended matrices of every fourth Gaussian of a pack. Each 128-bit part of `parts[i]` holds four
+/// elements of one matrix.
 struct BlendedRows {
   F::vector parts[3];
 };
@@ -90,7 +91,7 @@ GSNAV_HD BlendedRows blend_every_fourth(const float* joints, const std::uint16_t
 #endif
 }
 
-/// Transposes the 4x4 blocks in the 128-bit parts of four packs.
+/// Transposes the 4 x 4 blocks in the 128-bit parts of four packs.
 struct Columns {
   F c[4];
 
@@ -118,7 +119,7 @@ struct Columns {
   }
 };
 
-/// Blended matrices of the kWidth Gaussians from `first` on.
+/// Blended joint matrices of the kWidth Gaussians from `first` on.
 template <int K>
 GSNAV_HD Affine3<F> blend_joints(const SkinningArgs<float>& args, std::size_t first) noexcept {
   constexpr int step = K * kWidth;
@@ -138,8 +139,8 @@ GSNAV_HD Affine3<F> blend_joints(const SkinningArgs<float>& args, std::size_t fi
           {m2.c[1], m2.c[2], m2.c[3]}};
 }
 
-/// Linear parts of the joints of the greatest weights of the pack that begins at `first`. Rarely called,
-/// and apart, for its loads to take no registers from skin_packs.
+/// Linear parts of the joints with the greatest weights, for the pack that begins at `first`. Rarely
+/// called, and not inlined, so that its loads take no registers from skin_packs.
 template <int K>
 [[gnu::noinline, gnu::cold]] Mat3<F> greatest_joints(const SkinningArgs<float>& args,
                                                      std::size_t first) noexcept {
@@ -155,7 +156,8 @@ template <int K>
   return out;
 }
 
-/// SkinGaussian<float> for the Gaussians [begin, end), whole packs; the same bits.
+/// Computes SkinGaussian<float> for the Gaussians [begin, end) in whole packs. The bits equal those of
+/// the scalar kernel.
 template <int K>
 GSNAV_HD void skin_packs(const SkinningArgs<float>& args, std::size_t begin, std::size_t end) noexcept {
   for (std::size_t first = begin; first < end; first += kWidth) {
@@ -177,7 +179,8 @@ GSNAV_HD void skin_packs(const SkinningArgs<float>& args, std::size_t begin, std
   }
 }
 
-/// SkinGaussian<float> for the Gaussians [begin, end), kWidth side by side; the same bits.
+/// Computes SkinGaussian<float> for the Gaussians [begin, end), kWidth at a time. The bits equal those
+/// of the scalar kernel.
 inline void skin_range(const SkinningArgs<float>& args, std::size_t begin, std::size_t end) noexcept {
   const std::size_t packs = begin + (end - begin) / kWidth * kWidth;
   if (args.influences == kInfluences8) {

@@ -14,7 +14,8 @@
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
-/// An array without initial values: a tile sets few of those that the largest tile needs.
+/// Array without initialisation. A tile uses only part of the space for the largest tile, so
+/// initialising it all would cost time.
 template <class T, int N>
 class Unset {
   static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
@@ -27,13 +28,13 @@ class Unset {
   alignas(T) std::byte bytes_[sizeof(T) * static_cast<std::size_t>(N)];
 };
 
-/// The pixels of one tile and the state of their blending, in blocks with a pixel a lane. `Mesh`: the
+/// Pixels of one tile and their blending state, in blocks with one pixel per lane. `Mesh` is true if the
 /// frame has meshes.
 template <bool Color, DepthMode D, bool Mesh>
 class TilePixels {
  public:
-  /// Depths that are blended. The median is found after a list has been blended, from the number of its
-  /// splat.
+  /// Depths that the loop over splats computes. The median is computed after a list has been blended,
+  /// from the index of its splat.
   static constexpr DepthMode kLoop = D == DepthMode::median ? DepthMode::none : D;
 
   TilePixels(const RasterArgs<float>& args, std::size_t tile) noexcept
@@ -51,7 +52,7 @@ class TilePixels {
     lane_y_ = F::load(y);
   }
 
-  /// Calls f(block, x, y) with the place of each block in the tile.
+  /// Calls f(block, x, y) with the position of each block in the tile, in pixels.
   template <class Func>
   void for_each_block(const Func& f) const noexcept {
     for (int y = 0, block = 0; y < size; y += kBlockHeight) {
@@ -61,12 +62,12 @@ class TilePixels {
   F pixel_x(int x) const noexcept { return lane_x_ + F(static_cast<float>(left + x)); }
   F pixel_y(int y) const noexcept { return lane_y_ + F(static_cast<float>(top + y)); }
 
-  /// Opens the blocks with pixels in the image, for the first splats.
+  /// Opens the blocks that have pixels in the image, before the first splat.
   void open_all() noexcept {
     for_each_block([this](int block, int x, int y) {
       const auto inside = (pixel_x(x) < F(static_cast<float>(args_.grid.width))) &&
                           (pixel_y(y) < F(static_cast<float>(args_.grid.height)));
-      // Closed from the start outside the image.
+      // Pixels outside the image are closed from the start.
       states[block] = {};
       states[block].transmittance = select(inside, F(1.0f), F(-1.0f));
       if constexpr (D == DepthMode::median) medians[block] = F(0.0f);
@@ -76,7 +77,7 @@ class TilePixels {
     });
   }
 
-  /// A bit for each cell (OpenCells) with an open block.
+  /// One bit per cell (OpenCells), set if the cell has an open block.
   std::uint64_t open_cells() const noexcept {
     constexpr int kCell = OpenCells::kSize;
     static_assert(kCell % kBlockWidth == 0 && kCell % kBlockHeight == 0);
@@ -87,11 +88,12 @@ class TilePixels {
     return cells;
   }
 
-  /// Stores the states for a later pass, and reads them there.
+  /// Stores the blending states for the next slice of depth.
   void keep() noexcept {
     std::memcpy(kept(), states.bytes(), state_bytes());
     std::memcpy(kept() + state_bytes() / sizeof(float), medians.bytes(), median_bytes());
   }
+  /// Reads the states that keep() stored in the previous slice.
   void resume() noexcept {
     std::memcpy(states.bytes(), kept(), state_bytes());
     std::memcpy(medians.bytes(), kept() + state_bytes() / sizeof(float), median_bytes());
@@ -101,14 +103,14 @@ class TilePixels {
     });
   }
 
-  /// Writes the images.
+  /// Writes the tile's pixels to all requested images.
   void write() noexcept {
     if constexpr (Mesh) close_blocks();
     const int blocks = size / kBlockWidth;
     for (int y = 0, row = 0; y < size && top + y < args_.grid.height; y += kBlockHeight, row += blocks) {
       for (int x = 0; x < size && left + x < args_.grid.width; x += kWidth) {
         const BlockRow place(args_.grid, left + x, top + y, left + size);
-        // Where a tile has fewer blocks in a row, any block fills the pack.
+        // If a tile has fewer blocks per row than a pack needs, any block fills the pack.
         const auto block = [&](int i) { return row + (x / kBlockWidth + i) % blocks; };
         for_each_image<D>(args_.images, [&]<Output O>(float* image) {
           const auto value = [&](int i) {
@@ -124,12 +126,12 @@ class TilePixels {
     }
   }
 
-  int size, left, top;    ///< of the tile, pixels
-  bool open[kMaxBlocks];  ///< whether any pixel takes more splats
+  int size, left, top;    ///< width of the tile, and its top left pixel
+  bool open[kMaxBlocks];  ///< true if a pixel of the block takes more splats
   int open_count = 0;
   Unset<BlendState<F, kLoop>, kMaxBlocks> states;
   Unset<F, D == DepthMode::median ? kMaxBlocks : 1> medians;
-  Unset<F, Mesh ? kMaxBlocks : 1> mesh;  ///< its depth
+  Unset<F, Mesh ? kMaxBlocks : 1> mesh;  ///< depth of the mesh
 
  private:
   /// The tile's part of the stored states.
@@ -144,8 +146,8 @@ class TilePixels {
   std::size_t median_bytes() const noexcept {
     return D == DepthMode::median ? sizeof(float) * static_cast<std::size_t>(size * size) : 0;
   }
-  /// A block's pixels of an image with `values` values each. A lane outside of the image gets a pixel
-  /// from inside.
+  /// One of the `values` values per pixel of an image, for the pixels of a block. Lanes outside the
+  /// image get a pixel inside it.
   F lanes_of(const float* image, int values, int value, int x, int y) const noexcept {
     float v[kWidth];
     for (int l = 0; l < kWidth; ++l) {
@@ -157,7 +159,7 @@ class TilePixels {
     }
     return F::load(v);
   }
-  /// The state of a block with all of its depths.
+  /// State of a block, including the median depth.
   GSNAV_HD decltype(auto) whole_state(int block) noexcept {
     if constexpr (D == DepthMode::median) {
       return BlendState<F, D>{states[block], {medians[block]}};

@@ -17,7 +17,7 @@
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
-/// kWidth projected Gaussians: lane l is row `first + l` of the set.
+/// kWidth projected Gaussians. Lane l is row `first + l` of the set.
 struct ProjectedPack {
   std::size_t first;
   const RowKey<F>& key;
@@ -26,7 +26,7 @@ struct ProjectedPack {
 
 namespace detail {
 
-/// Those of `lanes` whose bounds reach an open cell.
+/// The lanes of `lanes` whose bounds reach an open cell, as bits.
 GSNAV_HD std::uint32_t reaching_open(const OpenCells& open, const PixelBox<F>& box,
                                      std::uint32_t lanes) noexcept {
   const F inverse(1.0f / OpenCells::kSize), one(1.0f);
@@ -44,17 +44,18 @@ GSNAV_HD std::uint32_t reaching_open(const OpenCells& open, const PixelBox<F>& b
   return found;
 }
 
-/// A TileSpans a lane, as the four words that it lies in memory as.
+/// One TileSpans per lane, as the four words that it consists of.
 struct SpanWords {
   F::ints word[4]{};
 };
 static_assert(sizeof(TileSpans) == 4 * sizeof(std::int32_t) && TileSpans::kRows == 5);
 
-/// The tiles of kWidth splats, lane by lane those that for_each_tile finds; `lanes`: which are wanted.
+/// Tiles of kWidth splats, as for_each_tile finds them, in each lane. `lanes` has the bits of the lanes
+/// that are needed.
 GSNAV_HD SpanWords find_tiles(const TileGrid& grid, const SplatGeometry<F>& g, float log2_alpha_min,
                               const PixelBox<F>& box, std::uint32_t lanes) noexcept {
   const F zero(0.0f), one(1.0f), size(static_cast<float>(grid.tile_size));
-  const F inverse(1.0f / static_cast<float>(grid.tile_size));  // a power of two: exact
+  const F inverse(1.0f / static_cast<float>(grid.tile_size));  // a power of two, so products are exact
   const auto tile_of = [inverse](F pixel) noexcept { return truncated(pixel * inverse); };
   const auto whole = [](F x) noexcept { return __builtin_convertvector(x.v, F::ints); };
   const TileRange<F> tiles = TileRange<F>::of(box, tile_of);
@@ -67,7 +68,7 @@ GSNAV_HD SpanWords find_tiles(const TileGrid& grid, const SplatGeometry<F>& g, f
   SpanWords out;
   out.word[0] = whole(tiles.y0) * grid.columns + whole(tiles.x0);
   out.word[1] = whole(select(large, F(static_cast<float>(TileSpans::kLarge)), rows));
-  F begin = zero, end = one;  // of a single tile
+  F begin = zero, end = one;  // for a single tile
   if (wanted != 0) {
     const FootprintStrips<F> footprint(g, log2_alpha_min, box);
     F top = tiles.y0 * size;
@@ -83,7 +84,7 @@ GSNAV_HD SpanWords find_tiles(const TileGrid& grid, const SplatGeometry<F>& g, f
         end = select(single, one, end);
       }
       const F::ints b = whole(begin), e = whole(end);
-      // Bytes 5 + 2 r and 6 + 2 r of the sixteen.
+      // Bytes 5 + 2 r and 6 + 2 r of the 16 bytes of a TileSpans.
       out.word[(5 + 2 * r) / 4] |= b << (8 * ((5 + 2 * r) % 4));
       out.word[(6 + 2 * r) / 4] |= e << (8 * ((6 + 2 * r) % 4));
       top = next;
@@ -94,7 +95,7 @@ GSNAV_HD SpanWords find_tiles(const TileGrid& grid, const SplatGeometry<F>& g, f
   return out;
 }
 
-/// Copies a record that is N floats, or as large.
+/// Copies N floats to a record of the same size.
 template <int N, class T>
 GSNAV_HD void copy_record(T& record, const float* from) noexcept {
   static_assert(std::is_trivially_copyable_v<T> && sizeof(T) == N * sizeof(float));
@@ -103,7 +104,7 @@ GSNAV_HD void copy_record(T& record, const float* from) noexcept {
 
 GSNAV_HD F as_floats(F::ints x) noexcept { return F(gsnav::detail::floats<kWidth>(x)); }
 
-/// Bounds and tiles of kWidth splats, eight words each, one behind the other.
+/// Writes bounds and tile spans of kWidth splats, eight words per splat.
 GSNAV_HD void store_bounds(const PixelBox<F>& box, const SpanWords& spans, float* to) noexcept {
   const auto whole = [](F x) noexcept { return as_floats(__builtin_convertvector(x.v, F::ints)); };
   const F columns[8] = {whole(box.x0),
@@ -117,14 +118,14 @@ GSNAV_HD void store_bounds(const PixelBox<F>& box, const SpanWords& spans, float
   store_columns<8>(columns, to);
 }
 
-/// The ranks of kWidth rows; those beyond the set's end have the last one's.
+/// Ranks of kWidth rows. Rows beyond the end of the set get the rank of the last one.
 GSNAV_HD void ranks_of(const ViewedSet<float>& args, const std::uint32_t (&rows)[kWidth],
                        std::uint32_t* ranks) noexcept {
   const std::uint32_t last = static_cast<std::uint32_t>(args.gaussians.size() - 1);
   for (int l = 0; l < kWidth; ++l) ranks[l] = args.rank_of(rows[l] < last ? rows[l] : last);
 }
 
-/// Leaves the lanes `kept` to color_survivors, behind the `count` that there are.
+/// Appends the lanes `kept` to the `count` survivors that color_survivors will colour.
 GSNAV_HD void keep_survivors(std::uint32_t kept, const std::uint32_t (&rows)[kWidth],
                              const Vec3<F>& delta, std::size_t count, Survivors& survivors) noexcept {
   store_lanes(kept, rows, survivors.rows + count);
@@ -136,7 +137,7 @@ GSNAV_HD void keep_survivors(std::uint32_t kept, const std::uint32_t (&rows)[kWi
   }
 }
 
-/// One row by itself, with all that needs double.
+/// Projects one row by itself, in double where needed.
 GSNAV_STAGE bool project_alone(const ViewedSet<float>& args, const ProjectOutputs<float>& out,
                                std::size_t slot, std::size_t row) noexcept {
   return project_gaussian(args, out, slot, row);
@@ -144,9 +145,10 @@ GSNAV_STAGE bool project_alone(const ViewedSet<float>& args, const ProjectOutput
 
 }  // namespace detail
 
-/// Writes the survivors `bits` of a pack, in row order, behind the `count` that their chunk has from
-/// slot `base` on: the bits of write_splat, but for colours, which `survivors` are left to. Returns how
-/// many had a pixel centre in their bounds. Contract only: Response::ewa, Compat::none.
+/// Writes the rows in `bits` of a pack, in row order, after the `count` splats that their chunk already
+/// has from slot `base` on. The bits equal those of write_splat, except colours, which are left to
+/// `survivors`. Only for Response::ewa and Compat::none.
+/// @return the number of rows with a pixel centre in their bounds
 GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const ProjectOutputs<float>& out,
                                        std::size_t base, std::size_t count, const ProjectedPack& pack,
                                        std::uint32_t bits, Survivors& survivors) noexcept {
@@ -155,7 +157,7 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
   const ProjectionCamera<float>& camera = args.camera;
   const Projected<F>& p = pack.seen.splat;
   const PixelBox<F> box = gsnav::detail::pixel_box(camera, p);
-  // Those whose geometry float cannot hold are few: each goes its own way.
+  // Few rows are too inexact in float. Each of them is projected alone.
   const std::uint32_t alone = lane_bits(gsnav::detail::needs_double(camera, p)) & bits;
   bits &= lane_bits(box.any_pixel()) | alone;
   if (!out.open.empty()) bits &= detail::reaching_open(out.open, box, bits) | alone;
@@ -170,7 +172,7 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
   const SplatGeometry<F> g =
       splat_geometry(p, reference_of<F>(camera.width, camera.height, mean_x, mean_y));
 
-  // Records side by side in lanes become one after the other in memory.
+  // Transpose the records from lanes to consecutive memory.
   alignas(64) float geometry[kWidth * 8], bounds[kWidth * 8], depths[2][kWidth * 8];
   {
     const F columns[8] = {g.ref_x, g.ref_y, g.a, g.k, g.b, g.w1, g.w2, g.log2_opacity};

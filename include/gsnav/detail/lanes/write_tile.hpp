@@ -10,19 +10,20 @@
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
-/// Blocks side by side that make rows of kWidth pixels: as many as a block has rows.
+/// Number of neighbouring blocks that make rows of kWidth pixels. It equals the number of rows in a
+/// block.
 inline constexpr int kRowBlocks = kWidth / kBlockWidth;
 static_assert(kRowBlocks == kBlockHeight);
 
-/// Where kRowBlocks blocks side by side lie in an image: kBlockHeight rows of kWidth pixels, of which
-/// `columns` of `rows` are to be written.
+/// Position of kRowBlocks neighbouring blocks in an image: kBlockHeight rows of kWidth pixels. `rows`
+/// rows and `columns` columns of them are written.
 struct BlockRow {
-  std::size_t first;  ///< pixel
+  std::size_t first;  ///< index of the first pixel
   std::size_t stride;
   std::size_t columns;
   int rows;
 
-  /// From (x0, y0) on, what lies in the image and left of `end`.
+  /// Blocks from (x0, y0) on, limited to the image and to columns less than `end`.
   BlockRow(const TileGrid& grid, int x0, int y0, int end) noexcept {
     const int right = end < grid.width ? end : grid.width;
     stride = static_cast<std::size_t>(grid.width);
@@ -32,7 +33,8 @@ struct BlockRow {
   }
 };
 
-/// Writes one image of a row of blocks; nothing where it is null. value(i): the pixels of block i.
+/// Writes the pixels of a row of blocks to an image. Does nothing if `image` is null. value(i) returns
+/// the pixels of block i.
 template <class Value>
 void write_plane(const BlockRow& row, float* image, const Value& value) noexcept {
   if (image == nullptr) return;
@@ -51,7 +53,8 @@ void write_plane(const BlockRow& row, float* image, const Value& value) noexcept
   }
 }
 
-/// The same of three values a pixel. value(i): a Vec3.
+/// write_plane for an image with three values per pixel. value(i) returns the pixels of block i as a
+/// Vec3.
 template <class Value>
 void write_color(const BlockRow& row, float* image, const Value& value) noexcept {
   if (image == nullptr) return;
@@ -77,7 +80,7 @@ void write_color(const BlockRow& row, float* image, const Value& value) noexcept
   }
 }
 
-/// The tile's rows are far apart in an image, and come in while it is blended.
+/// Prefetches a tile of all images, whose rows are far apart in memory, while the tile is blended.
 inline void prefetch_images(const RasterArgs<float>& args, int tile_x, int tile_y) noexcept {
   const int tile_size = args.grid.tile_size;
   const auto prefetch = [=, &args](const float* image, std::size_t values) {

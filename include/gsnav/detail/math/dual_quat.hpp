@@ -5,15 +5,15 @@
 
 namespace gsnav {
 
-/// A rigid map x -> rotate(real, x) + t as a unit dual quaternion, whose dual part is t * real / 2 with
-/// t as (0, t). (real, dual) and (-real, -dual) are the same map.
+/// Rigid map x -> rotate(real, x) + t as a unit dual quaternion. The dual part is (0, t) * real / 2.
+/// (real, dual) and (-real, -dual) are the same map.
 template <class L>
 struct DualQuat {
   Quat<L> real{};
   Quat<L> dual{L(0), L(0), L(0), L(0)};
 };
 
-/// The dual quaternion of a rigid map.
+/// Dual quaternion of a rigid map.
 template <class S>
 GSNAV_HD DualQuat<S> dual_quat(const Affine3<S>& rigid) noexcept {
   const Quat<S> real = quat_from_matrix(rigid.linear);
@@ -26,9 +26,8 @@ GSNAV_HD constexpr DualQuat<T> dual_quat_cast(const DualQuat<U>& q) noexcept {
   return {quat_cast<T>(q.real), quat_cast<T>(q.dual)};
 }
 
-/// The translation of the rigid map that a dual quaternion of any length stands for. A part of `dual`
-/// along `real`, which sums of unit dual quaternions have, is left out, as dividing by the dual norm
-/// would.
+/// Translation of the rigid map that a dual quaternion of any length represents. Sums of unit dual
+/// quaternions can have a part of `dual` along `real`. It is ignored, as in a division by the dual norm.
 template <class L>
 GSNAV_HD Vec3<L> translation_of(const DualQuat<L>& q) noexcept {
   const Quat<L> t = q.dual * conjugate(q.real);

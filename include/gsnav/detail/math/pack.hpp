@@ -18,11 +18,12 @@
 #include "gsnav/detail/math/pack_mask.hpp"
 #include "gsnav/math/functions.hpp"
 
-// Float lanes over the compilers' vector extension: the functions of math/functions.hpp with the same
-// bits per lane. Kernels are written over `L` and run on a Pack where pixels or Gaussians go side by
-// side. Where the instruction set has no fma, one is computed with correct rounding.
+// SIMD packs of floats, built on the compilers' vector extension. They have the functions of
+// math/functions.hpp, with the same bits per lane. Kernels are templates over `L` and run on a Pack
+// where several pixels or Gaussians are processed together. On instruction sets without fma, one with
+// correct rounding is computed.
 
-/// Lanes that the flags of this translation unit make natural.
+/// Natural number of float lanes for the flags of this translation unit.
 #if defined(__AVX512F__)
 #define GSNAV_PACK_WIDTH 16
 #elif defined(__AVX2__)
@@ -33,10 +34,10 @@
 
 namespace gsnav {
 
-/// N floats that are computed with together.
+/// N floats that are processed together.
 template <class T, int N>
 struct Pack;
-/// N doubles: detail/math/pack_double.hpp.
+/// N doubles that are processed together (detail/math/pack_double.hpp).
 template <int N>
 struct PackPair;
 
@@ -47,11 +48,11 @@ struct Pack<float, N> {
   vector v{};
 
   GSNAV_HD Pack() noexcept = default;
-  // s - 0 is s for every s, -0 included, so this is a plain broadcast.
+  // s - 0 is s for every s, also for -0, so this is a plain broadcast.
   GSNAV_HD Pack(float s) noexcept : v(s - vector{}) {}
   GSNAV_HD explicit Pack(vector x) noexcept : v(x) {}
 
-  /// Reads N floats from any address.
+  /// Reads N floats from any address, aligned or not.
   GSNAV_HD static Pack load(const float* p) noexcept {
     Pack r;
     std::memcpy(&r.v, p, sizeof r.v);
@@ -98,7 +99,7 @@ GSNAV_HD Pack<float, N> select(Mask<N> m, Pack<float, N> a, Pack<float, N> b) no
 template <int N>
 GSNAV_HD Pack<float, N> min(Pack<float, N> a, Pack<float, N> b) noexcept {
 #if defined(__AVX512F__)
-  if constexpr (N == 16) {  // g++ does not make one instruction of the two
+  if constexpr (N == 16) {  // g++ does not fuse comparison and selection into one instruction
     return Pack<float, N>(reinterpret_cast<typename Pack<float, N>::vector>(_mm512_maskz_min_ps(
         static_cast<__mmask16>(-1), reinterpret_cast<__m512>(a.v), reinterpret_cast<__m512>(b.v))));
   } else
@@ -150,7 +151,7 @@ GSNAV_HD Pack<float, N> truncated(Pack<float, N> a) noexcept {
   return P(__builtin_convertvector(__builtin_convertvector(a.v, typename P::ints), typename P::vector));
 }
 
-/// Bit i is set where lane i is.
+/// Mask as bits: bit i is set if lane i is set.
 template <int N>
 GSNAV_HD std::uint32_t lane_bits(Mask<N> m) noexcept {
 #if defined(__AVX512F__)
@@ -200,7 +201,7 @@ GSNAV_HD bool all(Mask<N> m) noexcept {
   return lane_bits(m) == (N == 32 ? ~0u : (1u << N) - 1u);
 }
 
-/// Square root, correctly rounded.
+/// Correctly rounded square root.
 template <int N>
 GSNAV_HD Pack<float, N> sqrt(Pack<float, N> a) noexcept {
 #if defined(__AVX512F__)
@@ -237,14 +238,14 @@ GSNAV_HD Pack<float, N> sqrt_above(Pack<float, N> a) noexcept {
   using V = typename Pack<float, N>::vector;
   const Pack<float, N> positive = max(a, Pack<float, N>(1e-30f));
 #if defined(__AVX512F__)
-  if constexpr (N == 16) {  // 2^-14
+  if constexpr (N == 16) {  // error of rsqrt14: 2^-14
     const Pack<float, N> r(reinterpret_cast<V>(
         _mm512_maskz_rsqrt14_ps(static_cast<__mmask16>(-1), reinterpret_cast<__m512>(positive.v))));
     return positive * (r * Pack<float, N>(1.0001f));
   }
 #endif
 #if defined(__AVX__)
-  if constexpr (N == 8) {  // 1.5 * 2^-12
+  if constexpr (N == 8) {  // error of rsqrtps: 1.5 * 2^-12
     return positive *
            (Pack<float, N>(reinterpret_cast<V>(_mm256_rsqrt_ps(reinterpret_cast<__m256>(positive.v)))) *
             Pack<float, N>(1.0004f));
@@ -259,7 +260,7 @@ GSNAV_HD Pack<float, N> sqrt_above(Pack<float, N> a) noexcept {
   return sqrt(a);
 }
 
-/// a * b + c with one rounding.
+/// a * b + c, rounded once.
 template <int N>
 GSNAV_HD Pack<float, N> fma(Pack<float, N> a, Pack<float, N> b, Pack<float, N> c) noexcept {
 #if defined(__AVX512F__)
@@ -298,7 +299,7 @@ GSNAV_HD Pack<float, N> fma(Pack<float, N> a, Pack<float, N> b, Pack<float, N> c
 
 template <int N>
 GSNAV_HD Pack<float, N> scale_by_rounded(Pack<float, N> p, Pack<float, N> t) noexcept {
-  // Without a sign: lanes that nobody will read may hold anything, and their sums wrap.
+  // Unsigned, because lanes that nothing reads may hold any value and their sums wrap.
   typename detail::PackTypes<N>::u a, b;
   std::memcpy(&a, &p.v, sizeof a);
   std::memcpy(&b, &t.v, sizeof b);
@@ -308,18 +309,19 @@ GSNAV_HD Pack<float, N> scale_by_rounded(Pack<float, N> p, Pack<float, N> t) noe
   return r;
 }
 
-/// 2^x for x in [-126, 126], lane by lane the bits of the scalar exp2; of any other x: anything.
+/// 2^x for x in [-126, 126], with the bits of the scalar exp2 in each lane. The result for any other x
+/// is unspecified.
 template <Exp2 M = Exp2::degree5, int N>
 GSNAV_HD Pack<float, N> exp2_in_range(Pack<float, N> x) noexcept {
   return detail::exp2_by_polynomial<M>(x);
 }
-/// 2^x, lane by lane the bits of the scalar exp2.
+/// 2^x, with the bits of the scalar exp2 in each lane.
 template <Exp2 M = Exp2::degree5, int N>
 GSNAV_HD Pack<float, N> exp2(Pack<float, N> x) noexcept {
   return exp2_in_range<M>(clamp(x, Pack<float, N>(-126.0f), Pack<float, N>(126.0f)));
 }
 
-/// log2(x), lane by lane the bits of the scalar log2.
+/// log2(x), with the bits of the scalar log2 in each lane.
 template <int N>
 GSNAV_HD Pack<float, N> log2(Pack<float, N> x) noexcept {
   using P = Pack<float, N>;

@@ -7,8 +7,8 @@
 
 #include "gsnav/detail/math/pack.hpp"
 
-// Lanes of doubles, half as many as of floats, for the little that float cannot hold: each lane has the
-// bits of the scalar function.
+// SIMD packs of doubles, with half as many lanes as packs of floats, for the few values that need
+// double. Each lane has the bits of the scalar function.
 
 namespace gsnav {
 
@@ -46,7 +46,7 @@ struct Pack<double, N> {
   GSNAV_HD Pack(double s) noexcept : v(s - vector{}) {}
   GSNAV_HD explicit Pack(vector x) noexcept : v(x) {}
 
-  /// Widens N floats at any address.
+  /// Reads N floats from any address and widens them.
   GSNAV_HD static Pack load(const float* p) noexcept {
     floats f;
     std::memcpy(&f, p, sizeof f);
@@ -57,7 +57,7 @@ struct Pack<double, N> {
     std::memcpy(&r.v, p, sizeof r.v);
     return r;
   }
-  /// Rounds to N floats at any address.
+  /// Rounds to N floats and writes them to any address.
   GSNAV_HD void store(float* p) const noexcept {
     const floats f = __builtin_convertvector(v, floats);
     std::memcpy(p, &f, sizeof f);
@@ -127,19 +127,19 @@ GSNAV_HD Pack<float, 2 * N> rounded(Pack<double, N> low, Pack<double, N> high,
 }
 }  // namespace detail
 
-/// Half the lanes of a pack of floats in double: the lower ones (0) or the upper ones (1).
+/// Half of the lanes of a pack of floats, as doubles: the lower half (0) or the upper half (1).
 template <int Half, int N>
 GSNAV_HD Pack<double, N / 2> widened(Pack<float, N> a) noexcept {
   return detail::widened<Half>(a, std::make_index_sequence<static_cast<std::size_t>(N / 2)>{});
 }
 
-/// Two halves rounded to float.
+/// Rounds two halves to one pack of floats.
 template <int N>
 GSNAV_HD Pack<float, 2 * N> rounded(Pack<double, N> low, Pack<double, N> high) noexcept {
   return detail::rounded(low, high, std::make_index_sequence<static_cast<std::size_t>(2 * N)>{});
 }
 
-/// a * b + c with one rounding.
+/// a * b + c, rounded once.
 template <int N>
 GSNAV_HD Pack<double, N> fma(Pack<double, N> a, Pack<double, N> b, Pack<double, N> c) noexcept {
   using P = Pack<double, N>;
@@ -179,7 +179,7 @@ struct PackPair {
   GSNAV_HD PackPair(double s) noexcept : low(s), high(s) {}
   GSNAV_HD PackPair(half l, half h) noexcept : low(l), high(h) {}
   GSNAV_HD explicit PackPair(Pack<float, N> a) noexcept : low(widened<0>(a)), high(widened<1>(a)) {}
-  /// Rounded to floats.
+  /// Rounds to floats.
   GSNAV_HD explicit operator Pack<float, N>() const noexcept { return rounded(low, high); }
   /// Reads N doubles from any address.
   GSNAV_HD static PackPair load(const double* p) noexcept {
@@ -198,7 +198,7 @@ struct PackPair {
   GSNAV_HD friend PackPair operator/(PackPair a, PackPair b) noexcept {
     return {a.low / b.low, a.high / b.high};
   }
-  /// a * b + c with one rounding.
+  /// a * b + c, rounded once.
   GSNAV_HD friend PackPair fma(PackPair a, PackPair b, PackPair c) noexcept {
     return {fma(a.low, b.low, c.low), fma(a.high, b.high, c.high)};
   }

@@ -8,11 +8,11 @@
 
 #include "gsnav/detail/math/pack.hpp"
 
-// Packs to and from memory that is not laid out lane by lane.
+// Loads and stores of packs in other layouts than one value per lane.
 
 namespace gsnav {
 
-/// Reads K floats from any address, and repeats them: lane i holds p[i % K].
+/// Reads K floats from any address and repeats them: lane i holds p[i % K].
 template <int K, int N>
 GSNAV_HD Pack<float, N> load_repeated(const float* p) noexcept {
   if constexpr (K == N) return Pack<float, N>::load(p);
@@ -34,8 +34,8 @@ GSNAV_HD Pack<float, N> load_repeated(const float* p) noexcept {
 }
 
 namespace detail {
-/// Lane l of the K-th pack of interleaved triples comes from pixel (K N + l) / 3. Step 0 places the
-/// first and second of each triple, step 1 the third.
+/// Source lane for lane l of the K-th pack of interleaved triples; it belongs to pixel (K N + l) / 3.
+/// Step 0 places the first and second components, step 1 the third.
 template <int N, int K, int Step>
 constexpr int interleaved_lane(int l) noexcept {
   const int pixel = (K * N + l) / 3, component = (K * N + l) % 3;
@@ -63,8 +63,8 @@ GSNAV_HD void store_interleaved(Pack<float, N> a, Pack<float, N> b, Pack<float, 
 }
 
 namespace detail {
-/// Chunk `Chunk` of pack a, then that of pack b, where packs are of chunks of W lanes: of both, those
-/// that are `Every` apart from `First` on.
+/// Source lane for lane l of a pack made of chunks of W lanes. The first half of the result comes from
+/// pack a, the second from pack b. It takes the chunks first, first + every, ... of each.
 template <int W, int N>
 constexpr int chunk_lane(int l, int first, int every) noexcept {
   constexpr int kHalf = N / W / 2;  // chunks of the result that come from a
@@ -79,8 +79,8 @@ GSNAV_HD Pack<float, N> chunks(Pack<float, N> a, Pack<float, N> b,
 }
 }  // namespace detail
 
-/// Transposes H packs of H chunks each (2 or 4): pack i gets chunk i of every pack, in order. What were
-/// blocks of H rows side by side are rows then.
+/// Transposes H packs of H chunks each (H is 2 or 4): pack i receives chunk i of every pack, in order.
+/// This turns H-row blocks that lie next to each other into whole rows.
 template <int H, int N>
 GSNAV_HD void transpose_chunks(Pack<float, N>* v) noexcept {
   constexpr auto lanes = std::make_index_sequence<static_cast<std::size_t>(N)>{};
@@ -102,8 +102,8 @@ GSNAV_HD void transpose_chunks(Pack<float, N>* v) noexcept {
   }
 }
 
-/// Writes first + l for each lane l of `m`, in order, and returns how many. Up to N bytes from `out` on
-/// are overwritten.
+/// Writes first + l for each lane l set in `m`, in order, and returns the number written. May overwrite
+/// up to N bytes from `out` on.
 template <int N>
 GSNAV_HD int store_lane_indices(Mask<N> m, int first, std::uint8_t* out) noexcept {
 #if defined(__AVX512F__)
@@ -124,7 +124,8 @@ GSNAV_HD int store_lane_indices(Mask<N> m, int first, std::uint8_t* out) noexcep
   }
 }
 
-/// Writes the lanes of `bits` to consecutive places from `out` on, nothing else, and returns how many.
+/// Writes the lanes selected by `bits` to consecutive positions from `out` on, and nothing else. Returns
+/// the number written.
 template <int N>
 GSNAV_HD int store_lanes(std::uint32_t bits, const std::uint32_t (&lanes)[N],
                          std::uint32_t* out) noexcept {
@@ -146,7 +147,8 @@ GSNAV_HD int store_lanes(std::uint32_t bits, const std::uint32_t (&lanes)[N],
 
 namespace detail {
 #if defined(__AVX512F__)
-/// Transposes the 8 x 8 matrices in the lower and in the upper halves of 8 registers.
+/// Transposes two 8 x 8 matrices: the one in the lower halves of 8 registers, and the one in the upper
+/// halves.
 GSNAV_HD void transpose_halves(PackTypes<16>::f* r) noexcept {
   using V = PackTypes<16>::f;
   V t[8];
@@ -174,12 +176,12 @@ GSNAV_HD void transpose_halves(PackTypes<16>::f* r) noexcept {
 #endif
 }  // namespace detail
 
-/// Reads K floats from each of N rows (one a lane) as K packs, one a column.
+/// Reads K floats from each of N rows, one row per lane, into K packs, one per column.
 template <int K, int N>
 GSNAV_HD void load_columns(const float* const (&rows)[N], Pack<float, N>* columns) noexcept {
 #if defined(__AVX512F__)
   if constexpr (N == 16 && K == 8) {
-    // Rows i and i + 8 share a register: then each half is an 8 x 8 transpose.
+    // Rows i and i + 8 share a register, so that each half is an 8 x 8 transpose.
     typename Pack<float, 16>::vector r[8];
     for (int i = 0; i < 8; ++i) {
       const Pack<float, 8> a = Pack<float, 8>::load(rows[i]), b = Pack<float, 8>::load(rows[i + 8]);
@@ -226,7 +228,7 @@ GSNAV_HD void load_columns(const float* const (&rows)[N], Pack<float, N>* column
     columns[k] = Pack<float, N>::load(column);
   }
 }
-/// The same of a row-major matrix.
+/// Reads the columns of a row-major matrix with N rows of K floats.
 template <int K, int N>
 GSNAV_HD void load_columns(const float* matrix, Pack<float, N>* columns) noexcept {
   const float* rows[N];
@@ -234,7 +236,7 @@ GSNAV_HD void load_columns(const float* matrix, Pack<float, N>* columns) noexcep
   load_columns<K>(rows, columns);
 }
 
-/// Writes K packs, one a column, as a row-major matrix of N rows (one a lane) and K floats a row.
+/// Writes K packs, one per column, as a row-major matrix with N rows (one per lane) of K floats.
 template <int K, int N>
 GSNAV_HD void store_columns(const Pack<float, N>* columns, float* matrix) noexcept {
 #if defined(__AVX512F__)
@@ -262,7 +264,7 @@ GSNAV_HD void store_columns(const Pack<float, N>* columns, float* matrix) noexce
         __builtin_shufflevector(c, d, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
     const V cd1 =
         __builtin_shufflevector(c, d, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-    // Rows 0, 4, 8 and 12; 1, 5, ...; four floats each.
+    // r[i] holds rows i, i + 4, i + 8 and i + 12, four floats each.
     const V r[4] = {
         __builtin_shufflevector(ab0, cd0, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29),
         __builtin_shufflevector(ab0, cd0, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31),

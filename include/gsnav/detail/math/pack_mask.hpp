@@ -13,13 +13,13 @@
 
 #include "gsnav/math/functions.hpp"
 
-// The vector types of lanes, and what a comparison of two gives.
+// Vector types of SIMD lanes, and the mask that a comparison of two of them returns.
 
 namespace gsnav {
 
 namespace detail {
 
-// g++ 12 rejects a vector_size that depends on a template parameter, so widths are spelled out.
+// g++ 12 rejects a vector_size that depends on a template parameter, so each width is written out.
 template <int N>
 struct PackTypes;
 template <>
@@ -43,7 +43,7 @@ struct PackTypes<16> {
 
 }  // namespace detail
 
-/// Comparison result of a Pack: all bits of a lane set, or none.
+/// Result of comparing packs: a lane has all bits set, or none.
 template <int N>
 struct Mask {
   using vector = typename detail::PackTypes<N>::i;
@@ -59,7 +59,7 @@ struct Mask {
 };
 
 #if defined(__AVX512F__)
-/// With AVX-512 a mask is a register of one bit a lane; g++ does not see through the vector form.
+/// AVX-512 masks are registers with one bit per lane. g++ does not optimise the vector form to them.
 template <>
 struct Mask<16> {
   __mmask16 v = 0;
@@ -71,7 +71,7 @@ struct Mask<16> {
     r.v = m;
     return r;
   }
-  // By name, or g++ moves masks to general registers and back.
+  // Use the mask intrinsics: with plain operators, g++ moves masks to general registers and back.
   GSNAV_HD friend Mask operator&&(Mask a, Mask b) noexcept { return of(_kand_mask16(a.v, b.v)); }
   GSNAV_HD friend Mask operator||(Mask a, Mask b) noexcept { return of(_kor_mask16(a.v, b.v)); }
   GSNAV_HD friend Mask operator!(Mask a) noexcept { return of(_knot_mask16(a.v)); }

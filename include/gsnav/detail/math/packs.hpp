@@ -5,9 +5,9 @@
 
 namespace gsnav {
 
-/// G packs that are computed with side by side. A processor looks only so far ahead for instructions
-/// that need not wait for others: in chains as long as exp2's it runs dry, but not where each step is
-/// that of G chains.
+/// G packs that are processed side by side. A long chain of dependent instructions, such as exp2, leaves
+/// a processor idle, because it looks ahead only a limited number of instructions. Interleaving G
+/// independent chains keeps it busy.
 template <class P, int G>
 struct Packs {
   P v[G];
@@ -17,7 +17,7 @@ struct Packs {
   GSNAV_HD explicit Packs(P p) noexcept {
     for (P& x : v) x = p;
   }
-  /// f(0), ..., f(G - 1).
+  /// Packs f(0), ..., f(G - 1).
   template <class F>
   GSNAV_HD static Packs of(const F& f) noexcept {
     Packs r;
@@ -64,7 +64,7 @@ template <class P, int G>
 GSNAV_HD Packs<P, G> min(const Packs<P, G>& a, const Packs<P, G>& b) noexcept {
   return Packs<P, G>::of([&](int i) GSNAV_INLINED { return min(a.v[i], b.v[i]); });
 }
-/// a * b + c with one rounding.
+/// a * b + c, rounded once.
 template <class P, int G>
 GSNAV_HD Packs<P, G> fma(const Packs<P, G>& a, const Packs<P, G>& b, const Packs<P, G>& c) noexcept {
   return Packs<P, G>::of([&](int i) GSNAV_INLINED { return fma(a.v[i], b.v[i], c.v[i]); });
@@ -75,7 +75,8 @@ GSNAV_HD Packs<P, G> scale_by_rounded(const Packs<P, G>& p, const Packs<P, G>& t
   return Packs<P, G>::of([&](int i) GSNAV_INLINED { return scale_by_rounded(p.v[i], t.v[i]); });
 }
 
-/// 2^x for x in [-126, 126], lane by lane the bits of the scalar exp2; of any other x: anything.
+/// 2^x for x in [-126, 126], with the bits of the scalar exp2 in each lane. The result for any other x
+/// is unspecified.
 template <Exp2 M, class P, int G>
 GSNAV_HD Packs<P, G> exp2_in_range(const Packs<P, G>& x) noexcept {
   return detail::exp2_by_polynomial<M>(x);

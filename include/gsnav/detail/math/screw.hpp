@@ -7,19 +7,22 @@
 
 namespace gsnav {
 
-/// A rigid map as a rotation (unit) and a translation: x -> rotate(rotation, x) + translation.
+/// Rigid map x -> rotate(rotation, x) + translation, with a unit quaternion.
 template <class S>
 struct RigidPose {
   Quat<S> rotation{};
   Vec3<S> translation{};
 };
 
-/// What lies at u in [0, 1] between the rigid poses a and b: a screw motion (Chasles), the shorter way
-/// round, turning and advancing at constant rates about an axis that is fixed both in space and in the
-/// body. Unlike slerp beside a straight line it does not depend on which point of the body is called its
-/// origin. No special case for small angles: with t the translation from a to b in a's frame, theta the
-/// angle and n the axis, the part of t across n becomes sin(u theta / 2) / sin(theta / 2) times itself
-/// turned by (u - 1) theta / 2 about n.
+/// Interpolates between the rigid poses a (u = 0) and b (u = 1) by a screw motion (Chasles), the shorter
+/// way round. It turns and advances at constant rates about one axis that is fixed in space and in the
+/// body. Unlike slerp with linear translation, the result does not depend on the choice of the body's
+/// origin.
+///
+/// Let t be the translation from a to b in a's frame, theta the angle and n the axis. The part of t
+/// perpendicular to n is scaled by sin(u theta / 2) / sin(theta / 2) and turned by (u - 1) theta / 2
+/// about n. Only rotations with a sine below 1e-9 are interpolated differently, by slerp and a straight
+/// line.
 template <class S>
 RigidPose<S> screw_between(const RigidPose<S>& a, const RigidPose<S>& b, S u) noexcept {
   const Quat<S> back = conjugate(a.rotation);
@@ -27,7 +30,7 @@ RigidPose<S> screw_between(const RigidPose<S>& a, const RigidPose<S>& b, S u) no
   if (turn.w < S(0)) turn = -turn;
   const Vec3<S> way = rotate(back, b.translation - a.translation), axis{turn.x, turn.y, turn.z};
   const S sine = norm(axis);
-  // Below this an angle's half is its sine, to rounding.
+  // At such small angles, sine and angle agree to rounding.
   if (sine < S(1e-9)) {
     return {slerp(a.rotation, b.rotation, u), a.translation + rotate(a.rotation, way * u)};
   }

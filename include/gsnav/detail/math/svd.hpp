@@ -6,19 +6,19 @@
 
 namespace gsnav {
 
-/// m = left diag(values) transpose(right), with left and right rotations: the values come greatest first
-/// and only the last may be negative, where det(m) is. So all three are continuous where a body folds
-/// over.
+/// Singular value decomposition m = left diag(values) transpose(right), where left and right are
+/// rotations. Values are in descending order. Only the last may be negative, namely if det(m) is. All
+/// three factors are therefore continuous where a body folds over.
 template <class L>
 struct Svd3 {
   Vec3<L> left[3], right[3];  ///< columns
   L values[3];
 };
 
-/// Singular values and vectors by one-sided Jacobi rotations (Hestenes 1958): columns of m are turned
-/// among each other until they are orthogonal, in five sweeps. Error of a value: 2e-6 of the greatest in
-/// float, 4e-15 in double. Where the second value is below 1e-4 of the first, the vectors that go with
-/// it are any that are orthogonal to the first.
+/// Singular value decomposition by one-sided Jacobi rotations (Hestenes 1958): five sweeps turn the
+/// columns of m until they are orthogonal. The error of a value is 2e-6 of the greatest in float and
+/// 4e-15 in double. If the second value is below 1e-4 of the first, its vectors are arbitrary, but
+/// orthogonal to the first.
 template <class L>
 GSNAV_HD Svd3<L> svd(const Mat3<L>& m) noexcept {
   using S = scalar_of<L>;
@@ -30,8 +30,8 @@ GSNAV_HD Svd3<L> svd(const Mat3<L>& m) noexcept {
     for (const auto& pair : kPairs) {
       Vec3<L>&p = a[pair[0]], &q = a[pair[1]], &vp = v[pair[0]], &vq = v[pair[1]];
       const L pp = dot(p, p), qq = dot(q, q), pq = dot(p, q);
-      // tan of the angle: the smaller root of t^2 + 2 z t - 1, z = (qq - pp) / (2 pq), times pq to spare
-      // its zeros.
+      // Tangent of the angle: the smaller root of t^2 + 2 z t - 1 with z = (qq - pp) / (2 pq). Numerator
+      // and denominator are multiplied by pq to avoid dividing by zero.
       const L z = L(S(0.5)) * (qq - pp), length = sqrt(fma(z, z, pq * pq)) + abs(z);
       const auto turns = length > zero;
       L t = pq / select(turns, length, one);
@@ -44,8 +44,7 @@ GSNAV_HD Svd3<L> svd(const Mat3<L>& m) noexcept {
       vq = vp0 * s + vq * c;
     }
   }
-  // Greatest first; a column that changes places with another changes its sign, so that v stays a
-  // rotation.
+  // Sort in descending order. A column that swaps places changes its sign, so that v stays a rotation.
   for (const auto& pair : kPairs) {
     Vec3<L>&p = a[pair[0]], &q = a[pair[1]], &vp = v[pair[0]], &vq = v[pair[1]];
     const auto swap = dot(q, q) > dot(p, p);
@@ -63,7 +62,7 @@ GSNAV_HD Svd3<L> svd(const Mat3<L>& m) noexcept {
   const auto some = n0 > zero;
   const L scale = one / select(some, n0, one);
   const Vec3<L> u0{select(some, a[0].x * scale, one), a[0].y * scale, a[0].z * scale};
-  // What is left of the second column after rounding; or anything orthogonal.
+  // Second column without its part along u0. If only rounding is left of it, use any orthogonal vector.
   const Vec3<L> rest = a[1] - u0 * dot(u0, a[1]);
   const L n1 = sqrt(dot(rest, rest));
   const auto clear = n1 > n0 * L(S(1e-4));

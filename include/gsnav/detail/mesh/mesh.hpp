@@ -11,91 +11,95 @@
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/math/vec.hpp"
 
-// Triangle meshes as kernels read them. How they are drawn: docs/composition.md.
+// Triangle meshes in the form in which kernels read them. docs/composition.md describes how they are
+// drawn.
 
 namespace gsnav {
 
-/// A base-colour texture and its mip chain. Owns nothing.
+/// A base-colour texture with its mip chain. It owns nothing.
 struct TextureView {
-  /// RGBA, 8 bits each, sRGB-encoded: level 0 from its top row on, then each level of half the size
+  /// RGBA, 8 bits each, sRGB-encoded, top row first. Level 0, then each further level at half the size
   /// (rounded down, at least 1).
   View<const std::uint8_t> texels;
-  View<const float> decode;  ///< [256], the linear value of an sRGB byte
+  View<const float> decode;  ///< [256], linear value of each sRGB byte
   int width = 0, height = 0, levels = 0;
 
   GSNAV_HD bool empty() const noexcept { return texels.empty(); }
 };
 
-/// What a surface's alpha (base, times that of vertices and of the texture) does.
+/// Effect of a surface's alpha, which is the product of the base, vertex and texture alpha.
 enum class MeshAlpha : std::uint8_t {
-  opaque,  ///< nothing
-  mask,    ///< a surface where it is at least alpha_cutoff, a hole elsewhere
-  blend,   ///< what is behind is seen through it
+  opaque,  ///< Alpha is ignored.
+  mask,    ///< The surface exists where alpha is at least alpha_cutoff and has a hole elsewhere.
+  blend,   ///< The surface is see-through.
 };
 
-/// Read-only arrays of an indexed triangle mesh. Owns nothing. Metres in the mesh's own frame;
-/// counter-clockwise seen from outside. Every index must be below vertices.size.
+/// Read-only arrays of an indexed triangle mesh with T triangles. It owns nothing. Coordinates are
+/// metres in the mesh's own frame; corners are counter-clockwise seen from outside. Every index must be
+/// less than vertices.size.
 struct MeshView {
   View<const Vec3f> vertices;
-  View<const std::uint32_t> indices;  ///< [3 T]
-  View<const Vec3f> normals;          ///< unit, one a vertex; empty: those of the faces
-  View<const Vec3f> colors;           ///< linear RGB, one a vertex; empty: white
-  View<const Vec2<float>> uvs;  ///< (0, 0) is the texture's top left; one a vertex; empty: no texture
-  TextureView texture;          ///< repeats; empty: white
-  Vec3f base_color{1, 1, 1};    ///< linear RGB, times colours and texture
-  bool two_sided = false;       ///< false: what is seen from behind is not drawn
-  bool unlit = false;           ///< its colour is what is seen, whatever the light
-  Vec3f low{}, high{};          ///< box of the finite vertices; low.x > high.x: not known
+  View<const std::uint32_t> indices;  ///< [3 T], three corners per triangle
+  View<const Vec3f> normals;          ///< one unit vector per vertex. Empty: normals of the faces.
+  View<const Vec3f> colors;           ///< linear RGB, one per vertex. Empty: white.
+  View<const Vec2<float>> uvs;  ///< One per vertex; (0, 0) is the texture's top left. Empty: no texture.
+  TextureView texture;          ///< Repeats outside of [0, 1]. Empty: white.
+  Vec3f base_color{1, 1, 1};    ///< Linear RGB; multiplied with colours and texture.
+  bool two_sided = false;       ///< False: triangles seen from behind are not drawn.
+  bool unlit = false;           ///< True: light does not affect the colour.
+  Vec3f low{}, high{};          ///< Box of the finite vertices. low.x > high.x: unknown.
   MeshAlpha alpha_mode = MeshAlpha::opaque;
-  float base_alpha = 1;       ///< in [0, 1]
-  float alpha_cutoff = 0.5f;  ///< of MeshAlpha::mask
-  View<const float> alphas;   ///< in [0, 1], one a vertex; empty: 1
-  bool base_color_only =
-      false;  ///< base_color is what is seen, whatever colours and texture are; alpha stays
+  float base_alpha = 1;          ///< in [0, 1]
+  float alpha_cutoff = 0.5f;     ///< threshold of MeshAlpha::mask
+  View<const float> alphas;      ///< in [0, 1], one per vertex. Empty: 1.
+  bool base_color_only = false;  ///< True: the colour is base_color alone, without vertex colours and
+                                 ///< texture. Alpha is unaffected.
 
   GSNAV_HD std::size_t triangle_count() const noexcept { return indices.size / 3; }
 };
 
-/// A mesh in the world. Moving it costs nothing: its transform is read when a frame is drawn.
+/// A mesh placed in the world. It can be moved at no cost: its transform is read when a frame is drawn.
 struct MeshInstance {
   MeshView mesh;
   Similarity world_from_mesh{};
-  std::uint32_t id = 0;  ///< what the instance image shows; below kNoInstance
+  std::uint32_t id = 0;  ///< value in the instance image, less than kNoInstance
 };
-// On the host alone (docs/architecture.md, "Sizes of arguments").
+// Host only, so the size is not limited by kernel arguments (docs/architecture.md, "Sizes of
+// arguments").
 static_assert(sizeof(void*) != 8 || (sizeof(MeshView) <= 256 && sizeof(MeshInstance) <= 280));
-inline constexpr std::uint32_t kNoInstance = 0xffffffffu;  ///< pixels without a mesh
+inline constexpr std::uint32_t kNoInstance = 0xffffffffu;  ///< value of pixels without a mesh
 
-/// How meshes are lit; linear RGB.
+/// Light on meshes, in linear RGB.
 struct MeshLight {
-  bool unlit = true;  ///< all colours as they are
+  bool unlit = true;  ///< True: all colours are shown as they are.
   Vec3d ambient{0.4, 0.4, 0.4};
-  Vec3d direction{0.4, 0.8, 0.4};  ///< towards the light, world; need not be of unit length
-  Vec3d diffuse{0.6, 0.6, 0.6};    ///< times the cosine to the normal
+  Vec3d direction{0.4, 0.8, 0.4};  ///< direction towards the light, world axes, of any length
+  Vec3d diffuse{0.6, 0.6, 0.6};    ///< multiplied with the cosine to the normal
 };
 
-/// How Gaussians and meshes become one image.
+/// Rule by which Gaussians and meshes become one image.
 enum class Composite : std::uint8_t {
-  merged,      ///< the contract: each Gaussian against the mesh at each pixel
-  hard_depth,  ///< Habitat-GS's: a pixel is the Gaussians' or the mesh's, by their expected depth
+  merged,  ///< The rule of the contract: each Gaussian is compared with the mesh's depth at each pixel.
+  hard_depth,  ///< The rule of Habitat-GS: Gaussians are drawn over the mesh where their expected depth
+               ///< is not beyond it. Elsewhere only the mesh shows.
 };
 
-/// An instance as one camera sees it.
+/// A mesh instance in one camera's frame.
 struct MeshPlacement {
   MeshView mesh;
-  Mat3d linear{};          ///< mesh axes to camera axes, scale in it
-  Vec3d translation{};     ///< camera axes, metres
+  Mat3d linear{};          ///< mesh axes to camera axes, including scale
+  Vec3d translation{};     ///< in camera axes, metres
   Mat3<float> rotation{};  ///< mesh axes to world axes
   std::uint32_t id = 0;
-  std::size_t first_vertex = 0;  ///< of its vertices among all
+  std::size_t first_vertex = 0;  ///< index of its first vertex among those of all instances
 };
 
 inline constexpr std::size_t kMeshChunk = 256;
 
-/// Work items of meshes: kMeshChunk vertices or triangles of one placement, from `begin` on.
+/// A work item: kMeshChunk vertices or triangles of one placement, from `begin` on.
 struct MeshChunk {
   std::uint32_t placement = 0, begin = 0;
-  /// Where it ends, of n in all.
+  /// End of the chunk, for a placement of n items.
   GSNAV_HD std::size_t end(std::size_t n) const noexcept {
     return begin + kMeshChunk < n ? begin + kMeshChunk : n;
   }

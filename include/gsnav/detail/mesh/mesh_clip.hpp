@@ -7,17 +7,18 @@
 #include "gsnav/math/functions.hpp"
 #include "gsnav/math/vec.hpp"
 
-// From camera axes to the lattice of 2^-14 px on which coverage is decided exactly: docs/composition.md.
+// Clipping, and projection to the lattice of 2^-14 px on which coverage is decided exactly
+// (docs/composition.md).
 
 namespace gsnav {
 
-/// Bits of a pixel's fraction, and how far from the image's centre a vertex may lie, in pixels: edge
-/// functions of such vertices at pixel centres are below 2^62.
+/// Bits of a pixel's fraction, and the largest distance of a vertex from the image's centre, in pixels.
+/// With them, edge functions at pixel centres stay below 2^62.
 inline constexpr int kMeshSubpixelBits = 14;
 inline constexpr double kMeshGuard = 32768;
 
-/// Why a vertex cannot be projected as it is (the first five, in the order they are clipped in), and on
-/// which side of the image it lies.
+/// Reasons why a vertex cannot be projected (the first five, in the order of clipping), and the sides of
+/// the image that it lies beyond.
 enum MeshOutcode : std::uint32_t {
   kMeshNear = 1u << 0,
   kMeshGuardLeft = 1u << 1,
@@ -32,13 +33,13 @@ enum MeshOutcode : std::uint32_t {
 };
 inline constexpr int kMeshClipPlanes = 5;
 inline constexpr std::uint32_t kMeshClipCodes = (1u << kMeshClipPlanes) - 1;
-/// Clipping adds at most one corner a plane.
+/// Clipping adds at most one corner per plane.
 inline constexpr int kMeshMostCorners = 3 + kMeshClipPlanes;
 
-/// What projecting meshes reads of a camera; pixels are counted from the image's centre.
+/// Parameters of a camera for projecting meshes. Pixels are counted from the image's centre.
 struct MeshCamera {
   double fx = 1, fy = 1;
-  double cx = 0, cy = 0;  ///< principal point from the image's centre
+  double cx = 0, cy = 0;  ///< principal point, relative to the image's centre
   double half_width = 0, half_height = 0;
   double near_plane = 0.2;
   int width = 0, height = 0;
@@ -48,7 +49,7 @@ struct MeshCamera {
             0.5 * c.width, 0.5 * c.height, c.near_plane,         c.width,
             c.height};
   }
-  /// Positive inside plane k of the first five outcodes.
+  /// Signed distance to clip plane k (the first five outcodes), positive inside.
   GSNAV_HD double distance(int k, const Vec3d& p) const noexcept {
     switch (k) {
       case 0:
@@ -69,8 +70,8 @@ struct MeshCamera {
     for (int k = 0; k < kMeshClipPlanes; ++k) {
       if (!(distance(k, p) >= 0)) code |= 1u << k;
     }
-    // Linear in p: a triangle all of whose corners are on one side is there, whatever lies behind the
-    // camera.
+    // These tests are linear in p. A triangle with all corners beyond one side is therefore beyond it,
+    // even if it reaches behind the camera.
     if (fma(fx, p.x, (half_width + cx) * p.z) < 0) code |= kMeshLeft;
     if (fma(-fx, p.x, (half_width - cx) * p.z) < 0) code |= kMeshRight;
     if (fma(fy, p.y, (half_height + cy) * p.z) < 0) code |= kMeshTop;
@@ -79,27 +80,28 @@ struct MeshCamera {
   }
 };
 
-/// A point of the lattice: pixels from the image's centre times 2^14.
+/// A lattice point: pixels from the image's centre, times 2^14.
 struct MeshPoint {
   std::int32_t x = 0, y = 0;
 };
 
+/// Nearest lattice coordinate.
 GSNAV_HD std::int32_t snap_to_lattice(double pixels) noexcept {
   const double v = fma(pixels, static_cast<double>(1 << kMeshSubpixelBits), 0.5);
   const std::int64_t i = static_cast<std::int64_t>(v);
   return static_cast<std::int32_t>(static_cast<double>(i) > v ? i - 1 : i);
 }
 
-/// Projects a point inside all planes.
+/// Projects a point that lies inside all clip planes.
 GSNAV_HD MeshPoint project_to_lattice(const MeshCamera& c, const Vec3d& p) noexcept {
   const double inverse = 1.0 / p.z;
   return {snap_to_lattice(fma(c.fx, p.x * inverse, c.cx)),
           snap_to_lattice(fma(c.fy, p.y * inverse, c.cy))};
 }
 
-/// Clips a triangle to the planes of `codes` (Sutherland-Hodgman); returns how many corners it then has.
-/// The point where an edge leaves is computed from its end inside to its end outside: both triangles of
-/// the edge get the same one.
+/// Clips a triangle to the planes in `codes` (Sutherland-Hodgman). Returns the number of corners. The
+/// crossing of an edge is computed from its inner to its outer end. Both triangles of the edge thus get
+/// the same point.
 GSNAV_HD int clip_triangle(const MeshCamera& camera, std::uint32_t codes,
                            Vec3d (&p)[kMeshMostCorners]) noexcept {
   int n = 3;
@@ -117,7 +119,7 @@ GSNAV_HD int clip_triangle(const MeshCamera& camera, std::uint32_t codes,
       const double t = d_in / (d_in - d_out);
       Vec3d q{fma(outside.x - in.x, t, in.x), fma(outside.y - in.y, t, in.y),
               fma(outside.z - in.z, t, in.z)};
-      q.z = max(q.z, camera.near_plane);  // whatever rounding made of it
+      q.z = max(q.z, camera.near_plane);  // rounding may have moved it in front of the near plane
       out[m++] = q;
     }
     n = m;

@@ -6,28 +6,30 @@
 
 #include "gsnav/detail/mesh/mesh_shade.hpp"
 
-// Surfaces that are seen through, as lists of fragments, one a pixel: counted, given room, filled and
-// sorted tile by tile. No pixel's list has a limit.
+// Fragments of see-through surfaces, as one list per pixel. Tile by tile they are counted, given space,
+// filled and sorted. A pixel's list can have any length.
 
 namespace gsnav {
 
-/// Arguments of making the fragments of one camera.
+/// Arguments for making the fragments of one camera.
 template <class S>
 struct FragmentArgs {
-  MeshRasterArgs<S> raster;    ///< of the transparent triangles: its lists, nothing of its images
-  MeshShadeArgs<S> shade;      ///< its light, nothing of its images
-  const S* behind = nullptr;   ///< [H][W], depth of the opaque mesh: what is beyond it is no fragment
-  bool color = false;          ///< false: colours are left at 0
-  bool linear = false;         ///< colours in linear light
-  View<FragmentRange> ranges;  ///< [H][W]
-  View<std::uint64_t> tile_begin;   ///< [tiles + 1]: counts, then where a tile's fragments begin
-  View<MeshFragment<S>> fragments;  ///< tile by tile, pixel by pixel
+  MeshRasterArgs<S> raster;         ///< tile lists of the see-through triangles; its images are ignored
+  MeshShadeArgs<S> shade;           ///< light settings; its member `images` is ignored
+  const S* behind = nullptr;        ///< [H][W], depth of the opaque meshes. Surfaces behind it give no
+                                    ///< fragments.
+  bool color = false;               ///< False: colours stay 0.
+  bool linear = false;              ///< True: colours are in linear light.
+  View<FragmentRange> ranges;       ///< [H][W], fragments of each pixel
+  View<std::uint64_t> tile_begin;   ///< [tiles + 1], number of fragments per tile, later the index of
+                                    ///< each tile's first fragment
+  View<MeshFragment<S>> fragments;  ///< ordered by tile, then by pixel
 };
 
 namespace detail {
 
-/// Calls f(pixel, t, x, y, z) for each pixel of a tile and triangle that owns it, is not behind the
-/// opaque mesh; pixel by pixel in the order of triangles.
+/// Calls f(pixel, t, x, y, z) for each pixel of a tile and each triangle t that owns the pixel. Skips
+/// triangles behind the opaque mesh. For one pixel, triangles come in their order.
 template <class S, class F>
 GSNAV_HD void for_each_fragment(const FragmentArgs<S>& args, std::size_t tile, const F& f) noexcept {
   const BinArgs<S>& bin = args.raster.bin;
@@ -68,7 +70,7 @@ GSNAV_HD void for_each_tile_pixel(const TileGrid& grid, std::size_t tile, const 
 
 }  // namespace detail
 
-/// Counts the fragments of a tile's pixels.
+/// Kernel that counts the fragments of a tile's pixels.
 template <class S>
 struct CountFragments {
   FragmentArgs<S> args;
@@ -85,7 +87,7 @@ struct CountFragments {
   }
 };
 
-/// Turns the counts of tiles into where each begins.
+/// Kernel that converts the counts of tiles into their first indices.
 template <class S>
 struct ScanFragments {
   FragmentArgs<S> args;
@@ -94,8 +96,8 @@ struct ScanFragments {
   }
 };
 
-/// Writes a tile's fragments, each pixel's from near to far; of equally far ones the first triangle's
-/// comes first. Where a surface is all transparent there is none.
+/// Kernel that writes the fragments of a tile, from near to far in each pixel. Fragments of equal depth
+/// stay in the order of triangles. Surfaces with alpha 0 give no fragment.
 template <class S>
 struct FillFragments {
   FragmentArgs<S> args;

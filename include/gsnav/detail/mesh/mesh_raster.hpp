@@ -7,16 +7,16 @@
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/mesh/mesh_surface.hpp"
 
-// Which triangle each pixel shows, and how far it is: the visibility pass. Nothing is shaded here.
+// The visibility pass: finds the nearest triangle and its depth at each pixel. Nothing is shaded here.
 
 namespace gsnav {
 
-/// The three edge functions of a triangle at pixel centres, exactly: all are >= 0 at the pixels that it
-/// owns. An edge owns a centre on it if it is a top or a left one, so that of two triangles that share
-/// it one does.
+/// Exact values of the three edge functions of a triangle at pixel centres. All are >= 0 at pixels that
+/// the triangle owns. A centre exactly on an edge belongs to the triangle if the edge is a top or left
+/// one. Exactly one of two triangles that share an edge therefore owns it.
 struct MeshEdges {
-  std::int64_t at[3];                 ///< at the centre of the pixel asked for
-  std::int64_t step_x[3], step_y[3];  ///< a pixel right, a pixel down
+  std::int64_t at[3];                 ///< at the centre of the current pixel
+  std::int64_t step_x[3], step_y[3];  ///< change per pixel to the right, and per pixel down
 
   template <class S>
   GSNAV_HD static MeshEdges of(const MeshTriangle<S>& t, const TileGrid& grid, int x, int y) noexcept {
@@ -41,7 +41,7 @@ struct MeshEdges {
   GSNAV_HD void step_down() noexcept {
     for (int i = 0; i < 3; ++i) at[i] += step_y[i];
   }
-  /// Whether some pixel of the w x h from the one asked for on may be inside.
+  /// True if some pixel of the w x h pixels right of and below the current one may be inside.
   GSNAV_HD bool reach(int w, int h) const noexcept {
     for (int i = 0; i < 3; ++i) {
       const std::int64_t best =
@@ -52,21 +52,21 @@ struct MeshEdges {
   }
 };
 
-/// Arguments of the visibility pass. Binning writes through `bin`, whose tile lists are of triangles.
+/// Arguments of the visibility pass. Binning writes through `bin`; its tile lists hold triangles.
 template <class S>
 struct MeshRasterArgs {
-  BinArgs<S> bin;  ///< of its arrays: cursors, tile_offsets, tile_splats
+  BinArgs<S> bin;  ///< uses only the arrays cursors, tile_offsets and tile_splats
   View<const MeshTriangle<S>> triangles;
   View<const MeshPlacement> placements;
   S* depth = nullptr;                ///< [H][W]
-  std::uint32_t* visible = nullptr;  ///< [H][W], which of `triangles`; kNoTriangle where none
-  View<S> tile_far;                  ///< [tiles]
+  std::uint32_t* visible = nullptr;  ///< [H][W], index into `triangles`, or kNoTriangle
+  View<S> tile_far;                  ///< [tiles], largest depth of each tile
 };
 inline constexpr std::uint32_t kNoTriangle = 0xffffffffu;
 
 namespace detail {
 
-/// Calls f(tile) for the tiles of which a triangle may own a pixel.
+/// Calls f(tile) for each tile in which a triangle may own a pixel.
 template <class S, class F>
 GSNAV_HD void for_each_mesh_tile(const TileGrid& grid, const MeshTriangle<S>& t, const F& f) noexcept {
   const int ts = grid.tile_size;
@@ -83,8 +83,9 @@ GSNAV_HD void for_each_mesh_tile(const TileGrid& grid, const MeshTriangle<S>& t,
   }
 }
 
-/// The pixels [left, right) of a row of n that one edge leaves: e at the first, `step` to the next.
-/// `inverse`: 1 / |step|, which only guesses; the edge decides.
+/// Shrinks the span [left, right) of a row of n pixels to those inside one edge. `e` is the edge
+/// function at the first pixel, `step` its change per pixel. `inverse` is 1 / |step|; it only gives a
+/// first guess, which is corrected exactly.
 GSNAV_HD void clip_span(std::int64_t e, std::int64_t step, double inverse, int n, int& left,
                         int& right) noexcept {
   if (step > 0) {
@@ -112,7 +113,7 @@ GSNAV_HD void clip_span(std::int64_t e, std::int64_t step, double inverse, int n
 
 }  // namespace detail
 
-/// Counts the tiles of one block of triangles.
+/// Kernel that counts the triangles in each tile, for one block of triangles.
 template <class S>
 struct CountMeshTiles {
   MeshRasterArgs<S> args;
@@ -128,7 +129,8 @@ struct CountMeshTiles {
   }
 };
 
-/// Writes the triangles of one block into their tiles, in order (after ScanTileIntersections).
+/// Kernel that writes the triangles of one block into the lists of their tiles, in order. Runs after
+/// ScanTileIntersections.
 template <class S>
 struct ScatterMeshTiles {
   MeshRasterArgs<S> args;
@@ -147,12 +149,12 @@ struct ScatterMeshTiles {
 
 namespace detail {
 
-/// 1 / z of a triangle at the first pixel of row y of its box, before it is limited.
+/// 1 / z of a triangle at the first pixel of row y of its box, before clamping.
 template <class S>
 GSNAV_HD double inverse_z_row(const MeshTriangle<S>& t, int y) noexcept {
   return fma(t.inverse_z.y, static_cast<double>(y - t.y0), t.inverse_z.value);
 }
-/// ... and `dx` pixels on.
+/// 1 / z, clamped, `dx` pixels to the right of the value `row` that inverse_z_row gave.
 template <class S>
 GSNAV_HD S inverse_z_at(const MeshTriangle<S>& t, double row, int dx) noexcept {
   const S plane = S(fma(t.inverse_z.x, static_cast<double>(dx), row));
@@ -161,13 +163,13 @@ GSNAV_HD S inverse_z_at(const MeshTriangle<S>& t, double row, int dx) noexcept {
 
 }  // namespace detail
 
-/// 1 / z of a triangle at a pixel of its box, 1 / metres.
+/// 1 / z of a triangle at a pixel of its box, in 1 / metres.
 template <class S>
 GSNAV_HD S mesh_inverse_z(const MeshTriangle<S>& t, int x, int y) noexcept {
   return detail::inverse_z_at(t, detail::inverse_z_row(t, y), x - t.x0);
 }
 
-/// Whether a triangle that owns a pixel has a hole there.
+/// True if a triangle that owns a pixel has a hole there.
 template <class S>
 GSNAV_HD bool mesh_hole(const MeshRasterArgs<S>& args, const MeshTriangle<S>& t, int x, int y,
                         S inverse_z) noexcept {
@@ -176,8 +178,8 @@ GSNAV_HD bool mesh_hole(const MeshRasterArgs<S>& args, const MeshTriangle<S>& t,
 
 namespace detail {
 
-/// Calls f(y, left, right) for the pixels [left, right) of rows of [x0, x1) x [y0, y1), all in a
-/// triangle's box, that the triangle owns.
+/// Calls f(y, left, right) for each row of the box [x0, x1) x [y0, y1), where [left, right) are the
+/// pixels that the triangle owns. The box must lie inside the triangle's box.
 template <class S, class F>
 GSNAV_HD void for_each_span(const TileGrid& grid, const MeshTriangle<S>& t, int x0, int y0, int x1,
                             int y1, const F& f) noexcept {
@@ -196,7 +198,7 @@ GSNAV_HD void for_each_span(const TileGrid& grid, const MeshTriangle<S>& t, int 
   }
 }
 
-/// Shows a triangle at the pixels of a span where it is the nearest so far.
+/// Writes a triangle to the pixels of a span where it is the nearest so far.
 template <class S>
 struct ShowSpan {
   const MeshRasterArgs<S>& args;
@@ -229,8 +231,8 @@ struct ShowSpan {
 
 }  // namespace detail
 
-/// Finds the nearest triangle of each pixel of a tile; of equally near ones the first. No pixel's depth
-/// depends on the tile that it is found in.
+/// Finds the nearest triangle at each pixel of a tile; of equally near ones the first wins. A pixel's
+/// depth does not depend on the tile size.
 template <class S>
 GSNAV_HD void rasterize_mesh_tile(const MeshRasterArgs<S>& args, std::size_t tile) noexcept {
   const TileGrid& grid = args.bin.grid;
@@ -242,7 +244,8 @@ GSNAV_HD void rasterize_mesh_tile(const MeshRasterArgs<S>& args, std::size_t til
   const auto row_at = [&](int y) GSNAV_INLINED { return static_cast<std::size_t>(y) * stride; };
   for (int y = tile_y; y < tile_bottom; ++y) {
     for (int x = tile_x; x < tile_right; ++x) {
-      args.depth[row_at(y) + static_cast<std::size_t>(x)] = S(0);  // 1 / z until the tile is done
+      // holds 1 / z until the tile is finished
+      args.depth[row_at(y) + static_cast<std::size_t>(x)] = S(0);
       args.visible[row_at(y) + static_cast<std::size_t>(x)] = kNoTriangle;
     }
   }
@@ -257,7 +260,7 @@ GSNAV_HD void rasterize_mesh_tile(const MeshRasterArgs<S>& args, std::size_t til
   for (int y = tile_y; y < tile_bottom; ++y) {
     for (int x = tile_x; x < tile_right; ++x) {
       S& depth = args.depth[row_at(y) + static_cast<std::size_t>(x)];
-      depth = S(1) / depth;  // infinity where there is none
+      depth = S(1) / depth;  // infinity where there is no triangle
       far = max(far, depth);
     }
   }

@@ -8,53 +8,56 @@
 #include "gsnav/detail/mesh/mesh.hpp"
 #include "gsnav/detail/mesh/mesh_clip.hpp"
 
-// From meshes to triangles on the image: what the rasteriser walks over. All of it in double, whatever
-// the scalar of the frame, so that which pixel belongs to whom is the same on every backend and in every
-// precision.
+// From meshes to triangles on the image, ready for the rasteriser. All of it is computed in double, so
+// that the pixels that a triangle owns are the same on every backend and in every precision.
 
 namespace gsnav {
 
-/// A vertex as one camera sees it.
+/// A vertex as seen by one camera.
 struct MeshVertex {
   Vec3d position{};  ///< camera axes, metres
-  MeshPoint point;   ///< where no clip code is set
+  MeshPoint point;   ///< valid if no clip code is set
   std::uint32_t code = 0;
 };
 
-/// value + x dx + y dy: affine in the pixel, from the centre of the first pixel of a triangle's box.
+/// Affine function of the pixel: value + x dx + y dy, with (dx, dy) counted from the centre of the first
+/// pixel of a triangle's box.
 template <class S>
 struct PixelPlane {
   S value{}, x{}, y{};
   GSNAV_HD S at(S dx, S dy) const noexcept { return fma(x, dx, fma(y, dy, value)); }
 };
 
-/// A triangle ready to be rasterised, or a piece of one that had to be clipped.
+/// A triangle ready for rasterisation, or one piece of a triangle that was clipped.
 template <class S>
 struct MeshTriangle {
-  MeshPoint corner[3];                ///< clockwise on the screen: edge functions are positive inside
-  std::int16_t x0, y0, x1, y1;        ///< half-open box of pixels whose centres may be inside
-  std::uint32_t placement, triangle;  ///< of the mesh's triangles
-  PixelPlane<double> inverse_z;       ///< 1 / z
+  MeshPoint corner[3];          ///< clockwise on the screen, so that edge functions are positive inside
+  std::int16_t x0, y0, x1, y1;  ///< half-open box of the pixels whose centres may be inside
+  std::uint32_t placement, triangle;  ///< index of the placement, and of the triangle in its mesh
+  PixelPlane<double> inverse_z;       ///< 1 / z, in 1 / metres
   S inverse_z_min,
-      inverse_z_max;     ///< over the corners: what a sliver's plane gives beyond is not its own
-  PixelPlane<S> b1, b2;  ///< weights of corners 1 and 2 of the mesh's triangle, over z
-  bool back;             ///< seen from behind
-  bool masked;           ///< MeshAlpha::mask
+      inverse_z_max;     ///< range of 1 / z over the corners. Values of a sliver's plane beyond it are
+                         ///< clamped.
+  PixelPlane<S> b1, b2;  ///< weights of corners 1 and 2 of the mesh's triangle, divided by z
+  bool back;             ///< true if seen from behind
+  bool masked;           ///< true for MeshAlpha::mask
 };
 
+/// Arguments for projecting, clipping and counting the triangles of one camera.
 template <class S>
 struct MeshSetupArgs {
   MeshCamera camera;
   View<const MeshPlacement> placements;
   View<const MeshChunk> vertex_chunks, triangle_chunks;
   View<MeshVertex> vertices;
-  View<std::uint32_t> counts;      ///< [triangle chunks], triangles that may cover a pixel centre
-  View<std::uint32_t> not_finite;  ///< [triangle chunks], left out: a corner is NaN or infinite
-  View<std::uint64_t> offsets;     ///< [triangle chunks + 1]
+  View<std::uint32_t> counts;      ///< [triangle chunks], number of pieces that may cover a pixel centre
+  View<std::uint32_t> not_finite;  ///< [triangle chunks], number of triangles left out because a corner
+                                   ///< is NaN or infinite
+  View<std::uint64_t> offsets;     ///< [triangle chunks + 1], index of each chunk's first piece
   View<MeshTriangle<S>> triangles;
 };
 
-/// Takes vertex i of a placement into the camera's axes and onto the lattice.
+/// Transforms vertex i of a placement to camera axes and projects it to the lattice.
 template <class S>
 GSNAV_HD void project_mesh_vertex(const MeshSetupArgs<S>& args, const MeshPlacement& placement,
                                   std::size_t i) noexcept {
@@ -65,7 +68,7 @@ GSNAV_HD void project_mesh_vertex(const MeshSetupArgs<S>& args, const MeshPlacem
     v.point = project_to_lattice(args.camera, v.position);
 }
 
-/// project_mesh_vertex for a chunk.
+/// Kernel that projects the vertices of a chunk.
 template <class S>
 struct ProjectMeshVertices {
   MeshSetupArgs<S> args;
@@ -79,30 +82,30 @@ struct ProjectMeshVertices {
 
 namespace detail {
 
-/// The first pixel whose centre is not below x, and the last whose centre is not above, of a row of
-/// `size`.
+/// First pixel of a row of `size` whose centre is at or right of lattice coordinate x.
 GSNAV_HD std::int32_t first_centre(std::int32_t x, int size) noexcept {
   constexpr std::int32_t kHalf = 1 << (kMeshSubpixelBits - 1);
   return (x + (size - 1) * kHalf + 2 * kHalf - 1) >> kMeshSubpixelBits;
 }
+/// Last pixel of a row of `size` whose centre is at or left of lattice coordinate x.
 GSNAV_HD std::int32_t last_centre(std::int32_t x, int size) noexcept {
   constexpr std::int32_t kHalf = 1 << (kMeshSubpixelBits - 1);
   return (x + (size - 1) * kHalf) >> kMeshSubpixelBits;
 }
 
-/// Twice the area, positive where the corners are clockwise on the screen.
+/// Twice the signed area, positive if the corners are clockwise on the screen.
 GSNAV_HD std::int64_t doubled_area(const MeshPoint& a, const MeshPoint& b, const MeshPoint& c) noexcept {
   return std::int64_t{b.x - a.x} * (c.y - a.y) - std::int64_t{b.y - a.y} * (c.x - a.x);
 }
 
-/// Places corners and box; false where nothing can be covered or what is seen is a back that is not
-/// drawn.
+/// Sets corners and box of a triangle. Returns false if it cannot cover a pixel centre, or is a back
+/// face that is not drawn.
 template <class S>
 GSNAV_HD bool place_triangle(const MeshCamera& camera, bool two_sided, const MeshPoint& a,
                              const MeshPoint& b, const MeshPoint& c, MeshTriangle<S>& out) noexcept {
   const std::int64_t area = doubled_area(a, b, c);
   if (area == 0) return false;
-  out.back = area > 0;  // counter-clockwise from outside is clockwise where y points down: negative
+  out.back = area > 0;  // counter-clockwise from outside gives a negative area, because y points down
   if (out.back && !two_sided) return false;
   out.corner[0] = a;
   out.corner[1] = out.back ? b : c;
@@ -119,9 +122,10 @@ GSNAV_HD bool place_triangle(const MeshCamera& camera, bool two_sided, const Mes
          box(a.y, b.y, c.y, camera.height, out.y0, out.y1);
 }
 
-/// Fills what is interpolated. With n = e1 x e2 the plane is n.p = n.v0, so 1/z = n.r / n.v0 along r =
-/// (u, v, 1); and the weight of corner 1 over z is r.c1 with c1 = q1 - n (q1.v0) / (n.v0), q1 = e2 x n /
-/// n.n: linear in r, whatever of the triangle lies behind the camera.
+/// Computes the planes that are interpolated over the triangle. With n = e1 x e2 the triangle's plane is
+/// n.p = n.v0, so 1/z = n.r / n.v0 along the ray r = (u, v, 1). The weight of corner 1 divided by z is
+/// r.c1, where c1 = q1 - n (q1.v0) / (n.v0) and q1 = e2 x n / n.n. Both are linear in r, even if the
+/// triangle reaches behind the camera.
 template <class S>
 GSNAV_HD void interpolate_triangle(const MeshCamera& camera, const Vec3d& v0, const Vec3d& v1,
                                    const Vec3d& v2, double z_min, double z_max,
@@ -133,7 +137,8 @@ GSNAV_HD void interpolate_triangle(const MeshCamera& camera, const Vec3d& v0, co
   out.inverse_z = {1.0 / z_min, 0, 0};
   out.b1 = out.b2 = {};
   const double inverse = 1.0 / nv;
-  if (!(nn > 0) || !is_finite(inverse)) return;  // edge-on: its nearest depth, its first corner's colour
+  // edge-on: use its nearest depth and its first corner's colour
+  if (!(nn > 0) || !is_finite(inverse)) return;
   const double px = out.x0 + 0.5 - camera.half_width - camera.cx,
                py = out.y0 + 0.5 - camera.half_height - camera.cy;
   const auto plane = [&](const Vec3d& c) GSNAV_INLINED {
@@ -150,8 +155,8 @@ GSNAV_HD void interpolate_triangle(const MeshCamera& camera, const Vec3d& v0, co
   out.b2 = weight(cross(n, e1) * (1.0 / nn));
 }
 
-/// Calls f(piece) for each piece of triangle t of a placement, number `at`, that may cover a pixel
-/// centre; `Full`: with what is interpolated. False where a corner is not finite.
+/// Calls f(piece) for each piece of triangle t of placement `at` that may cover a pixel centre. With
+/// `Full`, interpolated planes are computed as well. Returns false if a corner is not finite.
 template <bool Full, class S, class F>
 GSNAV_HD bool for_each_piece(const MeshSetupArgs<S>& args, std::uint32_t at, std::size_t t,
                              const F& f) noexcept {
@@ -200,7 +205,8 @@ GSNAV_HD bool for_each_piece(const MeshSetupArgs<S>& args, std::uint32_t at, std
   return true;
 }
 
-/// The same for a chunk of triangles; returns how many have a corner that is not finite.
+/// Calls f(piece) for the pieces of all triangles of a chunk. Returns the number of triangles with a
+/// corner that is not finite.
 template <bool Full, class S, class F>
 GSNAV_HD std::uint32_t for_each_piece_of_chunk(const MeshSetupArgs<S>& args, std::size_t c,
                                                const F& f) noexcept {
@@ -213,7 +219,8 @@ GSNAV_HD std::uint32_t for_each_piece_of_chunk(const MeshSetupArgs<S>& args, std
   return not_finite;
 }
 
-/// offsets[i]: the sum of the counts before i, for i in [0, n]. The two may be one array.
+/// Exclusive prefix sums: offsets[i] is the sum of the counts before i, for i in [0, n]. Both may be the
+/// same array.
 template <class Count>
 GSNAV_HD void exclusive_sums(const Count* counts, std::size_t n, std::uint64_t* offsets) noexcept {
   std::uint64_t sum = 0;
@@ -227,7 +234,7 @@ GSNAV_HD void exclusive_sums(const Count* counts, std::size_t n, std::uint64_t* 
 
 }  // namespace detail
 
-/// Counts the pieces of a chunk.
+/// Kernel that counts the pieces of a chunk of triangles.
 template <class S>
 struct CountMeshTriangles {
   MeshSetupArgs<S> args;
@@ -239,7 +246,7 @@ struct CountMeshTriangles {
   }
 };
 
-/// Where the pieces of each chunk go.
+/// Kernel that computes the index of each chunk's first piece.
 template <class S>
 struct ScanMeshTriangles {
   MeshSetupArgs<S> args;
@@ -248,7 +255,7 @@ struct ScanMeshTriangles {
   }
 };
 
-/// Writes the pieces of a chunk.
+/// Kernel that writes the pieces of a chunk.
 template <class S>
 struct WriteMeshTriangles {
   MeshSetupArgs<S> args;

@@ -7,24 +7,27 @@
 #include "gsnav/detail/frame/color_space.hpp"
 #include "gsnav/detail/mesh/mesh_raster.hpp"
 
-// What the visible triangles look like, one pixel after the other: each is shaded once, however many
-// triangles lie behind it.
+// Shading of visible triangles. Each pixel is shaded once, regardless of how many triangles lie behind
+// it.
 
 namespace gsnav {
 
-/// Images of meshes alone, in a backend's memory; a null pointer is one not asked for.
+/// Images of the meshes alone, in a backend's memory. Null pointers are images that are not requested.
 template <class S>
 struct MeshImages {
-  S* color = nullptr;   ///< [H][W][3], display-referred; 0 where there is no mesh
-  S* normal = nullptr;  ///< [H][W][3], unit, world axes, on the camera's side; 0 where there is no mesh
-  std::uint32_t* instance = nullptr;  ///< [H][W], MeshInstance::id; kNoInstance
-  std::uint32_t* triangle = nullptr;  ///< [H][W], of the instance's mesh; kNoInstance
+  S* color = nullptr;   ///< [H][W][3], sRGB-encoded; 0 where there is no mesh
+  S* normal = nullptr;  ///< [H][W][3], unit vectors in world axes, facing the camera; 0 where there is
+                        ///< no mesh
+  std::uint32_t* instance = nullptr;  ///< [H][W], MeshInstance::id; kNoInstance where there is no mesh
+  std::uint32_t* triangle = nullptr;  ///< [H][W], index of the triangle in its mesh; kNoInstance where
+                                      ///< there is no mesh
 
   GSNAV_HD bool empty() const noexcept {
     return color == nullptr && normal == nullptr && instance == nullptr && triangle == nullptr;
   }
 };
 
+/// Arguments of shading.
 template <class S>
 struct MeshShadeArgs {
   View<const MeshPlacement> placements;
@@ -33,13 +36,13 @@ struct MeshShadeArgs {
   const std::uint32_t* visible = nullptr;  ///< [H][W]
   std::size_t width = 0;
   bool unlit = true;
-  Vec3<S> ambient{}, light{}, diffuse{};  ///< light: unit, world axes
+  Vec3<S> ambient{}, light{}, diffuse{};  ///< light is a unit vector in world axes, towards the light
   MeshImages<S> images;
 
   GSNAV_HD bool lights(const MeshView& mesh) const noexcept { return !unlit && !mesh.unlit; }
 };
 
-/// What is seen of a surface there, display-referred; `normal`: read where it is lit.
+/// Colour of a surface point, sRGB-encoded. `normal` is read only if the mesh is lit.
 template <class S>
 GSNAV_HD Vec3<S> shaded_color(const MeshShadeArgs<S>& args, const MeshView& mesh,
                               const MeshTriangle<S>& t, const SurfacePoint<S>& at,
@@ -54,7 +57,7 @@ GSNAV_HD Vec3<S> shaded_color(const MeshShadeArgs<S>& args, const MeshView& mesh
   return {srgb_encoded(color.x), srgb_encoded(color.y), srgb_encoded(color.z)};
 }
 
-/// Shades one pixel, which shows triangle `id` (or kNoTriangle) at `depth`.
+/// Shades one pixel that shows triangle `id` (or kNoTriangle) at `depth`.
 template <class S>
 GSNAV_HD void shade_mesh_pixel(const MeshShadeArgs<S>& args, std::size_t pixel, std::uint32_t id,
                                S depth) noexcept {
@@ -94,7 +97,7 @@ GSNAV_HD void shade_mesh_pixel(const MeshShadeArgs<S>& args, std::size_t pixel) 
   shade_mesh_pixel(args, pixel, args.visible[pixel], args.depth[pixel]);
 }
 
-/// Shades one row of pixels.
+/// Kernel that shades one row of pixels.
 template <class S>
 struct ShadeMeshRow {
   MeshShadeArgs<S> args;

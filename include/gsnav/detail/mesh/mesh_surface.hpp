@@ -6,7 +6,7 @@
 
 #include "gsnav/detail/mesh/mesh_setup.hpp"
 
-// What a triangle's surface is at a pixel: where on it the pixel looks, its colour and its alpha there.
+// Properties of a triangle's surface at a pixel: the point on it, its colour and its alpha.
 
 namespace gsnav {
 
@@ -20,7 +20,7 @@ GSNAV_HD Vec3<S> mixed(const Vec3f& a, const Vec3f& b, const Vec3f& c, S wb, S w
   return {mix(a.x, b.x, c.x), mix(a.y, b.y, c.y), mix(a.z, b.z, c.z)};
 }
 
-/// Largest whole number not above x, |x| < 2^31.
+/// Largest integer <= x, for |x| < 2^31.
 template <class S>
 GSNAV_HD std::int32_t floor_of(S x) noexcept {
   const std::int32_t i = static_cast<std::int32_t>(x);
@@ -29,10 +29,11 @@ GSNAV_HD std::int32_t floor_of(S x) noexcept {
 
 }  // namespace detail
 
-/// What of a texture is asked for.
+/// Part of a texture to read.
 enum class Texel { color, alpha };
 
-/// Linear RGB; or in x how far alpha is from 255, exactly 0 where all of it is that.
+/// Weighted sum of texels: linear RGB, or in x the sum of alpha - 255. The latter is exactly 0 where all
+/// texels are opaque.
 template <Texel What, class S>
 struct TexelSum {
   Vec3<S> value{};
@@ -49,7 +50,7 @@ struct TexelSum {
 
 namespace detail {
 
-/// One level at (u, v), bilinear; `texels`: the level's first.
+/// Bilinear sample of one mip level at (u, v). `texels` points to the level's first texel.
 template <Texel What, class S>
 GSNAV_HD Vec3<S> sample_level(const TextureView& t, const std::uint8_t* texels, int width, int height,
                               S u, S v) noexcept {
@@ -68,10 +69,11 @@ GSNAV_HD Vec3<S> sample_level(const TextureView& t, const std::uint8_t* texels, 
   return sum.value;
 }
 
-/// At (u, v), which repeat; `footprint2`: square of how many texels of level 0 a pixel spans.
+/// Trilinear sample at (u, v), repeating. `footprint2` is the square of the number of level-0 texels
+/// that a pixel spans.
 template <Texel What, class S>
 GSNAV_HD Vec3<S> sample_texture(const TextureView& t, S u, S v, S footprint2) noexcept {
-  constexpr S kFar(1e6);  // beyond, coordinates in float mean nothing
+  constexpr S kFar(1e6);  // beyond this, float coordinates have no useful fraction
   u = clamp(u, -kFar, kFar);
   v = clamp(v, -kFar, kFar);
   u = u - S(floor_of(u));
@@ -96,15 +98,15 @@ GSNAV_HD Vec3<S> sample_texture(const TextureView& t, S u, S v, S footprint2) no
 
 }  // namespace detail
 
-/// Where on a triangle a pixel looks.
+/// Point of a triangle that a pixel shows.
 template <class S>
 struct SurfacePoint {
-  std::uint32_t corner[3];  ///< of the mesh's vertices
+  std::uint32_t corner[3];  ///< indices of the mesh's vertices
   S b1, b2;                 ///< weights of corners 1 and 2
-  S z;                      ///< metres
+  S z;                      ///< planar z, metres
 };
 
-/// Of the pixel (x, y) of a triangle's box, where it is at depth z.
+/// Surface point at the pixel (x, y) of a triangle's box, at depth z.
 template <class S>
 GSNAV_HD SurfacePoint<S> surface_point(const MeshView& mesh, const MeshTriangle<S>& t, int x, int y,
                                        S z) noexcept {
@@ -114,7 +116,7 @@ GSNAV_HD SurfacePoint<S> surface_point(const MeshView& mesh, const MeshTriangle<
   return {{index[0], index[1], index[2]}, b1, clamp(t.b2.at(dx, dy) * z, S(0), S(1) - b1), z};
 }
 
-/// The texture there, which there is.
+/// Sample of the mesh's texture at a surface point. The mesh must have a texture.
 template <Texel What, class S>
 GSNAV_HD Vec3<S> surface_texel(const MeshView& mesh, const MeshTriangle<S>& t,
                                const SurfacePoint<S>& at) noexcept {
@@ -124,7 +126,7 @@ GSNAV_HD Vec3<S> surface_texel(const MeshView& mesh, const MeshTriangle<S>& t,
       e2{S(uv2.x) - S(uv0.x), S(uv2.y) - S(uv0.y)};
   const S u = fma(e1.x, at.b1, fma(e2.x, at.b2, S(uv0.x))),
           v = fma(e1.y, at.b1, fma(e2.y, at.b2, S(uv0.y)));
-  // A weight is its plane over that of 1 / z.
+  // A weight is its plane divided by that of 1 / z, hence the quotient rule.
   const auto footprint2 = [&](S b1_step, S b2_step, S inverse_z_step) GSNAV_INLINED {
     const S d1 = fma(-at.b1, inverse_z_step, b1_step) * at.z,
             d2 = fma(-at.b2, inverse_z_step, b2_step) * at.z;
@@ -137,7 +139,7 @@ GSNAV_HD Vec3<S> surface_texel(const MeshView& mesh, const MeshTriangle<S>& t,
       max(footprint2(t.b1.x, t.b2.x, S(t.inverse_z.x)), footprint2(t.b1.y, t.b2.y, S(t.inverse_z.y))));
 }
 
-/// Linear RGB before light.
+/// Colour of the surface before lighting, linear RGB.
 template <class S>
 GSNAV_HD Vec3<S> surface_color(const MeshView& mesh, const MeshTriangle<S>& t,
                                const SurfacePoint<S>& at) noexcept {
@@ -154,7 +156,7 @@ GSNAV_HD Vec3<S> surface_color(const MeshView& mesh, const MeshTriangle<S>& t,
   return color;
 }
 
-/// Alpha, in [0, 1]; 0 where it is not a number.
+/// Alpha of the surface in [0, 1]; 0 if it is NaN.
 template <class S>
 GSNAV_HD S surface_alpha(const MeshView& mesh, const MeshTriangle<S>& t,
                          const SurfacePoint<S>& at) noexcept {
@@ -170,13 +172,13 @@ GSNAV_HD S surface_alpha(const MeshView& mesh, const MeshTriangle<S>& t,
   return alpha > S(0) ? min(alpha, S(1)) : S(0);
 }
 
-/// Whether a MeshAlpha::mask surface has a hole there.
+/// True if a MeshAlpha::mask surface has a hole at the pixel.
 template <class S>
 GSNAV_HD bool surface_hole(const MeshView& mesh, const MeshTriangle<S>& t, int x, int y, S z) noexcept {
   return !(surface_alpha(mesh, t, surface_point(mesh, t, x, y, z)) >= S(mesh.alpha_cutoff));
 }
 
-/// Unit normal there, world axes, on the camera's side.
+/// Unit normal at a surface point, in world axes, facing the camera.
 template <class S>
 GSNAV_HD Vec3<S> surface_normal(const MeshPlacement& placement, const MeshTriangle<S>& t,
                                 const SurfacePoint<S>& at) noexcept {
@@ -191,7 +193,7 @@ GSNAV_HD Vec3<S> surface_normal(const MeshPlacement& placement, const MeshTriang
                            mesh.normals[at.corner[2]], at.b1, at.b2);
   }
   normal = mat_cast<S>(placement.rotation) * normal;
-  // Relative to the largest entry, so that a small face's is not lost.
+  // Divide by the largest component first, so that the normal of a small face does not underflow.
   const S largest = max(abs(normal.x), max(abs(normal.y), abs(normal.z)));
   if (largest > S(0)) {
     normal = normal * (S(1) / largest);

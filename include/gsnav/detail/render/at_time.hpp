@@ -11,7 +11,8 @@
 
 namespace gsnav {
 
-/// Checks that the arrays fit each other; names the one that does not.
+/// Checks that the lengths of all arrays agree.
+/// @return invalid_argument naming the array.
 inline Status validate(const TemporalView& in) {
   const std::size_t n = in.base.size();
   Status status;
@@ -31,7 +32,7 @@ inline Status validate(const TemporalView& in) {
   return status;
 }
 
-/// A moment of moving Gaussians in a backend's memory, used again for the next one.
+/// State of moving Gaussians at one moment, in a backend's memory. Reused for the next moment.
 template <Backend B>
 struct Moment {
   explicit Moment(B& backend)
@@ -43,15 +44,16 @@ struct Moment {
   Buffer<float, B> opacities;
   Buffer<ChunkBounds, B> bounds;
   GaussianRows
-      gaussians;  ///< what to render: the base's shapes and colours, the moment's means and opacities
+      gaussians;  ///< set to render: shapes and colours of the base, means and opacities of the moment
 };
 
-/// Takes N moving Gaussians to the time `t`, seconds: `out.gaussians` is a set like any other until the
-/// next call. Those whose opacity is below 1/255 then get 0 and are not drawn. Arithmetic is in S; the
-/// reference is double. Chunks get the moment's bounds where the host reaches the backend's memory and
-/// rows are sorted (`base.chunk_bounds`), else none, and all chunks are touched. The result is there
-/// after `backend.synchronize()`. Errors: invalid_argument naming the array, or a time that is not
-/// finite.
+/// Evaluates N moving Gaussians at time `t` in seconds. `out.gaussians` can be rendered like any other
+/// set until the next call. Gaussians whose opacity falls below 1/255 get opacity 0 and are not drawn.
+///
+/// Arithmetic is in S; double is the reference. On host backends with sorted rows (`base.chunk_bounds`
+/// is set), chunks get bounds for this moment; otherwise they have no bounds and none is culled. The
+/// result is complete after `backend.synchronize()`.
+/// @return invalid_argument naming the array, or for a time that is not finite.
 template <class S, Backend B>
 Status gaussians_at(B& backend, const TemporalView& in, double t, Moment<B>& out) {
   if (Status s = validate(in); !s) return s;

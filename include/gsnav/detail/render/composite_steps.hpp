@@ -15,9 +15,10 @@ namespace gsnav {
 
 namespace detail {
 
-/// Whether a mesh hides every Gaussian of a chunk at every pixel that it may reach (host memory). Never
-/// yes where one is seen: bounds are those of chunk_extent, and the reach of a depth is at most that of
-/// the largest and most opaque.
+/// True if a mesh hides every Gaussian of a chunk at every pixel that it may reach. Arrays are in host
+/// memory. The test is conservative: it is never true if some Gaussian of the chunk is visible. The
+/// chunk's bounds are those of chunk_extent, and no Gaussian reaches nearer than the largest and most
+/// opaque one would.
 inline bool mesh_hides_chunk(const ViewedSet<float>& args, const TileGrid& grid,
                              const View<const float>& tile_far, std::size_t c) noexcept {
   const ProjectionCamera<double>& camera = args.camera64;
@@ -31,7 +32,7 @@ inline bool mesh_hides_chunk(const ViewedSet<float>& args, const TileGrid& grid,
   const auto tile = [&grid](double pixel, int tiles) {
     return static_cast<int>(clamp(pixel / grid.tile_size, 0.0, static_cast<double>(tiles - 1)));
   };
-  if (!(e.x0 <= e.x1 && e.y0 <= e.y1)) return false;  // not finite: nothing is known
+  if (!(e.x0 <= e.x1 && e.y0 <= e.y1)) return false;  // bounds that are not finite tell us nothing
   const int x0 = tile(e.x0, grid.columns), x1 = tile(e.x1, grid.columns);
   const int y0 = tile(e.y0, grid.rows), y1 = tile(e.y1, grid.rows);
   for (int y = y0; y <= y1; ++y) {
@@ -44,7 +45,8 @@ inline bool mesh_hides_chunk(const ViewedSet<float>& args, const TileGrid& grid,
   return true;
 }
 
-/// Projects the chunks of a set that a mesh does not hide; `list` is scratch, `counts` are 0.
+/// Projects the chunks of a set that a mesh does not hide. `list` is scratch memory. out.counts must be
+/// 0 on entry.
 template <class B>
 void project_unhidden(B& backend, const ViewedSet<float>& args, const ProjectOutputs<float>& out,
                       const View<const float>& tile_far, std::vector<std::uint32_t>& list) {
@@ -69,7 +71,8 @@ void blend_pixels_with_meshes(B& backend, const RasterArgs<S>& args) {
   });
 }
 
-/// Blends frames with a mesh. Pixels that are seen through something are blended anew.
+/// Blends a frame with meshes. Pixels with see-through surfaces are then blended again, with the
+/// fragments.
 template <class S, Backend B>
 void rasterize_composite(B& backend, const RasterArgs<S>& args) {
   run(backend, stage::BlendWithMeshes{}, args);

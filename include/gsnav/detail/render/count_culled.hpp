@@ -15,16 +15,16 @@
 
 namespace gsnav {
 
-/// Rows of a frame by what culling does with them, nothing hidden by anything. Rows of chunks that a cut
-/// does not draw count as not touched.
+/// Counts of a frame's rows by the result of culling, as if nothing were hidden. Rows in chunks that a
+/// level-of-detail cut does not draw count as not touched.
 struct CullCounts {
-  std::uint64_t rows = 0;      ///< in all sets
-  std::uint64_t touched = 0;   ///< in chunks, and parts of chunks, that may be in view
-  std::uint64_t emitting = 0;  ///< of these, with at least one (tile, Gaussian) pair
+  std::uint64_t rows = 0;      ///< rows of all sets
+  std::uint64_t touched = 0;   ///< rows in chunks and parts that may be in view
+  std::uint64_t emitting = 0;  ///< touched rows with at least one (tile, Gaussian) pair
 
   std::uint64_t removed() const noexcept { return rows - touched; }
   std::uint64_t removable() const noexcept { return rows - emitting; }
-  /// Rows touched for each that was needed; at least 1, and 1 where none was touched.
+  /// Rows touched per row that was needed, >= 1. If none was touched, 1.
   double touched_per_emitting() const noexcept {
     return touched == 0
                ? 1.0
@@ -32,8 +32,8 @@ struct CullCounts {
   }
 };
 
-/// Counts for one camera. Arrays are in host memory; float32, as frames are. Rows that are not touched
-/// have no pair: that is what culling promises, and a test shows.
+/// Counts the rows that culling keeps and removes for one camera. Uses float32, as frames do. Arrays are
+/// in host memory. Culling guarantees that rows that are not touched have no (tile, Gaussian) pair.
 template <Backend B>
 requires is_host_backend<B> CullCounts count_culled(B& backend, std::span<const GaussianSet> sets,
                                                     const Camera& camera, const RenderConfig& config) {

@@ -18,22 +18,24 @@
 
 namespace gsnav {
 
-/// Backends that can draw a frame in slices of depth: their Blend goes on where the slice before ended
-/// (RasterArgs::progress), which the generic one does not.
+/// Backends that can draw a frame in slices of depth. Their Blend must continue where the previous slice
+/// ended (RasterArgs::progress); the generic one cannot.
 template <class B, class S>
 concept SlicingBackend = ProjectsChunks<B, S> && RunsStage<B, stage::Blend, RasterArgs<S>>;
 
-/// A frame in slices of depth, front to back: what a slice leaves closed, the next need not project,
-/// colour, sort or bin. The image is that of one slice, bit for bit: a pixel meets the same splats in
-/// the same order, but for those that come when it is closed.
+/// Plan of a frame that is drawn in slices of depth, front to back. Where a slice has closed all pixels,
+/// later slices need not project, colour, sort or bin anything. The image has the same bits as with one
+/// slice. Each pixel blends the same splats in the same order, except those that come after it is
+/// closed.
 ///
-/// A chunk belongs to the slice of its nearest possible key; what of it is farther waits, projected, for
-/// its own.
+/// A chunk belongs to the slice of its nearest possible key. Its farther Gaussians are projected with it
+/// and wait for their own slices.
 class DepthSlices {
  public:
   static constexpr int kMost = 8;
 
-  /// Finds how deep each chunk lies and where in the image. `sets`: one projection a set.
+  /// Finds the depth and the image region of each chunk.
+  /// @param sets one projection per set
   template <class B>
   void plan(B& backend, View<const ViewedSet<float>> sets) {
     chunks_.resize(sets.size == 0 ? 0
@@ -56,17 +58,17 @@ class DepthSlices {
       }
     }
   }
-  /// Gaussians of chunks that may be visible.
+  /// Number of Gaussians in chunks that may be visible.
   std::size_t candidates() const noexcept { return candidates_; }
 
-  /// Cuts what was planned into n slices, or as many as there are depths.
+  /// Cuts the plan into n slices, or fewer if there are fewer distinct depths.
   void cut(int n) noexcept {
     count_ = 0;
     std::size_t seen = 0, bucket = 0;
     for (int s = 0; s + 1 < n; ++s) {
       const double share = kFirst + (1 - kFirst) * s / n;
       const std::size_t wanted = static_cast<std::size_t>(share * static_cast<double>(candidates_));
-      if (seen >= wanted) continue;  // no slice is empty
+      if (seen >= wanted) continue;  // a slice would be empty
       while (bucket + 1 < kBuckets && seen < wanted) seen += weights_[bucket++];
       ends_[static_cast<std::size_t>(count_++)] = bucket;
     }
@@ -74,13 +76,13 @@ class DepthSlices {
   }
   int count() const noexcept { return count_; }
 
-  /// The keys of slice s.
+  /// Range of the keys of slice s.
   KeyRange keys(int s) const noexcept {
     const auto end = [this](int i) { return key_of_bucket(ends_[static_cast<std::size_t>(i)]); };
     return {s == 0 ? 0 : end(s - 1), s + 1 == count_ ? 0xffffffffu : end(s) - 1};
   }
-  /// The chunks of one set that slice s projects: those that may reach a cell of `open`, or all where
-  /// that is empty.
+  /// Chunks of one set that slice s projects: those that may reach a cell in `open`, or all if `open` is
+  /// empty. Valid until the next call.
   View<const std::uint32_t> chunks(int s, const ViewedSet<float>& args, const OpenCells& open) {
     const std::size_t begin = s == 0 ? 0 : ends_[static_cast<std::size_t>(s - 1)];
     const std::size_t end = ends_[static_cast<std::size_t>(s)];
@@ -94,7 +96,8 @@ class DepthSlices {
     return {list_.data(), list_.size()};
   }
 
-  /// The cells that a slice left open (TileProgress::open), for the next one's projection.
+  /// Open cells for the projection of the next slice, from TileProgress::open of the last one. Valid
+  /// until the next call.
   OpenCells open_cells(const TileGrid& grid, View<const std::uint64_t> open) {
     const std::size_t side = static_cast<std::size_t>(grid.tile_size / OpenCells::kSize);
     const std::size_t tiles = static_cast<std::size_t>(grid.columns);
@@ -116,7 +119,7 @@ class DepthSlices {
     return {{sums_.data(), sums_.size()}, stride};
   }
 
-  /// As RenderWorkspace::grow_to.
+  /// Grows the capacity to that of `o` (see RenderWorkspace::grow_to).
   void grow_to(const DepthSlices& o) {
     chunks_.reserve(o.chunks_.capacity());
     list_.reserve(o.list_.capacity());
@@ -128,13 +131,13 @@ class DepthSlices {
   }
 
  private:
-  /// Buckets of depth: 16 an octave, from a millimetre on.
+  /// Number of depth buckets: 16 per octave, from 1 mm on.
   static constexpr std::size_t kBuckets = 512;
   static constexpr int kBucketShift = 19;
-  /// Share of the Gaussians in the first slice.
+  /// Fraction of the Gaussians in the first slice.
   static constexpr double kFirst = 0.35;
 
-  /// Bucket of the nearest key, and cells that may be reached.
+  /// Bucket of a chunk's nearest key, and the half-open range of cells that it may reach.
   struct Place {
     std::uint16_t bucket = 0;
     std::uint16_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
@@ -156,7 +159,7 @@ class DepthSlices {
     const ChunkBounds& chunk = bounds[id];
     if (!may_be_visible(args.camera64, chunk)) return {};
     const ChunkExtent e = chunk_extent(args.camera64, chunk);
-    // Of what is not finite nothing is known: it lies nearest, everywhere.
+    // Bounds that are not finite tell us nothing: treat the chunk as nearest and as covering the image.
     const auto begin = [](double pixel, int size) {
       return static_cast<std::uint16_t>((pixel > 0 ? std::min(pixel, static_cast<double>(size)) : 0.0) /
                                         kSize);

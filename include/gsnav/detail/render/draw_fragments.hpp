@@ -14,12 +14,13 @@
 
 namespace gsnav {
 
-/// Scratch of `draw_fragments`; grows to the largest frame. Empty while nothing is seen through.
+/// Scratch memory of `draw_fragments`. It grows to the largest frame, and is empty while there are no
+/// see-through surfaces.
 template <class S, Backend B>
 struct FragmentWorkspace {
   explicit FragmentWorkspace(B& b) : mesh(b), ranges(b), tile_begin(b), fragments(b) {}
 
-  MeshWorkspace<S, B> mesh;  ///< of its triangles
+  MeshWorkspace<S, B> mesh;  ///< workspace for the triangles of see-through surfaces
   Buffer<FragmentRange, B> ranges;
   Buffer<std::uint64_t, B> tile_begin;
   Buffer<MeshFragment<S>, B> fragments;
@@ -29,7 +30,7 @@ struct FragmentWorkspace {
            fragments.capacity_bytes();
   }
   std::size_t capacity_bytes() const noexcept { return bytes(); }
-  /// As RenderWorkspace::grow_to.
+  /// Grows the capacity to that of `o` (see RenderWorkspace::grow_to).
   void grow_to(const FragmentWorkspace& o) {
     mesh.grow_to(o.mesh);
     ranges.grow_to(o.ranges);
@@ -38,16 +39,20 @@ struct FragmentWorkspace {
   }
 };
 
-/// Whether a frame has surfaces that are seen through.
+/// True if some mesh is see-through.
 inline bool any_seen_through(std::span<const MeshInstance> meshes) noexcept {
   return std::any_of(meshes.begin(), meshes.end(), detail::seen_through);
 }
 
-/// Lists at each pixel the surfaces that are seen through (MeshAlpha::blend), as many as there are, near
-/// to far, up to the opaque depth `behind` [H][W]. `color`: with their colours, lit as draw_meshes does,
-/// linear where `linear`. Gives the lists to `layer`; they are good until the next call. Adds to
-/// `stats`. `meshes` are those of draw_meshes, which has found them valid. Errors: unsupported (2^32
-/// triangles); backend_failure; out_of_memory is thrown by the workspace.
+/// Lists the see-through surfaces (MeshAlpha::blend) at each pixel, near to far, up to the opaque depth.
+/// Stores the lists in `layer`, where they are valid until the next call. Adds to `stats`.
+///
+/// @param meshes the instances that were given to draw_meshes, which has validated them
+/// @param color whether to compute colours, lit as in draw_meshes
+/// @param linear whether colours are in linear light
+/// @param behind [H][W], depth of the opaque meshes
+/// @return unsupported for 2^32 triangles or more; backend_failure. The workspace throws gsnav::Error
+///   (out_of_memory).
 template <class S, Backend B>
 Status draw_fragments(B& backend, FragmentWorkspace<S, B>& ws, std::span<const MeshInstance> meshes,
                       const Camera& camera, const MeshLight& light, int tile_size, bool color,

@@ -10,15 +10,16 @@
 
 namespace gsnav {
 
-/// The meshes of a frame, and their light.
+/// Meshes of a frame and their light.
 struct MeshFrame {
-  std::span<const MeshInstance> instances;  ///< arrays in the backend's memory
+  std::span<const MeshInstance> instances;  ///< instances; their arrays are in the backend's memory
   MeshLight light{};
 };
 
-/// Draws the images of one camera: of Gaussians alone by render_camera, else with meshes among them
-/// (docs/composition.md). `sets` may be empty. Errors: those of render_camera and draw_meshes;
-/// unsupported, where Composite::hard_depth meets a mesh that is seen through.
+/// Draws the images of one camera. Without meshes it calls render_camera; otherwise meshes and Gaussians
+/// are composited (docs/composition.md). `sets` may be empty.
+/// @return the errors of render_camera and draw_meshes; unsupported for Composite::hard_depth with a
+///   see-through mesh.
 template <class S, Backend B>
 Status draw_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
                   const MeshFrame& meshes, const Camera& camera, const RenderConfig& config,

@@ -17,7 +17,8 @@
 
 namespace gsnav {
 
-/// Scratch of `draw_meshes`; grows to the largest frame. Empty while there are no meshes.
+/// Scratch memory of `draw_meshes`. It grows to the largest frame, and is empty while there are no
+/// meshes.
 template <class S, Backend B>
 struct MeshWorkspace {
   explicit MeshWorkspace(B& b)
@@ -45,14 +46,14 @@ struct MeshWorkspace {
   Buffer<MeshTriangle<S>, B> triangles;
   Buffer<std::uint64_t, B> cursors, tile_offsets;
   Buffer<std::uint32_t, B> tile_triangles;
-  Buffer<S, B> depth;                ///< [H][W] of the last frame
-  Buffer<std::uint32_t, B> visible;  ///< [H][W]
+  Buffer<S, B> depth;                ///< [H][W], depth of the last frame
+  Buffer<std::uint32_t, B> visible;  ///< [H][W], index of the visible triangle
   Buffer<S, B> tile_far;
-  Buffer<S, B> color;  ///< [H][W][3], where draw_meshes was asked for a layer's colour
+  Buffer<S, B> color;  ///< [H][W][3], if draw_meshes was called with layer_color
   std::vector<MeshPlacement> host_placements;
   std::vector<MeshChunk> host_vertex_chunks, host_triangle_chunks;
   std::vector<std::uint32_t> host_not_finite;
-  std::vector<std::uint32_t> unhidden;  ///< chunks of Gaussians
+  std::vector<std::uint32_t> unhidden;  ///< chunks of Gaussians that no mesh hides
 
   std::size_t bytes() const noexcept {
     std::size_t sum = 0;
@@ -61,7 +62,7 @@ struct MeshWorkspace {
     });
     return sum;
   }
-  /// As RenderWorkspace::grow_to.
+  /// Grows the capacity to that of `o` (see RenderWorkspace::grow_to).
   void grow_to(const MeshWorkspace& o) {
     for_each(*this, o, [](auto& own, const auto& other) {
       if constexpr (requires { own.grow_to(other); }) {
@@ -89,7 +90,8 @@ struct MeshWorkspace {
   }
 };
 
-/// Checks an instance against what kernels assume, but for its indices; names what does not fit.
+/// Checks an instance against the assumptions of kernels, except the values of its indices.
+/// @return invalid_argument naming the field.
 inline Status validate(const MeshInstance& instance) {
   const MeshView& m = instance.mesh;
   const BadArgument bad{"MeshInstance: "};
@@ -134,7 +136,7 @@ inline Status validate(const MeshInstance& instance) {
 
 namespace detail {
 
-/// Whether any of a box may be in the image. Never no where some is.
+/// True if a mesh's box may be in the image. Conservative: never false if some of the box is.
 inline bool box_may_be_visible(const MeshCamera& camera, const MeshPlacement& p) noexcept {
   const MeshView& m = p.mesh;
   if (m.low.x > m.high.x) return true;
@@ -147,13 +149,13 @@ inline bool box_may_be_visible(const MeshCamera& camera, const MeshPlacement& p)
   return all == 0 || (all & kMeshNotFinite) != 0;
 }
 
-/// Whether a mesh is drawn as fragments.
+/// True if a mesh is drawn as fragments.
 inline bool seen_through(const MeshInstance& m) noexcept {
   return m.mesh.alpha_mode == MeshAlpha::blend;
 }
 
-/// An instance as a camera sees it; false where there is nothing to draw of it among those that are seen
-/// through, or among the others.
+/// Transforms an instance to a camera. Returns false if it draws nothing: it has no triangles, is out of
+/// view, or its see-through property differs from `through`.
 inline bool place_mesh(const MeshInstance& i, const Camera& camera, const MeshCamera& lens, bool through,
                        MeshPlacement& p) noexcept {
   p.mesh = i.mesh;
@@ -165,7 +167,7 @@ inline bool place_mesh(const MeshInstance& i, const Camera& camera, const MeshCa
   return seen_through(i) == through && i.mesh.triangle_count() != 0 && box_may_be_visible(lens, p);
 }
 
-/// Lists the work of the instances in view, of those that are seen through or of the others.
+/// Lists the work items of the instances in view, of those whose see-through property is `through`.
 template <class S, Backend B>
 void place_meshes(MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes, const Camera& camera,
                   bool through) {
@@ -194,7 +196,8 @@ void place_meshes(MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes,
   ws.vertices.resize_discard(vertices);
 }
 
-/// Names what of a frame's meshes cannot be, or ok.
+/// Checks the meshes, the camera and the light of a frame.
+/// @return invalid_argument naming the field.
 inline Status validate(std::span<const MeshInstance> meshes, const Camera& camera,
                        const MeshLight& light) {
   if (Status s = gsnav::validate(camera); !s) return s;
@@ -208,8 +211,8 @@ inline Status validate(std::span<const MeshInstance> meshes, const Camera& camer
   return {};
 }
 
-/// Fills ws.triangles with what may cover a pixel of the instances that are seen through, or of the
-/// others; adds to `stats`.
+/// Fills ws.triangles with the triangles that may cover a pixel centre: those of the see-through
+/// instances if `through`, otherwise those of the others. Adds to `stats`.
 template <class S, Backend B>
 Status set_up_meshes(B& backend, MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes,
                      const Camera& camera, bool through, MeshStats& stats) {
@@ -244,7 +247,7 @@ Status set_up_meshes(B& backend, MeshWorkspace<S, B>& ws, std::span<const MeshIn
   return {};
 }
 
-/// What rasterising what was set up reads.
+/// Arguments for rasterising the triangles that set_up_meshes prepared.
 template <class S, Backend B>
 MeshRasterArgs<S> raster_args(MeshWorkspace<S, B>& ws, const Camera& camera, int tile_size) {
   MeshRasterArgs<S> raster;
@@ -254,7 +257,7 @@ MeshRasterArgs<S> raster_args(MeshWorkspace<S, B>& ws, const Camera& camera, int
   return raster;
 }
 
-/// Lists the triangles of each tile.
+/// Builds the list of triangles of each tile.
 template <class S, Backend B>
 Status bin_meshes(B& backend, MeshWorkspace<S, B>& ws, MeshRasterArgs<S>& raster) {
   BinArgs<S>& bin = raster.bin;
@@ -282,7 +285,7 @@ void set_light(MeshShadeArgs<S>& shade, const MeshLight& light) noexcept {
   shade.light = light.unlit ? Vec3<S>{} : vec_cast<S>(normalized(light.direction));
 }
 
-/// What shading what was set up reads.
+/// Arguments for shading the triangles that set_up_meshes prepared.
 template <class S, Backend B>
 MeshShadeArgs<S> shade_args(MeshWorkspace<S, B>& ws, const Camera& camera, const MeshLight& light) {
   MeshShadeArgs<S> shade;
@@ -295,11 +298,15 @@ MeshShadeArgs<S> shade_args(MeshWorkspace<S, B>& ws, const Camera& camera, const
 
 }  // namespace detail
 
-/// Draws meshes into ws.depth, ws.visible and ws.tile_far (of tiles of `tile_size`), and into `images`
-/// what is asked for; `layer_color`: colour into ws.color. Those that are seen through
-/// (MeshAlpha::blend) are not drawn here (detail/render/draw_fragments.hpp). The result is there after
-/// `backend.synchronize()`, and good until the next call. Arrays of `meshes` are in the backend's
-/// memory. Fills `stats` when given. Errors: invalid_argument naming the field; backend_failure.
+/// Draws meshes into ws.depth, ws.visible and ws.tile_far, and into the images that are not null in
+/// `images`. See-through meshes (MeshAlpha::blend) are left to draw_fragments
+/// (detail/render/draw_fragments.hpp). The result is complete after `backend.synchronize()` and valid
+/// until the next call.
+/// @param meshes instances; their arrays are in the backend's memory
+/// @param tile_size width of the tiles of ws.tile_far, pixels
+/// @param layer_color whether to write the colour to ws.color. Then `images.color` is replaced by it.
+/// @param stats filled on success, if not null
+/// @return invalid_argument naming the field; unsupported for 2^32 triangles or more; backend_failure.
 template <class S, Backend B>
 Status draw_meshes(B& backend, MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes,
                    const Camera& camera, const MeshLight& light, int tile_size, bool layer_color,

@@ -16,27 +16,28 @@
 
 namespace gsnav {
 
-/// The sort keys of one slice of depth.
+/// Range of the sort keys in one slice of depth: [low, last].
 struct KeyRange {
   std::uint32_t low = 0, last = 0xffffffffu;
   GSNAV_HD bool whole() const noexcept { return low == 0 && last == 0xffffffffu; }
   GSNAV_HD bool contains(std::uint32_t key) const noexcept { return key - low <= last - low; }
 };
 
-/// What the projection left in its chunks, and room for what orders it.
+/// Keys and counts that the projection left per chunk, and memory for sorting them.
 template <Backend B>
 struct VisibleOrder {
   explicit VisibleOrder(B& b)
       : chunk_keys(b), ranks(b), counts(b), taken(b), keys(b), order(b), offsets(b), sort(b) {}
-  Buffer<std::uint32_t, B> chunk_keys, ranks, counts;  ///< [slots], [slots] or none, [chunks]
-  Buffer<std::uint32_t, B> taken;                      ///< [chunks]: how many are in a range of keys
-  Buffer<std::uint32_t, B> keys, order;                ///< of the visible, front to back
-  Buffer<std::uint64_t, B> offsets;  ///< of chunks, where the host cannot read `counts`
+  Buffer<std::uint32_t, B> chunk_keys, ranks, counts;  ///< [slots]; [slots] or empty; [chunks]
+  Buffer<std::uint32_t, B> taken;        ///< [chunks], number of rows whose key is in the range
+  Buffer<std::uint32_t, B> keys, order;  ///< keys and slots of the visible Gaussians, front to back
+  Buffer<std::uint64_t, B> offsets;  ///< [chunks], first index of each chunk; used if the host cannot
+                                     ///< read `counts`
   SortScratch<B> sort;
   std::vector<std::uint32_t> host_counts;
   std::vector<std::uint64_t> host_offsets;
 
-  /// f(a.member, b.member) for each buffer and vector.
+  /// Calls f(a.member, b.member) for each buffer and vector.
   template <class A, class C, class F>
   static void for_each(A& a, C& b, const F& f) {
     f(a.chunk_keys, b.chunk_keys), f(a.ranks, b.ranks), f(a.counts, b.counts), f(a.taken, b.taken);
@@ -49,8 +50,8 @@ struct VisibleOrder {
 
 namespace detail {
 
-/// Moves the survivors of the chunks into one list, (key, slot) pairs in slot order: one work item a
-/// slot, for backends of very many threads.
+/// Kernel that gathers the visible splats of all chunks into one list of (key, slot) pairs in slot
+/// order. One work item per slot, for backends with very many threads.
 struct GatherSlot {
   View<const std::uint32_t> chunk_keys, counts;
   View<const std::uint64_t> chunk_offsets;
@@ -63,7 +64,7 @@ struct GatherSlot {
   }
 };
 
-/// Counts the survivors of a chunk that are in a range of keys.
+/// Kernel that counts the visible splats of a chunk whose key is in a range.
 struct CountInRange {
   View<const std::uint32_t> chunk_keys, counts;
   KeyRange range;
@@ -76,15 +77,16 @@ struct CountInRange {
   }
 };
 
-/// The same list without making it: a sort reads it from the chunks, in blocks of as many survivors.
+/// Source of a sort that reads the list of GatherSlot directly from the chunks, in blocks of about equal
+/// numbers of splats.
 struct VisibleSource {
   static constexpr std::size_t kMostBlocks = 64;
   View<const std::uint32_t> chunk_keys, counts, taken;
   KeyRange range;
-  std::uint32_t base;  ///< subtracted from keys: none is below
+  std::uint32_t base;  ///< subtracted from all keys; no key is less
   std::array<std::size_t, kMostBlocks + 1> first_chunk;
 
-  /// Cuts the chunks so that each block has about as many.
+  /// Cuts the chunks so that each block has about the same number of splats.
   void split_by(const SortBlocks& split) noexcept {
     first_chunk[0] = 0;
     std::size_t block = 1, seen = 0;
@@ -110,7 +112,8 @@ struct VisibleSource {
   }
 };
 
-/// Sorts the slots of equal keys by rank: work item i does the run that starts at i.
+/// Kernel that sorts slots of equal keys by rank. Work item i handles the run of equal keys that starts
+/// at i.
 struct RankTies {
   View<const std::uint32_t> keys, ranks;
   View<std::uint32_t> order;
@@ -123,7 +126,8 @@ struct RankTies {
   }
 
  private:
-  /// Ties are few, but a wall across the view may be one: n log n, in place, and no recursion.
+  /// Heap sort: ties are usually few, but a wall parallel to the image can make one long run. It takes n
+  /// log n steps, in place and without recursion.
   GSNAV_HD void heap_sort(std::uint32_t* slots, std::size_t n) const noexcept {
     for (std::size_t root = n / 2; root-- > 0;) sift_down(slots, root, n);
     for (std::size_t end = n; end-- > 1;) {
@@ -144,8 +148,8 @@ struct RankTies {
   }
 };
 
-/// The same with one work item for kRange keys, of which most are found to be without ties many at a
-/// time.
+/// RankTies with one work item per kRange keys. It tests many keys at a time for equality, since most
+/// have no equal neighbour.
 struct RankTiesOfRange {
   static constexpr std::size_t kRange = 4096;
   RankTies ties;
@@ -165,9 +169,10 @@ struct RankTiesOfRange {
 
 }  // namespace detail
 
-/// Lists the visible slots front to back in `v.order`: by the lowest `bits` of the key, ties by rank or,
-/// where there are no ranks, by slot; those of a range of keys on the host alone. No key is below
-/// `base`. Returns how many there are.
+/// Sorts the visible slots front to back into `v.order`, by the lowest `bits` bits of the key. Ties go
+/// by rank, or by slot if there are no ranks. Returns the number of slots.
+/// @param base lower bound of all keys
+/// @param range keys to include; other than the whole range only on host backends
 template <Backend B>
 Result<std::size_t> order_visible(B& backend, VisibleOrder<B>& v, std::uint32_t base, int bits,
                                   const KeyRange& range = {}) {

@@ -8,31 +8,32 @@
 
 namespace gsnav {
 
-/// How 2^x is computed for the alpha of a Gaussian at a pixel.
+/// Method of computing 2^x for the alpha of a Gaussian at a pixel.
 enum class Exponential {
-  exact,  ///< error of rounding only
-  fast,   ///< a cubic: alpha within 1.0e-4 relative; on a GPU its own instruction, within 2e-7
+  exact,  ///< Only rounding errors.
+  fast,   ///< A cubic: alpha within 1.0e-4 relative. On a GPU the hardware instruction, within 2e-7.
 };
 
-/// The part of RenderConfig that trades error for speed. docs/accuracy.md has the error budgets against
-/// the float64 contract image.
+/// The settings of RenderConfig that trade accuracy for speed. docs/accuracy.md has the error budgets,
+/// measured against the float64 contract image.
 struct Quality {
-  /// Frames with meshes use Exponential::exact whatever is set here.
+  /// Frames with meshes always use Exponential::exact.
   Exponential exponential = Exponential::exact;
-  /// In (0, 1): a Gaussian is not blended where its alpha is lower. Below 2^-126 it is 2^-126.
+  /// Skip a Gaussian at a pixel where its alpha is lower. Range (0, 1); values below 2^-126 act as
+  /// 2^-126.
   double alpha_min = 1.0 / 255;
-  double max_alpha = 0.99;          ///< in (0, 1]: upper limit of a Gaussian's alpha
-  double transmittance_min = 1e-4;  ///< in [0, 1): a pixel is closed once its transmittance is lower
-  /// Divides the colour and the accumulated depth of a closed pixel by its alpha, and makes its alpha 1:
-  /// the transmittance at which blending stopped shows no background. Has no effect with a Compat.
+  double max_alpha = 0.99;  ///< upper limit of a Gaussian's alpha, in (0, 1]
+  /// Stop blending a pixel once its transmittance is lower. Range [0, 1).
+  double transmittance_min = 1e-4;
+  /// Treat a closed pixel as opaque: divide its colour and its accumulated depth by its alpha, then set
+  /// its alpha to 1. The background does not show through it. Ignored with a Compat.
   bool normalize_closed = false;
-  int max_sh_degree = kMaxShDegree;  ///< in [0, 3]: SH bands above it are left out
-  int key_bits = 32;                 ///< in [8, 32]: bits of the sort key that are compared
+  int max_sh_degree = kMaxShDegree;  ///< highest SH degree to evaluate, 0 to 3
+  int key_bits = 32;                 ///< bits of the depth key that sorting compares, 8 to 32
 
-  /// The contract; float32 rounding is the only error.
+  /// The contract: float32 rounding is the only error.
   static constexpr Quality exact() noexcept { return {}; }
-  /// A cheaper exponential; blending stops at a transmittance of 1/1000, and closed pixels are
-  /// normalized.
+  /// Exponential::fast; blending stops at a transmittance of 1/1000, and closed pixels are normalized.
   static constexpr Quality fast() noexcept {
     Quality q;
     q.exponential = Exponential::fast;
@@ -43,7 +44,8 @@ struct Quality {
   bool operator==(const Quality&) const = default;
 };
 
-/// invalid_argument, naming the field, or ok.
+/// Checks all fields.
+/// @return invalid_argument naming the field.
 inline Status validate(const Quality& q) {
   const BadArgument bad{"RenderConfig.quality."};
   if (q.exponential != Exponential::exact && q.exponential != Exponential::fast) {

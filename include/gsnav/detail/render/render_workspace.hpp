@@ -18,7 +18,7 @@
 
 namespace gsnav {
 
-/// Scratch of `render_camera`; grows to the largest frame and is then reused.
+/// Scratch memory of `render_camera`. It grows to the largest frame and is reused.
 template <class S, Backend B>
 struct RenderWorkspace {
   explicit RenderWorkspace(B& b)
@@ -49,15 +49,16 @@ struct RenderWorkspace {
   Buffer<std::uint64_t, B> cursors, tile_offsets;
   Buffer<std::uint32_t, B> tile_splats;
   Buffer<TileSpans, B> spans;
-  Buffer<std::uint64_t, B> open;  ///< of frames in slices: cells of tiles, and the state of their pixels
+  Buffer<std::uint64_t, B> open;  ///< of frames in slices: open cells of each tile; `states` has the
+                                  ///< state of each pixel
   Buffer<S, B> states;
   DepthSlices slices;
   MeshWorkspace<S, B> mesh;
   FragmentWorkspace<S, B> fragments;
-  Buffer<S, B> composite;  ///< of Composite::hard_depth: what the Gaussians alone have
+  Buffer<S, B> composite;  ///< of Composite::hard_depth: alpha and depth of the Gaussians alone
   std::vector<Vec3d> host_offsets;
-  std::vector<ViewedSet<S>> projections;  ///< [sets]
-  ProjectOutputs<S> projected;            ///< of the frame
+  std::vector<ViewedSet<S>> projections;  ///< [sets], one projection per set
+  ProjectOutputs<S> projected;            ///< outputs of the projection
 
   std::size_t bytes() const noexcept {
     std::size_t sum = 0;
@@ -66,8 +67,8 @@ struct RenderWorkspace {
     });
     return sum;
   }
-  /// Makes room for what the other has room for, so that a frame of either allocates nothing. Drops the
-  /// content.
+  /// Grows the capacity to at least that of `o`, so that a frame that fits either workspace allocates
+  /// nothing. The content is lost.
   void grow_to(const RenderWorkspace& o) {
     for_each(*this, o, [](auto& own, const auto& other) {
       if constexpr (requires { own.grow_to(other); }) {

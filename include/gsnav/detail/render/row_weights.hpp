@@ -19,11 +19,11 @@ namespace gsnav {
 
 namespace detail {
 
-/// Walks the list of one tile as blending does and keeps, of each Gaussian, the largest part of a pixel
-/// that it takes.
+/// Blends the list of one tile and records, for each Gaussian, the largest share of a pixel's light that
+/// it contributes.
 struct WeighTile {
   RasterArgs<float> args;
-  std::span<float> most;  ///< [rows], raised from many tiles at a time
+  std::span<float> most;  ///< [rows], raised concurrently from many tiles
 
   void operator()(std::size_t tile) const noexcept {
     const TileGrid& grid = args.grid;
@@ -56,9 +56,9 @@ struct WeighTile {
     }
   }
 
-  static constexpr int kSide = 16;  // of the largest tile
+  static constexpr int kSide = 16;  // of the largest tile, in pixels
   View<const SplatBounds> bounds;
-  View<const std::uint32_t> rows;  ///< of each slot
+  View<const std::uint32_t> rows;  ///< [slots], row of each slot
 
  private:
   static void raise(float& value, float to) noexcept {
@@ -71,19 +71,20 @@ struct WeighTile {
 
 }  // namespace detail
 
-/// Scratch of add_row_weights.
+/// Scratch memory of add_row_weights.
 template <Backend B>
 struct RowWeightsWorkspace {
   explicit RowWeightsWorkspace(B& backend) : render(backend) {}
   RenderWorkspace<float, B> render;
   std::vector<float> alpha;
-  std::vector<std::uint32_t> numbers;  ///< 0, 1, ...
+  std::vector<std::uint32_t> numbers;  ///< 0, 1, 2, ...
 };
 
-/// Draws a set and raises `most` [rows] to the largest part of a pixel's light, alpha times
-/// transmittance, that each Gaussian takes anywhere in the image. By the contract with
-/// Exponential::fast, those of one depth in row order. The same bits for any number of threads. Errors:
-/// those of render_camera; unsupported (a response other than Response::ewa).
+/// Draws a set and measures the largest share of a pixel's light, alpha times transmittance, that each
+/// Gaussian contributes anywhere in the image. Raises the values of `most` [rows] to these shares. Uses
+/// Exponential::fast; Gaussians of equal depth are blended in row order. The bits do not depend on the
+/// number of threads.
+/// @return the errors of render_camera; invalid_argument if `most` has the wrong length.
 template <Backend B>
 requires is_host_backend<B> Status add_row_weights(B& backend, RowWeightsWorkspace<B>& ws,
                                                    GaussianSet set, const Camera& camera,
@@ -96,11 +97,12 @@ requires is_host_backend<B> Status add_row_weights(B& backend, RowWeightsWorkspa
   config.quality.exponential = Exponential::fast;
   config.outputs = kAlpha;
   config.tuning.tile_size = detail::WeighTile::kSide;
-  config.tuning.depth_slices = 1;  // the lists of a whole frame are read
+  config.tuning.depth_slices = 1;  // the lists of the whole frame are needed
   ws.alpha.resize(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height));
   FrameImages<float> images;
   images.alpha = ws.alpha.data();
-  // What decides between equal depths is kept of each slot: so that it is the row.
+  // The workspace keeps the row id of each slot for ties of depth. Set it to the row number, to read the
+  // row back.
   if (ws.numbers.size() < most.size()) {
     ws.numbers.resize(most.size());
     std::iota(ws.numbers.begin(), ws.numbers.end(), std::uint32_t{0});

@@ -11,12 +11,12 @@
 #include "gsnav/math/functions.hpp"
 #include "gsnav/render/config.hpp"
 
-// What the stages of a frame read of its RenderConfig.
+// Settings that each stage of a frame derives from RenderConfig.
 
 namespace gsnav {
 
-/// Side of the tiles that an image is rendered in. On a processor large images have tiles of 32 pixels:
-/// their footprints are large too, and take fewer of those.
+/// Width of the tiles that an image is rendered in. On CPUs large images use 32 pixels: their footprints
+/// are large too and then reach fewer tiles.
 template <Backend B>
 int tile_size_of(const RenderConfig& c, int width, int height) noexcept {
   if (c.tuning.tile_size != 0) return c.tuning.tile_size;
@@ -25,13 +25,13 @@ int tile_size_of(const RenderConfig& c, int width, int height) noexcept {
   return is_host_backend<B> && large && c.compat == Compat::none ? 32 : 16;
 }
 
-/// Exponent from which on a Gaussian is blended. What float's exp2 reaches, also in double: an alpha_min
-/// below 2^-126 is that.
+/// Smallest log2(alpha) at which a Gaussian is blended. It is at least -126, the limit of exp2 in float,
+/// also in double.
 inline double log2_alpha_min(const Quality& q) noexcept {
   return std::max(std::log2(q.alpha_min), -126.0);
 }
 
-/// The part that projection reads.
+/// Settings for the projection.
 inline ProjectionRules projection_rules(const RenderConfig& c) noexcept {
   return {c.sort_order, c.response, c.compat, log2_alpha_min(c.quality), c.quality.key_bits};
 }
@@ -42,7 +42,7 @@ inline Exp2 exp2_method(const Quality& q) noexcept {
 
 namespace detail {
 
-/// Changes rules of blending to those of another renderer.
+/// Changes blending rules to those of another renderer.
 template <class S>
 void follow(Compat compat, BlendRules<S>& r) noexcept {
   r.exclusive_stop = compat != Compat::none;
@@ -53,7 +53,7 @@ void follow(Compat compat, BlendRules<S>& r) noexcept {
 
 }  // namespace detail
 
-/// The part that blending reads, rounded to the scalar of the kernel.
+/// Settings for blending, rounded to the scalar of the kernel.
 template <class S>
 BlendRules<S> blend_rules(const RenderConfig& c) noexcept {
   BlendRules<S> r;
@@ -66,8 +66,8 @@ BlendRules<S> blend_rules(const RenderConfig& c) noexcept {
   return r;
 }
 
-/// The same for a frame of these images: where no colour and no alpha are asked for, and of depths only
-/// those that a transmittance decides, a pixel is closed once it has them. The images keep their bits.
+/// Settings for blending into given images. If neither colour, alpha nor an averaged depth is requested,
+/// a pixel is closed as soon as its median and first-hit depths are known. The images keep their bits.
 template <class S>
 BlendRules<S> blend_rules(const RenderConfig& c, const FrameImages<S>& images) noexcept {
   BlendRules<S> r = blend_rules<S>(c);

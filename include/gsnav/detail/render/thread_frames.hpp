@@ -18,13 +18,13 @@
 
 namespace gsnav {
 
-/// Backends whose batches may be cut by camera: each thread renders whole frames.
+/// Host backends that can split a batch by camera, so that each thread renders whole frames.
 template <class B>
 concept ThreadFramesBackend = Backend<B> && is_host_backend<B> && requires(const B& b) {
   { b.one_thread() } -> std::same_as<B>;
 };
 
-/// One frame of a batch: what it sees, from where, by which rules, and where its images go.
+/// One frame of a batch: sets, camera, settings, images and meshes.
 template <class S>
 struct FrameJob {
   std::span<const GaussianSet> sets;
@@ -34,19 +34,20 @@ struct FrameJob {
   MeshFrame meshes{};
 };
 
-/// Renders batches with one worker a thread: no thread waits for another within a frame. Scratch grows
-/// with threads, not with cameras, and is the same for all workers, so that a batch like one before it
-/// allocates nothing, whichever worker takes which camera.
+/// Renders batches of frames with one worker per thread, so that no thread waits for another within a
+/// frame. Scratch memory grows with the number of threads, not of cameras. All workers have the same
+/// capacity, so a batch like an earlier one allocates nothing, whichever worker takes which camera.
 template <class S, ThreadFramesBackend B>
 class ThreadFrames {
  public:
-  /// Whether a batch keeps all threads busy for long enough that workers pay.
+  /// True if a batch has enough cameras to keep all threads busy.
   static bool worth_it(const B& backend, std::size_t cameras) noexcept {
     return cameras > 1 && cameras >= 2 * concurrency_of(backend);
   }
 
-  /// draw_frame() for each of `count` frames; job_of(c) gives the FrameJob of frame c. The first
-  /// frame's error, by number, is returned; out_of_memory too.
+  /// Calls draw_frame() for each of `count` frames. job_of(c) returns the FrameJob of frame c.
+  /// @return the error of the first failing frame, by index; out_of_memory if scratch memory cannot be
+  ///   allocated.
   template <class JobOf>
   Status render(B& backend, std::size_t count, const JobOf& job_of, std::span<RenderStats> stats) {
     while (workers_.size() < concurrency_of(backend))
@@ -87,7 +88,7 @@ class ThreadFrames {
     std::atomic<bool> taken{false};
   };
 
-  /// A worker that nobody is in: there are as many as threads.
+  /// Returns a free worker. There is one per thread, so one is free.
   Worker& take() noexcept {
     while (true) {
       for (const auto& worker : workers_) {

@@ -7,15 +7,17 @@
 
 namespace gsnav {
 
-/// The part of RenderConfig that changes no bit of an image. A renderer may ignore it.
+/// The settings of RenderConfig that change no bit of an image. A renderer may ignore them.
 struct Tuning {
-  int tile_size = 0;     ///< side of a tile, pixels: 8, 16 or 32, or 0 to choose by the image's size
-  int depth_slices = 0;  ///< in [1, 8], or 0 to choose: number of front-to-back passes. A pass skips
-                         ///< what the passes before it hide. Backends that can slice only (OpenMP)
+  int tile_size = 0;     ///< Tile width in pixels: 8, 16 or 32, or 0 to choose by the image's size.
+  int depth_slices = 0;  ///< Number of front-to-back passes, 1 to 8, or 0 to choose automatically. Later
+                         ///< passes skip what earlier ones hide. Only for backends that can slice
+                         ///< (OpenMP).
   bool operator==(const Tuning&) const = default;
 };
 
-/// invalid_argument, naming the field, or ok.
+/// Checks all fields.
+/// @return invalid_argument naming the field.
 inline Status validate(const Tuning& t) {
   const BadArgument bad{"RenderConfig.tuning."};
   if (t.tile_size != 0 && t.tile_size != 8 && t.tile_size != 16 && t.tile_size != 32) {

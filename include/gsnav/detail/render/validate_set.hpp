@@ -16,7 +16,7 @@ namespace gsnav {
 
 namespace detail {
 
-/// Names the packed array that does not fit, or null.
+/// Name of a packed array that does not fit the others, or null.
 inline const char* wrong_packed(const GaussianRows& g) noexcept {
   const ShapeRows& shape = g.shape;
   const ColorRows& color = g.color;
@@ -39,7 +39,7 @@ inline const char* wrong_packed(const GaussianRows& g) noexcept {
 
 namespace detail {
 
-/// Names the array that is null and has a size, or null.
+/// Name of an array that is null but has a size, or null.
 inline const char* null_array(const GaussianSet& set) noexcept {
   const GaussianRows& g = set.gaussians;
   const auto null = [](const auto& v) { return v.data == nullptr && v.size != 0; };
@@ -74,7 +74,7 @@ inline const char* null_array(const GaussianSet& set) noexcept {
                                             : nullptr;
 }
 
-/// Names the planes of which one is longer than another, or null.
+/// Name of a group of planes with different lengths, or null.
 inline const char* unequal_planes(const GaussianRows& g) noexcept {
   const auto unequal = [](const auto& planes) { return planes.size == planes.kUnequal; };
   return unequal(g.shape.means)       ? "shape.means"
@@ -87,7 +87,7 @@ inline const char* unequal_planes(const GaussianRows& g) noexcept {
 
 }  // namespace detail
 
-/// Checks which rows of a set of so many chunks are drawn.
+/// Checks the sizes of a selection, for a set of `chunks` chunks.
 inline Status validate(const Selection& selection, std::size_t chunks) {
   if (!selection.seen.empty() && !seen_may_have(selection.seen.size, chunks)) {
     return {Errc::invalid_argument,
@@ -103,7 +103,8 @@ inline Status validate(const Selection& selection, std::size_t chunks) {
   return {};
 }
 
-/// Checks a set against what kernels assume; names the array that does not fit.
+/// Checks a set against the assumptions of kernels.
+/// @return invalid_argument naming the array or field.
 inline Status validate(const GaussianSet& set) {
   const GaussianRows& g = set.gaussians;
   const ShapeRows& shape = g.shape;

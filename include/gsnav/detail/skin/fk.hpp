@@ -11,28 +11,30 @@
 
 namespace gsnav {
 
-/// A joint's frame to the root frame, from its frame to its parent's; `parent` -1: that is the root
-/// frame. The parent's `globals` are there.
+/// Transform from a joint's frame to the root frame. `local` maps the joint's frame to the parent's
+/// frame, which is the root frame for parent -1. `globals[parent]` must have been computed.
 template <class S>
 GSNAV_HD Affine3<S> joint_global(const Affine3<S>* globals, std::int32_t parent,
                                  const Affine3<S>& local) noexcept {
   return parent < 0 ? local : globals[static_cast<std::size_t>(parent)] * local;
 }
 
-/// One actor's pose in a batch of actors that share a skeleton of J joints, A poses in all. Frames:
-/// global is the actor's root frame, metres; a local transform maps a joint's frame to its parent's.
+/// Arrays of forward kinematics for A actors that share a skeleton of J joints. "Global" is the actor's
+/// root frame, in metres. A local transform maps a joint's frame to its parent's frame.
 template <class S>
 struct ForwardKinematicsArgs {
-  View<const std::int32_t> parents;      ///< [J], -1: child of the root frame; a parent comes first
-  View<const Quat<S>> rotations;         ///< [A][J] local, unit
-  View<const Vec3<S>> translations;      ///< [A][J] local, metres
-  View<const Affine3<S>> inverse_binds;  ///< [J], or empty: no joint matrices
-  View<Affine3<S>> globals;              ///< [A][J] joint frame to root frame
-  View<Affine3<S>> joint_matrices;       ///< [A][J] global * inverse bind, or empty
+  View<const std::int32_t> parents;  ///< [J], index of the parent, or -1 for a child of the root frame.
+                                     ///< Parents come before their children.
+  View<const Quat<S>> rotations;     ///< [A][J], local, unit quaternions
+  View<const Vec3<S>> translations;  ///< [A][J], local, metres
+  View<const Affine3<S>> inverse_binds;  ///< [J]. Empty: joint matrices are not computed.
+  View<Affine3<S>> globals;              ///< [A][J], joint frame to root frame
+  View<Affine3<S>> joint_matrices;  ///< [A][J], global * inverse bind, which skinning reads. Empty: not
+                                    ///< computed.
 };
 
-/// Forward kinematics of pose a: from local rotations and offsets to global transforms and, where they
-/// are asked for, the joint matrices that skinning reads.
+/// Kernel of forward kinematics for pose a: computes global transforms and, if requested, joint matrices
+/// from local rotations and offsets.
 template <class S>
 struct ForwardKinematics {
   ForwardKinematicsArgs<S> args;

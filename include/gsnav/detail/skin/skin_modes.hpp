@@ -8,18 +8,19 @@
 #include "gsnav/detail/math/svd.hpp"
 #include "gsnav/skin/lbs.hpp"
 
-// Skinning by other than linear blending with the rotation alone: modes of an asset, apart from the
-// kernel that most use (skin/lbs.hpp).
+// Skinning modes other than plain linear blending: dual quaternions, and linear blending with stretch.
+// They are separate from the kernel that most assets use (skin/lbs.hpp).
 
 namespace gsnav {
 
-/// Bounds of the stretch of a Gaussian along any direction.
+/// Limits of the stretch of a Gaussian along any direction.
 inline constexpr double kLeastStretch = 0.5, kGreatestStretch = 2.0;
 
-/// Dual quaternion blending of one Gaussian (Kavan et al. 2007, "Skinning with dual quaternions", DLB).
-/// `blend`: sum over the influences of weight * dual quaternion of the joint, each with the sign that
-/// puts its real part on the side of the first's. The body keeps its width where it twists and bulges
-/// outside of elbows. Joints that differ by a translation give what linear blending gives.
+/// Skins one Gaussian by dual quaternion blending (Kavan et al. 2007, "Skinning with dual quaternions",
+/// DLB). The body keeps its width where it twists, and bulges at the outside of elbows. Joints that
+/// differ only by a translation give the result of linear blending.
+/// @param blend sum over the influences of weight * dual quaternion of the joint. Each has the sign that
+///   puts its real part on the side of the first one.
 template <class L>
 GSNAV_HD Skinned<L> skin(const DualQuat<L>& blend, const Vec3<L>& mean, const Quat<L>& quat) noexcept {
   Skinned<L> out;
@@ -36,11 +37,13 @@ GSNAV_HD Skinned<L> skin(const DualQuat<L>& blend, const Vec3<L>& mean, const Qu
   return out;
 }
 
-/// m with its singular values held within [kLeastStretch, kGreatestStretch], as that of a body that does
-/// not fold over: a negative one counts as the least. What lies within is m itself, bit for bit.
+/// m with its singular values clamped to [kLeastStretch, kGreatestStretch]. A negative value, where a
+/// body folds over, is clamped to the lower limit. A matrix within the limits is returned unchanged, bit
+/// for bit.
 template <class S>
 GSNAV_HD Mat3<S> clamped_stretch(const Mat3<S>& m) noexcept {
-  // Most Gaussians are hardly stretched. With |m^T m - 1| < 0.75 no singular value is outside.
+  // Most Gaussians are hardly stretched. If |m^T m - 1| < 0.75, all singular values are within the
+  // limits.
   const Vec3<S> a = m.column(0), b = m.column(1), c = m.column(2);
   const S aa = dot(a, a) - S(1), bb = dot(b, b) - S(1), cc = dot(c, c) - S(1);
   const S ab = dot(a, b), ac = dot(a, c), bc = dot(b, c);
@@ -73,12 +76,13 @@ GSNAV_HD Quat<S> canonical_quat(const SkinningArgs<S, Out>& args, std::size_t i)
 
 }  // namespace detail
 
-/// Skins Gaussian i by dual quaternions.
+/// Kernel that skins Gaussian i by dual quaternion blending.
 template <class S, class Out = float>
 struct SkinGaussianDual {
   SkinningArgs<S, Out> args;
 
-  /// What skin() wants, of Gaussian i. Its length is at least the greatest weight.
+  /// Blended dual quaternion of Gaussian i, as skin() needs it. Its length is at least the greatest
+  /// weight.
   GSNAV_HD DualQuat<S> blend(std::size_t i) const noexcept {
     const std::size_t row = static_cast<std::size_t>(args.influences);
     const std::uint16_t* const indices = args.joint_indices.data + row * i;
@@ -99,10 +103,10 @@ struct SkinGaussianDual {
   }
 };
 
-/// Skins Gaussian i linearly and stretches it as the skin is: its shape goes through the derivative of
-/// the position by the canonical position, F = sum_k w_k A_k + sum_k (A_k p + t_k) grad(w_k)^T, whose
-/// singular values are clamped (clamped_stretch), instead of through a rotation. Means, quats and
-/// rotations are those of SkinGaussian.
+/// Kernel that skins Gaussian i by linear blending and also stretches its shape. The shape is
+/// transformed by F instead of by a rotation. F is the derivative of the skinned position with respect
+/// to the canonical one: F = sum_k w_k A_k + sum_k (A_k p + t_k) grad(w_k)^T. The singular values of F
+/// are clamped (clamped_stretch). Means, quats and rotations are those of SkinGaussian.
 template <class S, class Out = float>
 struct SkinGaussianStretched {
   SkinningArgs<S, Out> args;
@@ -120,7 +124,7 @@ struct SkinGaussianStretched {
     for (std::size_t k = 1; k < row; ++k, gradient += 3) {
       const Affine3<S>& joint = args.joints[indices[k]];
       const S w = skinning_weight<S>(parts[k]);
-      // Gradients of all weights add up to none: the first's is minus the sum of the others.
+      // The gradients of all weights sum to zero, so the first one is minus the sum of the others.
       const Vec3<S> apart = joint * mean - place, g{S(gradient[0]), S(gradient[1]), S(gradient[2])};
       for (int r = 0; r < 3; ++r) f.row[r] = f.row[r] + joint.linear.row[r] * w + g * apart[r];
     }

@@ -7,15 +7,15 @@
 #include "gsnav/core/view.hpp"
 #include "gsnav/sweep/capsule.hpp"
 
-// Many pairs of capsules at once, by planes: what lanes and devices read. Positions relative to an
-// origin near the capsules (sweep/capsule.hpp).
+// Arrays of many pairs of capsules, one plane per component, as SIMD kernels and GPUs read them.
+// Positions are relative to an origin near the capsules (sweep/capsule.hpp).
 
 namespace gsnav {
 
 /// N capsules, metres.
 template <class S>
 struct CapsulePlanes {
-  View<const S> p0[3], p1[3];  ///< x, y, z, [N] each
+  View<const S> p0[3], p1[3];  ///< ends of the axes: x, y, z, [N] each
   View<const S> radius;        ///< [N], >= 0
 
   GSNAV_HD Capsule<S> operator[](std::size_t i) const noexcept {
@@ -26,40 +26,41 @@ struct CapsulePlanes {
 /// N capsules that move linearly over one interval.
 template <class S>
 struct MovingCapsulePlanes {
-  CapsulePlanes<S> begin, end;
+  CapsulePlanes<S> begin, end;  ///< capsules at the start and at the end
 
   GSNAV_HD MovingCapsule<S> operator[](std::size_t i) const noexcept { return {begin[i], end[i]}; }
 };
 
-/// Gaps of N pairs. What is written has the meaning of CapsuleGap.
+/// Arrays for computing the gaps of N pairs of capsules. Outputs have the meaning of the fields of
+/// CapsuleGap.
 template <class S>
 struct CapsuleGapArgs {
   CapsulePlanes<S> a, b;
   View<S> gap;                          ///< [N]
-  View<S> normal[3], on_a[3], on_b[3];  ///< [N] each, or all empty: not asked for
+  View<S> normal[3], on_a[3], on_b[3];  ///< [N] each, or all empty: not computed
 
   GSNAV_HD std::size_t size() const noexcept { return a.radius.size; }
   GSNAV_HD bool asks_for_points() const noexcept { return !normal[0].empty(); }
 };
 
-/// Bits of SweepArgs::outcome.
+/// Bits of SweepArgs::outcome: SweepResult::hit, pushed and agent_closing.
 inline constexpr std::uint8_t kSweepHit = 1, kSweepPushed = 2, kSweepAgentClosing = 4;
 
-/// Sweeps of N pairs. What is written has the meaning of SweepResult.
+/// Arrays for sweeping N pairs of capsules. Outputs have the meaning of the fields of SweepResult.
 template <class S>
 struct SweepArgs {
   MovingCapsulePlanes<S> agents, bodies;
   SweepRules<S> rules;
-  View<std::uint8_t> outcome;   ///< [N] sums of kSweepHit, kSweepPushed, kSweepAgentClosing
+  View<std::uint8_t> outcome;   ///< [N], sums of kSweepHit, kSweepPushed and kSweepAgentClosing
   View<S> time, start_gap;      ///< [N] each
-  View<S> contact_time, gap;    ///< [N] each, or, with normal and point, all empty: not asked for
-  View<S> normal[3], point[3];  ///< [N] each, or empty
+  View<S> contact_time, gap;    ///< [N] each. Together with normal and point all empty: not computed.
+  View<S> normal[3], point[3];  ///< [N] each, or all empty: not computed
 
   GSNAV_HD std::size_t size() const noexcept { return agents.begin.radius.size; }
   GSNAV_HD bool asks_for_contact() const noexcept { return !contact_time.empty(); }
 };
 
-/// Gap of pair i.
+/// Kernel that computes the gap of pair i.
 template <class S>
 struct GapOfPair {
   CapsuleGapArgs<S> args;
@@ -76,7 +77,7 @@ struct GapOfPair {
   }
 };
 
-/// Sweep of pair i.
+/// Kernel that sweeps pair i.
 template <class S>
 struct SweepPair {
   SweepArgs<S> args;

@@ -4,21 +4,22 @@
 #include "gsnav/math/capsule.hpp"
 #include "gsnav/math/vec.hpp"
 
-// Distances of segments and capsules, for scalars and lane packs (sweep/capsule.hpp).
+// Distances of segments and of capsules, for scalars and SIMD packs (sweep/capsule.hpp).
 
 namespace gsnav {
 
-/// Closest points of two segments.
+/// Distance and closest points of two segments.
 template <class L>
 struct SegmentDistance {
   L distance;
-  Vec3<L> on_a, on_b;  ///< witness points
-  Vec3<L> normal;      ///< unit, from a to b; where they touch, perpendicular to both
+  Vec3<L> on_a, on_b;  ///< closest points
+  Vec3<L> normal;      ///< Unit vector from a to b. If the segments touch, perpendicular to both.
 };
 
 namespace detail {
 
-/// Smallest normal number. A literal: numeric_limits' constexpr functions are host code to nvcc.
+/// Smallest normal number. A literal, because numeric_limits' constexpr functions are host code for
+/// nvcc.
 template <class S>
 GSNAV_HD constexpr S least_normal() noexcept {
   return static_cast<S>(sizeof(S) > sizeof(float) ? 2.2250738585072014e-308 : 1.1754943508222875e-38);
@@ -29,7 +30,7 @@ GSNAV_HD Vec3<L> select_vec(const M& m, const Vec3<L>& a, const Vec3<L>& b) noex
   return {select(m, a.x, b.x), select(m, a.y, b.y), select(m, a.z, b.z)};
 }
 
-/// Best candidate so far: parameters on both segments and the vector from a to b.
+/// Closest pair found so far: parameters on both segments, squared distance, and the vector from a to b.
 template <class L>
 struct SegmentCandidate {
   L s, t, distance2;
@@ -57,7 +58,7 @@ struct SegmentCandidate {
   }
 };
 
-/// A unit vector perpendicular to v (unit length not needed); x for the zero vector.
+/// A unit vector perpendicular to v, which may have any length. The x axis for the zero vector.
 template <class L>
 GSNAV_HD Vec3<L> any_perpendicular(const Vec3<L>& v) noexcept {
   using S = scalar_of<L>;
@@ -74,13 +75,15 @@ GSNAV_HD Vec3<L> any_perpendicular(const Vec3<L>& v) noexcept {
 
 }  // namespace detail
 
-/// Distance of the segments a0 a1 and b0 b1 with witness points and a deterministic normal.
+/// Distance of the segments a0 a1 and b0 b1, with closest points and a deterministic normal.
 ///
-/// The minimum over the four endpoint-to-segment candidates and the crossing of the two lines where it
-/// lies inside both. No tolerance is involved: segments of zero length and parallel ones fall out of the
-/// endpoint candidates, and an inexact crossing near parallelism still lies on both segments, where it
-/// costs second order only. Relative error in float <= 1e-5 for distances >= 1 cm and coordinates of a
-/// few metres.
+/// It is the minimum over five candidates. Four are distances from an endpoint to the other segment. The
+/// fifth is the distance at the crossing of the two lines, if that lies inside both segments. No
+/// tolerance is needed. Segments of zero length and parallel segments are handled by the endpoint
+/// candidates. Near parallelism the crossing is inexact but still lies on both segments, where its error
+/// affects the distance only to second order.
+///
+/// The relative error in float is at most 1e-5 for distances >= 1 cm and coordinates of a few metres.
 template <class L>
 GSNAV_HD SegmentDistance<L> segment_distance(const Vec3<L>& a0, const Vec3<L>& a1, const Vec3<L>& b0,
                                              const Vec3<L>& b1) noexcept {
@@ -102,7 +105,8 @@ GSNAV_HD SegmentDistance<L> segment_distance(const Vec3<L>& a0, const Vec3<L>& a
 
   const Vec3<L> n = cross(u, v);
   const L den = dot(n, n);
-  // Where the lines are nearly parallel, an error along them costs second order only.
+  // rough_cross suffices: for nearly parallel lines, an error along them affects the distance only to
+  // second order.
   const L s_num = dot(rough_cross(w00, v), n), t_num = dot(rough_cross(w00, u), n);
   const auto inside = (den > tiny) && (min(s_num, t_num) >= zero) && (max(s_num, t_num) <= den);
   const L safe_den = select(den > tiny, den, one);
@@ -114,7 +118,8 @@ GSNAV_HD SegmentDistance<L> segment_distance(const Vec3<L>& a0, const Vec3<L>& a
   out.distance = sqrt(best.distance2);
   out.on_a = fma(best.s, u, a0);
   out.on_b = fma(best.t, v, b0);
-  // Touching cores have no direction between them: across both, else across the one that has length.
+  // Touching segments have no direction between them. Use the normal of both, or any perpendicular of
+  // the longer one.
   const Vec3<L> crossed = n * (one / sqrt(safe_den));
   const auto u_longer = dot(u, u) >= dot(v, v);
   const Vec3<L> fallback = detail::select_vec(
@@ -125,14 +130,15 @@ GSNAV_HD SegmentDistance<L> segment_distance(const Vec3<L>& a0, const Vec3<L>& a
   return out;
 }
 
-/// Signed gap of two capsules: metres between the surfaces, negative where they overlap.
+/// Signed gap of two capsules: metres between the surfaces, negative if they overlap.
 template <class L>
 struct CapsuleGap {
   L gap;
-  Vec3<L> normal;      ///< unit, from b to a: the way a gets out
+  Vec3<L> normal;      ///< unit vector from b to a, along which a can leave
   Vec3<L> on_a, on_b;  ///< points of the two surfaces along the normal
 };
 
+/// Signed gap of two capsules, with points and normal.
 template <class L>
 GSNAV_HD CapsuleGap<L> capsule_gap(const Capsule<L>& a, const Capsule<L>& b) noexcept {
   const SegmentDistance<L> d = segment_distance(a.p0, a.p1, b.p0, b.p1);

@@ -12,13 +12,13 @@
 
 namespace gsnav {
 
-/// A leg of an agent's way: its motion in the part [u0, u1] of the bodies' interval.
+/// One straight leg of an agent's path, during the part [u0, u1] of the bodies' motion.
 struct SweptLeg {
   MovingCapsule<double> motion{};  ///< world, metres
   double u0 = 0.0, u1 = 1.0;
 };
 
-/// What N legs run into first, among M bodies. Memory of the backend.
+/// Arrays for finding the first impact of N legs among M bodies, in the backend's memory.
 template <class S>
 struct FirstImpactArgs {
   View<const SweptLeg> legs;          ///< [N]
@@ -27,7 +27,7 @@ struct FirstImpactArgs {
   View<FirstImpact<S>> impacts;  ///< [N]
 };
 
-/// The impact of leg i: first_impact().
+/// Kernel that computes the first impact of leg i with first_impact().
 template <class S>
 struct ImpactOfLeg {
   FirstImpactArgs<S> args;
@@ -40,8 +40,9 @@ struct ImpactOfLeg {
   }
 };
 
-/// The first impacts of N legs, with the bits of first_impact() on every backend. They are there after
-/// `backend.synchronize()`. Errors: invalid_argument where `impacts` is not as many as the legs.
+/// Computes the first impacts of N legs, with the bits of first_impact() on every backend. Results are
+/// complete after `backend.synchronize()`.
+/// @return invalid_argument if `impacts` and `legs` differ in length.
 template <class S, Backend B>
 Status first_impacts(B& backend, const FirstImpactArgs<S>& args) {
   detail::SizeCheck check("FirstImpactArgs", args.legs.size);
