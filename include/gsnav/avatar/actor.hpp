@@ -36,7 +36,7 @@ class AvatarActor {
   /// Makes an actor.
   /// @param motion null: the asset's idle pose, or its rest pose where it has none.
   /// @param trajectory null: stands at the world's origin.
-  /// @return invalid_argument, for an asset or a motion that does not validate, a motion with another
+  /// @return the result, or invalid_argument, for an asset or a motion that does not validate, a motion with another
   /// number of joints, or options out of range; or the asset's other errors.
   static Result<AvatarActor> create(std::shared_ptr<const AvatarAsset> asset,
                                     std::shared_ptr<const MotionSource> motion = nullptr,

@@ -119,7 +119,7 @@ double smooth_wrap_time(const Skeleton& skeleton, const MotionClip& clip, bool f
 /// relative to the parent, so that frames can be interpolated by slerp. The path of the first root joint
 /// becomes `root_translation`.
 /// @param matrices [T][J], joint to root frame; with `skinning` that times the skeleton's inverse bind.
-/// @return invalid_argument, naming what is wrong.
+/// @return the result, or invalid_argument, naming what is wrong.
 Result<MotionClip> clip_from_matrices(const Skeleton& skeleton, double frame_rate,
                                       const std::vector<Affine3<double>>& matrices, bool skinning);
 

@@ -60,7 +60,7 @@ struct LoadedPackedCloud {
 ///
 /// Rows are in spatial order (detail/scene/spatial_order.hpp) unless `options.sort` is false; `row_ids`
 /// has the place of each row in the file. Never throws.
-/// @return the errors of the format's loader; unsupported for an unknown extension, with the list of
+/// @return the cloud, or an error of the format's loader; unsupported for an unknown extension, with the list of
 /// known ones; invalid_argument for an empty name or a tile that is named twice.
 Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& options = {});
 
@@ -68,7 +68,7 @@ Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& 
 /// A large binary PLY file is read five times, so that at no time more than twice the packed memory is
 /// needed. With other formats the full and the packed cloud coexist while one is packed.
 /// @param options storage must be Storage::full.
-/// @return the errors of load_scene.
+/// @return the cloud, or an error of load_scene.
 Result<LoadedPackedCloud> load_packed_scene(const std::string& spec,
                                             const LoadSceneOptions& options = {});
 

@@ -68,7 +68,7 @@ struct LoadedAvatar {
 /// `proxy_capsules` of a driver (detail/avatar/capsule_track.hpp).
 ///
 /// Errors name the file, the array, the row and the value. Never throws.
-/// @return one of these errors:
+/// @return the result, or one of these errors:
 /// - file_not_found.
 /// - invalid_file: an array is missing or has another shape, a value is not finite, an opacity is
 ///   outside [0, 1], a scale or weight is negative, the weights of a row are all zero, or an inverse

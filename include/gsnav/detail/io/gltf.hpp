@@ -33,7 +33,7 @@ struct LoadGltfOptions {
 /// Rows that are not drawable Gaussians are dropped and counted in the report. Colours of another space
 /// than sRGB are read unchanged, with a warning. Memory is at most 260 bytes for each byte of the file
 /// and its buffers. Never throws.
-/// @return errors that name the node or accessor:
+/// @return the result, or an error that names the node or accessor:
 /// - file_not_found.
 /// - invalid_file: indices, offsets and sizes that do not fit each other or the data, attributes that
 ///   are missing or of other types, or no Gaussian primitive.

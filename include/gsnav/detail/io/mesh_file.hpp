@@ -37,7 +37,7 @@ Result<TriangleMesh> load_ply_mesh(const std::filesystem::path& path);
 /// reversed, so that outsides stay outside. Other primitives, skins and morph targets are left out. Axes
 /// and units are the file's. Memory is at most 30 bytes for each byte of the file and its buffers. Never
 /// throws.
-/// @return file_not_found; invalid_file (indices, offsets and sizes that do not fit each other or the
+/// @return the result, or file_not_found; invalid_file (indices, offsets and sizes that do not fit each other or the
 /// data, or no triangle primitive); unsupported (a required extension that is not read, such as
 /// compressed geometry; JSON nested deeper than `limits` allow); invalid_argument (`limits`);
 /// out_of_memory.

@@ -52,7 +52,7 @@ struct AmcOptions {
 /// `mass` and other sections are skipped.
 ///
 /// Errors name the file, the line and the word. Never throws.
-/// @return file_not_found; invalid_file (syntax, a bone that is defined twice or is missing from the
+/// @return the result, or file_not_found; invalid_file (syntax, a bone that is defined twice or is missing from the
 /// hierarchy, a value for an unknown bone, another number of values than its `dof`, a frame without a
 /// bone that has `dof`, no frames); unsupported (a `dof` that is not a rotation); invalid_argument (the
 /// options); out_of_memory.

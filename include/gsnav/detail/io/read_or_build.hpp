@@ -19,7 +19,7 @@ void remove_stale_caches(const std::filesystem::path& path) noexcept;
 /// @param value the member of `Cached` that is filled, next to `built` and `warning`.
 /// @param load,build return a Result<T>.
 /// @param save returns a Status.
-/// @return errors of `build`.
+/// @return the value, or an error of `build`.
 template <class Cached, class T, class Load, class Build, class Save>
 Result<Cached> read_or_build(const std::filesystem::path& path, T Cached::*value, const Load& load,
                              const Build& build, const Save& save) {

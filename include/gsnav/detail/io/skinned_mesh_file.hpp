@@ -59,7 +59,7 @@ struct GltfOptions {
 /// A joint without a name is called "node<n>"; the second of two equal names gets the suffix "#<n>".
 ///
 /// Errors name the file, the element and the value. Never throws.
-/// @return one of these errors:
+/// @return the result, or one of these errors:
 /// - file_not_found.
 /// - invalid_file: JSON, an index out of range, data beyond its buffer, a cycle of nodes, weights that
 ///   are negative or all zero, or an inverse bind that is not rigid times a scale.
@@ -100,8 +100,7 @@ struct MakeHumanOptions {
 /// Reads a MakeHuman base mesh (`.obj`) with its skeleton, weights and shape targets. The body is turned
 /// to face -Z, with its lowest point on y = 0. A joint lies at the mean of its bone's head vertices and
 /// keeps the world's axes. Weights that do not sum to 1 are divided out; vertices without weights take
-/// those of the nearest vertex that has some. Both are counted. A bone without a parent is the root; if
-/// there are several, the others become its children.
+/// those of the nearest vertex that has some. Both are counted. A bone without a parent is a root.
 ///
 /// Errors name the file, the element and the value: file_not_found; invalid_file (also for a cycle of
 /// bones or a vertex that does not exist); invalid_argument; out_of_memory. Never throws.

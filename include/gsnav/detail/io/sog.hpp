@@ -15,7 +15,7 @@ namespace gsnav::io {
 ///
 /// Memory is at most 62 MB plus 2 kB for each byte of the images, because constant images of any size
 /// compress to a few bytes. Errors name the file, the field and the value. Never throws.
-/// @return file_not_found (an image is missing); invalid_file (sizes of images that do not fit the count
+/// @return the result, or file_not_found (an image is missing); invalid_file (sizes of images that do not fit the count
 /// or each other, a quaternion mode outside 252..255, a palette label or codebook index beyond its end,
 /// a damaged zip or WebP, more pixels than the number of bytes makes plausible); unsupported (other
 /// versions, lossy images, encrypted bundles); out_of_memory.
