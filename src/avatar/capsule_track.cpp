@@ -23,7 +23,8 @@ Result<TrackedCapsules> capsules_from_track(const Skeleton& skeleton, const Moti
   };
   std::vector<Ends> first(count * joints);
   std::vector<double> spread(count * joints, 0.0);
-  std::vector<std::vector<Affine3<double>>> back(frames);  // from the driver's frame to the joint's
+  std::vector<std::vector<Affine3<double>>> back(frames);  // from the driver's frame to that of the
+                                                           // joint
   LocalPose pose;
   for (std::size_t t = 0; t < frames; ++t) {
     if (track[t].size() != count) return bad("frames of different numbers of capsules");

@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-// Light of the default scene: sky through windows, sun, lamps, and what walls and floor throw back.
+// SPDX-License-Identifier: Apache-2.0 Light of the default scene: sky through windows, sun, lamps, and
+// reflections from walls and floor.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -20,8 +20,7 @@ Vec3d inverse_of(const Vec3d& d) noexcept {
 constexpr double kClear = 0.02;  // metres: rays to a window end this far in front of it
 
 /// The boxes of a room, relative to a point, without those behind the plane through it. Rays do not go
-/// there, except to a window in the plane, and those may only miss what is between their end and the
-/// window.
+/// there, except to a window in the plane. Such a ray ends just in front of the window.
 class NearBoxes {
  public:
   NearBoxes(const Room& room, const Vec3d& point, const Vec3d& normal) {

@@ -41,7 +41,7 @@ double noise(double x, double y, int seed) noexcept {
 
 Painter::Painter() {
   // Cosine-weighted directions about +Z on a spiral. They are the same for every point, so that
-  // neighbours differ by what they see and not by chance.
+  // neighbours differ by their surroundings only, not by chance.
   constexpr int kRays = 56;
   for (int i = 0; i < kRays; ++i) {
     const double r2 = (i + 0.5) / kRays, r = std::sqrt(r2);

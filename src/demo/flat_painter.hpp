@@ -42,7 +42,7 @@ struct Lamp {
 struct Room {
   Box inside{};
   std::vector<Box> blockers{};
-  std::vector<Box> covered{};  ///< Boxes that hide what is right behind a rug or a picture.
+  std::vector<Box> covered{};  ///< Boxes of rugs and pictures, which hide the surface right behind them.
   std::vector<Window> windows{};
   std::vector<Lamp> lamps{};
   Vec3d bounce{};  ///< Colour of light reflected by the floor.
@@ -115,7 +115,7 @@ class Painter {
     double stretch = 1;         ///< Factor on all spacings.
     std::size_t gaussians = 0;  ///< Total number.
     std::size_t rows = 0;       ///< Open rows, counted through all patches.
-    std::size_t missing = 0;    ///< Gaussians that open rows get in addition to what `stretch` gives.
+    std::size_t missing = 0;    ///< Gaussians that open rows get in addition to those from `stretch`.
     std::vector<Counted> patches;
 
     /// The part of `missing` for one open row; it is shared out evenly.

@@ -134,8 +134,7 @@ Result<std::vector<Camera>> indoor_views(const DefaultScene& scene, const Indoor
   std::vector<Camera> out;
   std::vector<Vec3d> eyes;
   while (static_cast<int>(out.size()) < o.count) {
-    // Of several candidates take the one furthest from all earlier views, so that views spread over the
-    // rooms.
+    // Take the candidate furthest from all earlier views, so that views spread over the rooms.
     constexpr int kCandidates = 6;
     std::optional<Sight> best;
     double furthest = -1;

@@ -129,7 +129,7 @@ std::vector<std::vector<Group>> furniture_for(const PlannedRoom& room, bool only
 }
 
 FloorRect footprint_of(const Group::Piece& p) noexcept {
-  // Allow a little more than what the painter draws: fronts have handles, and chairs are turned a
+  // Leave some margin around the drawn piece, because fronts have handles and chairs are turned a
   // little.
   const auto at_wall = [](double w, double depth) { return FloorRect{-w / 2, 0, w / 2, depth}; };
   const auto centred = [](double w, double d) { return FloorRect{-w / 2, -d / 2, w / 2, d / 2}; };

@@ -23,8 +23,8 @@ struct AvatarFileArrays {
   NpyArray shs;        ///< [N, K, 3].
 };
 
-/// Reads Habitat-GS's arrays, or GART's parameters if the file has those. Adds what was guessed to
-/// `warnings`. Errors: those of load_avatar.
+/// Reads Habitat-GS's arrays, or GART's parameters if the file has those. Adds guesses to `warnings`.
+/// Errors: those of load_avatar.
 Result<AvatarFileArrays> read_avatar_arrays(const NpzArrays& arrays, std::size_t joints,
                                             AvatarColors colors, std::vector<std::string>& warnings);
 

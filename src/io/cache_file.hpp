@@ -11,7 +11,7 @@
 #include "file.hpp"
 #include "gsnav/detail/scene/content_hash.hpp"
 
-// Files that cache what was built from a cloud: a header, followed by arrays.
+// Cache files for data built from a cloud: a header, followed by arrays.
 
 namespace gsnav::io::detail {
 

@@ -187,13 +187,13 @@ inline void resize_planes(GaussianCloud& cloud, std::size_t n) {
 }
 
 /// Reads `count` rows into a cloud of SH degree `degree`, in parallel if there are many. The result does
-/// not depend on the number of threads. No memory is allocated beyond the cloud's.
+/// not depend on the number of threads. No memory is allocated besides that of the cloud.
 /// @param decode decode(first, last, sink) adds the rows [first, last) to the sink in order and returns
-/// a Status. Of several errors the first is returned.
+/// a Status. If several calls fail, the first error is returned.
 /// @param parallel false: all rows are read by one call.
-/// @param planes planes with `count` rows that exist already; they become the cloud's. If shN is one of
-/// them, the shN of row i is sink.bands(i). Of the others, `decode` may still read row i (sink.cloud())
-/// until it adds that row or a later one.
+/// @param planes planes with `count` rows that exist already; they are moved into the cloud. If shN is
+/// one of them, the shN of row i is sink.bands(i). In the other planes, `decode` may still read row i
+/// (sink.cloud()) until it adds that row or a later one.
 /// @param apart reads bands separately: the cloud then has degree 0. If apart->out is not null, only
 /// bands are read.
 template <class Decode>

@@ -40,7 +40,7 @@ Result<std::vector<std::byte>> load_text(const fs::path& path, const ReadLimits&
   while (!gzip.at_end()) {
     const std::size_t before = text.size();
     const std::size_t room = std::min(std::max(2 * before, kLeastText), most + 1);
-    text.reserve(room);  // resize() alone may allocate twice as much
+    text.reserve(room);  // resize() alone may allocate twice this size
     text.resize(room);
     const std::size_t got = gzip.read(std::span(text).subspan(before));
     text.resize(before + got);

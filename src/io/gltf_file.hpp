@@ -27,7 +27,7 @@ class GltfValues {
 
  private:
   friend class GltfFile;
-  /// Bytes from the first of n elements to the end of the last.
+  /// Bytes from the start of the first of n elements to the end of the last.
   std::size_t extent(std::size_t n) const noexcept;
 
   std::size_t count_ = 0, components_ = 1, stride_ = 0;

@@ -26,7 +26,7 @@ struct GltfMaterial {
 /// Reads materials and their images, each image once: PNG, JPEG or WebP, in the file or next to it.
 class GltfMaterials {
  public:
-  /// Appends images to `textures`, and what is left out or interpreted differently to `warnings`.
+  /// Appends images to `textures`, and a line to `warnings` for each thing left out or changed.
   GltfMaterials(const GltfFile& file, std::vector<TextureImage>& textures,
                 std::vector<std::string>& warnings)
       : file_(file), textures_(textures), warnings_(warnings) {}

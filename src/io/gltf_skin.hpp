@@ -23,7 +23,7 @@ struct GltfSkinPart {
 struct GltfSkin {
   std::vector<std::size_t> nodes;   ///< [J] node of each joint; kNoNode: the joint keeps its rest pose.
   std::vector<GltfSkinPart> parts;  ///< The skins, at least one.
-  std::vector<Affine3<double>> inverse_binds;  ///< [J] the file's.
+  std::vector<Affine3<double>> inverse_binds;  ///< [J] as in the file.
   Affine3<double> canonical_from_mesh{};       ///< A rotation times a scale, and a translation.
   Quatd canonical_from_scene{0, 0, 1, 0};      ///< Half a turn about Y, because glTF faces +Z.
   Skeleton skeleton;
@@ -41,11 +41,13 @@ Status read_surface(const GltfFile& file, const GltfSkin& skin, LoadedSkinnedMes
 std::vector<Affine3<double>> rigid_joints(const GltfSkin& skin,
                                           const std::vector<Affine3<double>>& globals);
 
-/// Called with the transforms of all nodes in about every tenth frame of a clip.
+/// Receives the transforms of all nodes from read_clips, in about every tenth frame of a clip.
 struct PoseObserver {
   virtual ~PoseObserver() = default;
   virtual void look(const std::vector<Affine3<double>>& globals) = 0;
 };
+/// Reads all animations of the file as clips for `skin`. Appends to `out` and `warnings`. Errors: those
+/// of load_gltf_skin.
 Status read_clips(const GltfFile& file, const GltfSkin& skin, const GltfNodes& nodes, double frame_rate,
                   PoseObserver& observer, std::vector<NamedClip>& out,
                   std::vector<std::string>& warnings);

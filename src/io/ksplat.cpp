@@ -18,30 +18,31 @@ using detail::load_le;
 
 constexpr std::size_t kHeader = 4096, kSectionHeader = 1024, kBucketCentre = 12;
 
-/// Sizes in bytes of a record's fields, by compression level. Four bytes of colour follow the
-/// quaternion.
+/// Sizes in bytes of a record's fields, by compression level. Four bytes of colour follow
+/// the quaternion.
 struct Level {
-  std::size_t number;   ///< Of a coordinate of the position, the scale or the quaternion.
-  std::size_t rest;     ///< Of an SH coefficient.
+  std::size_t number;   ///< Size of a coordinate of the position, the scale or the quaternion.
+  std::size_t rest;     ///< Size of an SH coefficient.
   std::uint32_t range;  ///< Steps from a bucket's centre to its side, unless the section has its own.
 };
 constexpr std::array<Level, 3> kLevels = {{{4, 4, 1}, {2, 2, 32767}, {2, 1, 32767}}};
 
 struct Section {
-  std::size_t count = 0, capacity = 0;  ///< Gaussians; those of a full bucket
-  std::size_t full = 0, partial = 0;    ///< buckets
-  std::size_t record = 0;               ///< bytes
+  std::size_t count = 0, capacity = 0;  ///< Number of Gaussians, and the size of a full bucket.
+  std::size_t full = 0, partial = 0;    ///< Number of buckets.
+  std::size_t record = 0;               ///< Bytes of a record.
   int degree = 0;
   double range = 0, step = 0;
-  std::size_t first = 0;                ///< place of its first Gaussian among all sections'
-  std::vector<std::byte> bucket_bytes;  ///< sizes of its partial buckets, then the centres of all
-  std::vector<std::uint64_t> ends;      ///< of each partial bucket: one past its last Gaussian
+  std::size_t first = 0;                ///< Index of its first Gaussian among those of all sections.
+  std::vector<std::byte> bucket_bytes;  ///< Sizes of its partial buckets, then the centres of all
+                                        ///< buckets.
+  std::vector<std::uint64_t> ends;      ///< For each partial bucket, one past its last Gaussian.
   detail::ByteSource records;
 
   const std::byte* centre(std::size_t bucket) const {
     return bucket_bytes.data() + 4 * partial + bucket * kBucketCentre;
   }
-  /// The bucket of Gaussian i: full ones come first; empty ones hold nothing.
+  /// The bucket of Gaussian i. Full buckets come first; empty ones hold nothing.
   std::size_t bucket_of(std::size_t i) const {
     if (i < full * capacity) return i / capacity;
     return full + static_cast<std::size_t>(std::upper_bound(ends.begin(), ends.end(), i) - ends.begin());

@@ -19,13 +19,13 @@ namespace {
 namespace fs = std::filesystem;
 using detail::invalid_file;
 
-/// Increase with every change of what build_lod makes from a cloud.
+/// Version of the result of build_lod: increase it with every change.
 constexpr std::uint32_t kVersion = 2;
 
 /// Start of the file. The arrays of for_each_array follow.
 struct Header {
   detail::CacheFront front;
-  std::uint64_t checksum;  ///< Of the arrays.
+  std::uint64_t checksum;  ///< Checksum of the arrays.
 };
 static_assert(sizeof(Header) == 40);
 

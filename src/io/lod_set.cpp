@@ -85,7 +85,7 @@ class LodReader {
   }
 
  private:
-  /// Rows of one step. Step k has what is drawn k levels above the finest available one.
+  /// Rows of one step. Step k has the rows that are drawn k levels above the finest available one.
   using Step = std::vector<std::vector<NodeRows>>;  ///< [files]
 
   /// Reads the set; with `coarser` all of its levels.

@@ -14,7 +14,7 @@
 
 namespace gsnav::io::detail {
 
-/// Time and motion of one Gaussian, as stored in files. What a file leaves out is zero.
+/// Time and motion of one Gaussian, as stored in files. Values that a file leaves out are zero.
 struct RawTemporal {
   double time = 0;       ///< Seconds.
   double log_sigma = 0;  ///< Natural logarithm, seconds; infinity: always present.

@@ -14,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 using detail::invalid_file;
 
-/// Increase with every change of what build_visible_sets makes from a cloud.
+/// Version of the result of build_visible_sets: increase it with every change.
 constexpr std::uint32_t kVersion = 2;
 
 /// Start of the file. Keys, ends and bits follow.
@@ -23,7 +23,7 @@ struct Header {
   double cell, focal, near_plane, near_sigma, min_weight;
   std::uint64_t viewpoints, cells, chunks;  ///< chunks: those of the cloud.
   std::uint64_t words;                      ///< Number of words of all cells.
-  std::uint64_t checksum;                   ///< Of the numbers above and of the arrays.
+  std::uint64_t checksum;                   ///< Checksum of the numbers above and of the arrays.
 };
 static_assert(sizeof(Header) == 112);
 
@@ -49,7 +49,8 @@ std::uint64_t checksum(const VisibleSets& v) {
   return h.low();
 }
 
-/// What is wrong with the words of a cell, for a cloud of `cloud_rows` Gaussians; null if nothing is.
+/// Checks the words of a cell, for a cloud of `cloud_rows` Gaussians. Returns a description of the flaw,
+/// or null.
 const char* flaw_of(const VisibleSets& v, std::size_t cell, std::size_t cloud_rows) {
   const View<const std::uint32_t> seen = v.seen_from(cell);
   const std::size_t words = v.words();

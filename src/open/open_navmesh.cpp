@@ -105,7 +105,7 @@ Status add_people(OpeningScene& s, const std::optional<NavMeshChoice>& choice) {
                                         ": they walk on a NavMesh, and there is none; "
                                         "OpenOptions.navmesh = auto builds it"};
   }
-  // Use a wider body than the agent's, so that people keep their shoulders clear of furniture.
+  // Use a body wider than that of the agent, so that people keep their shoulders clear of furniture.
   std::optional<NavMesh> wide;
   if (choice->file.empty()) {
     if (auto made = build(s, *choice, 0.3, 1.8, "NavMesh of people")) wide = std::move(*made);

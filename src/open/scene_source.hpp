@@ -23,8 +23,8 @@ struct SceneSource {
   std::string navmesh;           ///< The NavMesh that belongs to the scene, or empty.
   bool has_frame = false;        ///< Whether world_from_mesh is valid. If not, OpenOptions::up decides
                                  ///< how the triangles stand.
-  Similarity world_from_mesh{};  ///< Of a Habitat stage.
-  io::AvatarScene avatars;       ///< Of a Habitat scene.
+  Similarity world_from_mesh{};  ///< Placement of a Habitat stage.
+  io::AvatarScene avatars;       ///< Avatars of a Habitat scene.
 };
 
 /// Finds out what a scene's name stands for. Errors: those of open_scene that depend on the name alone.

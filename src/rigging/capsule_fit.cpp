@@ -251,7 +251,7 @@ Result<CapsuleReport> fit_body_capsules(AvatarAsset& asset,
   const std::vector<std::size_t> owner = capsule_owners(asset, options);
   const std::vector<Affine3<double>> inverse = asset.skeleton.bind_inverses();
   std::vector<std::vector<Vec3d>> local(asset.skeleton.size());
-  // Use only as many as a percentile needs. Every Gaussian is used in some pose.
+  // A percentile does not need all centres: use each Gaussian in some of the poses only.
   const std::size_t stride = max<std::size_t>(1, asset.size() * poses.size() / 2000000);
   for (std::size_t s = 0; s < poses.size(); ++s) {
     std::vector<Affine3<double>> joints(poses[s].size());

@@ -108,7 +108,7 @@ bool contains(const Capsule<double>& c, const Vec3d& p) {
   return dot(off, off) <= c.radius * c.radius;
 }
 
-/// What the capsules cover: centres of cells, and points of the surface.
+/// Centres of cells and points of the surface that the capsules cover.
 struct Covered {
   std::vector<std::uint8_t> cells, points;
 

@@ -99,7 +99,7 @@ class SolePaths {
   }
 
   /// Movement of the body along the ground from each frame to the next: the foot that is down stays
-  /// behind by as much. That foot is low and moves against the unit vector `ahead`.
+  /// behind by the same distance. That foot is low and moves against the unit vector `ahead`.
   std::vector<Vec3d> steps(const Vec3d& ahead) const {
     std::vector<double> lowest(at_[0].size(), std::numeric_limits<double>::max());
     for (const std::vector<Vec3d>& at : at_) {

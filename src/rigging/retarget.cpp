@@ -129,9 +129,9 @@ class Retargeter {
     return above;
   }
 
-  /// Finds for each paired joint the rotation from the target's rest pose to the source's. It aligns the
-  /// limb towards the only paired joint next below it. Without such a joint it is that of the joint
-  /// above.
+  /// Finds for each paired joint the rotation from the rest pose of the target to that of the source. It
+  /// aligns the limb towards the only paired joint next below it. Without such a joint it is that of the
+  /// joint above.
   void align_rest_poses() {
     const std::vector<std::size_t> above = paired_above();
     for (std::size_t j = 0; j < align_.size(); ++j) {
@@ -153,7 +153,8 @@ class Retargeter {
     }
   }
 
-  /// Rotates the target's joints to match the source's. `pose` has the translations of the rest pose.
+  /// Rotates the joints of the target to match those of the source. `pose` has the translations of the
+  /// rest pose.
   void turn_joints(const std::vector<Affine3<double>>& globals, LocalPose& pose) const {
     const Mat3d back = transpose(turn_);
     std::vector<Mat3d> turned(target_.size());

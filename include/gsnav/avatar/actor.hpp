@@ -36,8 +36,8 @@ class AvatarActor {
   /// Makes an actor.
   /// @param motion null: the asset's idle pose, or its rest pose where it has none.
   /// @param trajectory null: stands at the world's origin.
-  /// @return the result, or invalid_argument, for an asset or a motion that does not validate, a motion with another
-  /// number of joints, or options out of range; or the asset's other errors.
+  /// @return the result, or invalid_argument for an asset or a motion that does not validate, a motion
+  /// with another number of joints, or options out of range; or the asset's other errors.
   static Result<AvatarActor> create(std::shared_ptr<const AvatarAsset> asset,
                                     std::shared_ptr<const MotionSource> motion = nullptr,
                                     std::shared_ptr<const Trajectory> trajectory = nullptr,
@@ -91,7 +91,7 @@ class AvatarActor {
   /// present.
   bool narrow_to_stay(double& from, double& to) const noexcept;
 
-  /// `needed`: flags of the joints to pose, [J]; null: all joints.
+  /// `needed` [J] marks the joints to pose; null means all joints.
   Similarity placement(double t, LocalPose& pose, const std::vector<char>* needed = nullptr) const;
 
   Similarity placement_at(double t, LocalPose& pose, const std::vector<char>* needed) const;

@@ -55,7 +55,7 @@ class FixedPose final : public MotionSource {
   LocalPose pose_;
 };
 
-/// What follows the last frame of a clip.
+/// Behaviour after the last frame of a clip.
 enum class ClipEnd : std::uint8_t {
   hold,          ///< The last pose is held.
   loop,          ///< The clip starts again, after a blend to the first pose over `wrap_time`; the root
@@ -77,7 +77,7 @@ class MotionClip final : public MotionSource {
   std::vector<Vec3d> translations;      ///< [T][J], or [J] if all frames share them; metres.
   std::vector<Vec3d> root_translation;  ///< [T] path of the whole avatar in its own frame, metres; or
                                         ///< empty.
-  /// What follows the last frame.
+  /// Behaviour after the last frame.
   ClipEnd end = ClipEnd::loop;
   /// Seconds from the last frame to the first in a loop; at least one frame is used. smooth_wrap_time
   /// computes a value without jumps.
@@ -119,7 +119,7 @@ double smooth_wrap_time(const Skeleton& skeleton, const MotionClip& clip, bool f
 /// relative to the parent, so that frames can be interpolated by slerp. The path of the first root joint
 /// becomes `root_translation`.
 /// @param matrices [T][J], joint to root frame; with `skinning` that times the skeleton's inverse bind.
-/// @return the result, or invalid_argument, naming what is wrong.
+/// @return the result, or invalid_argument naming the argument.
 Result<MotionClip> clip_from_matrices(const Skeleton& skeleton, double frame_rate,
                                       const std::vector<Affine3<double>>& matrices, bool skinning);
 

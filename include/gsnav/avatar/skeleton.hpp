@@ -24,8 +24,8 @@ struct LocalPose {
   Status validate(const std::string& what) const;
 };
 
-/// A tree of joints. Lengths are in metres; the root frame is the avatar's: Y up, feet on y = 0, facing
-/// -Z.
+/// A tree of joints. Lengths are in metres; the root frame is that of the avatar: Y up, feet on y = 0,
+/// facing -Z.
 struct Skeleton {
   std::vector<std::string> names;           ///< [J], unique
   std::vector<std::int32_t> parents;        ///< [J], -1 for a root. A parent comes before its children.

@@ -35,7 +35,7 @@ struct LoadSceneOptions {
   bool keep_zero_bands = false;
   /// Largest change of an SH coefficient that compact storage may make. A cloud that would change by
   /// more stays in full storage, with a warning. The report has the error. A colour changes by at most
-  /// 4.3 times as much: the squares of the 15 basis functions sum to 15 / (4 pi).
+  /// 4.3 times this value, since the squares of the 15 basis functions sum to 15 / (4 pi).
   double most_sh_error = 2e-3;
   PackLimits pack{};    ///< Limits of packing, for load_packed_scene.
   ReadLimits limits{};  ///< Limits of readers; json_depth applies to glTF and lod-meta.json.
@@ -50,9 +50,9 @@ struct LoadedPackedCloud {
 };
 
 /// Reads a scene of Gaussians. The format follows from the name: `.ply`, `.splat`, `.ksplat`, `.spz`,
-/// `.sog`, `.glb`, `.gltf`, a `meta.json` or `lod-meta.json`, or a folder that holds one of these two.
-/// Of scenes that move (a `.ply` with t, t_scale or motion_*, a `.4dgs.npz`) the moment `options.time`
-/// is read.
+/// `.sog`, `.glb`, `.gltf`, a `meta.json` or `lod-meta.json`, or a folder that holds one of these two. A
+/// scene that moves (a `.ply` with t, t_scale or motion_*, a `.4dgs.npz`) is read at the moment
+/// `options.time`.
 ///
 /// A comma separates sibling tiles, which are merged into one cloud: `scenes/flat/2_0,2_1` reads
 /// scenes/flat/2_0 and scenes/flat/2_1. Their reports are summed; a warning begins with the path of its
@@ -60,8 +60,8 @@ struct LoadedPackedCloud {
 ///
 /// Rows are in spatial order (detail/scene/spatial_order.hpp) unless `options.sort` is false; `row_ids`
 /// has the place of each row in the file. Never throws.
-/// @return the cloud, or an error of the format's loader; unsupported for an unknown extension, with the list of
-/// known ones; invalid_argument for an empty name or a tile that is named twice.
+/// @return the cloud, or an error of the format's loader; unsupported for an unknown extension, with the
+/// list of known ones; invalid_argument for an empty name or a tile that is named twice.
 Result<LoadedCloud> load_scene(const std::string& spec, const LoadSceneOptions& options = {});
 
 /// Reads a scene and packs it, to a third of the memory. Packed clouds can be rendered, but not edited.
@@ -83,8 +83,8 @@ Result<std::optional<LoadedLodSet>> load_shipped_levels(const std::string& spec,
 std::string report_text(const LoadReport& report);
 
 /// Writes a scene. The format follows from the name: `.compressed.ply`, `.ply` (INRIA's layout),
-/// `.splat`, `.spz` (version 4), `.sog`, `meta.json` in a folder (SOG), or `.glb`. What a format loses
-/// is documented at its writer.
+/// `.splat`, `.spz` (version 4), `.sog`, `meta.json` in a folder (SOG), or `.glb`. The losses of a
+/// format are documented at its writer.
 ///
 /// Rows are written in the order in which they were read (`row_ids`), by which renderers break ties of
 /// depth; only a `.compressed.ply` keeps the cloud's own order. A compact cloud is widened first. The
@@ -103,8 +103,8 @@ struct ClampedValues {
                                  ///< of the format's range.
   std::uint64_t scales = 0;      ///< Standard deviations, clamped.
   std::uint64_t bands = 0;       ///< SH coefficients of bands 1 to 3, clamped.
-  std::uint64_t lost_bands = 0;  ///< Of `bands`: non-zero coefficients of bands that the format does not
-                                 ///< store.
+  std::uint64_t lost_bands = 0;  ///< Part of `bands`: non-zero coefficients of bands that the format
+                                 ///< does not store.
   /// Sum of the four counts.
   std::uint64_t all() const noexcept { return colours + scales + bands + lost_bands; }
 };

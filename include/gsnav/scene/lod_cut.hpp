@@ -41,18 +41,18 @@ inline Status validate(const LodChoice& c) {
   return {};
 }
 
-/// What a cut draws. Counts are Gaussians of the cloud unless said otherwise.
+/// Counts of a cut. They are Gaussians of the cloud unless said otherwise.
 struct LodStats {
   std::uint64_t shown = 0;   ///< Gaussians in chunks that may be in view.
-  std::uint64_t merged = 0;  ///< Of these, the ones that merged Gaussians stand for.
+  std::uint64_t merged = 0;  ///< Number of those that merged Gaussians stand for.
   std::uint64_t drawn = 0;   ///< Rows that are drawn for them, merged ones included.
   double error_px = 0;       ///< Largest LodNode::error of a node that is drawn, pixels.
 };
 
-/// Settings of the profile `lod`: those of `fast`, and where at least half of what a cut shows is
-/// merged, a pixel closes at a transmittance of 0.001 instead of the configured one. Where little is
-/// merged, Gaussians are large on the image and direct rendering has 60 dB or more against the photo, so
-/// that closing earlier would dominate the error.
+/// Settings of the profile `lod`: those of `fast`, and if at least half of a cut's Gaussians are merged,
+/// a pixel closes at a transmittance of 0.001 instead of the configured one. Where little is merged,
+/// Gaussians are large on the image and direct rendering has 60 dB or more against the photo, so that
+/// closing earlier would dominate the error.
 inline RenderConfig lod_config(RenderConfig config, const LodStats& stats = {}) noexcept {
   config.quality.exponential = Exponential::fast;
   if (stats.shown > 0 && 2 * stats.merged >= stats.shown) {

@@ -13,8 +13,8 @@ namespace gsnav {
 
 /// One node of a level-of-detail tree: a chunk of Gaussians and how far it is from the cloud.
 struct LodNode {
-  /// Distance between the merged Gaussians and what they stand for: root mean square over their mass,
-  /// metres. 0 for a leaf. A parent's error is at least that of its children.
+  /// Distance between the merged Gaussians and those of the cloud that they stand for, metres (root mean
+  /// square over mass). 0 for a leaf. A parent's error is at least that of its children.
   float error = 0;
   /// Size of the cloud's own Gaussians below the node: square root of their area (lod_area), geometric
   /// mean over their mass, metres. 0 where no Gaussian has mass.
@@ -52,8 +52,8 @@ struct LodTree {
   std::vector<std::uint32_t>
       level_begin;  ///< First node of each level, followed by the number of nodes.
 
-  std::vector<LodBox> boxes;         ///< Of a forest: the box of each node. Otherwise empty.
-  std::vector<std::uint32_t> roots;  ///< Of a forest: the coarsest node of each box.
+  std::vector<LodBox> boxes;         ///< In a forest, the box of each node. Otherwise empty.
+  std::vector<std::uint32_t> roots;  ///< In a forest, the coarsest node of each box.
 
   /// Number of levels, leaves included; 0 for an empty tree.
   std::size_t levels() const noexcept { return level_begin.empty() ? 0 : level_begin.size() - 1; }
@@ -90,7 +90,8 @@ inline ChunkBounds both(const ChunkBounds& a, const ChunkBounds& b) noexcept {
 
 /// Settings of build_lod.
 struct LodSettings {
-  int sh_degree = kMaxShDegree;  ///< SH degree of merged Gaussians, at most the cloud's.
+  int sh_degree = kMaxShDegree;  ///< SH degree of merged Gaussians; the degree of the cloud is an upper
+                                 ///< limit.
   int neighbours = 8;            ///< Nearest neighbours that each Gaussian is tried with for a merge, in
                                  ///< [1, 16].
   /// Called some hundred times with the share of the work that is done, in [0, 1], by the calling

@@ -208,7 +208,7 @@ class MeshScene {
     held.high = -held.low;
     for (const Vec3f& v : held.surface.geometry.vertices) {
       if (!is_finite(v)) {  // An empty box marks a mesh with vertices that are not finite: it is
-                            // processed in every frame, so that what is left out is counted.
+                            // processed in every frame, so that its left-out triangles are counted.
         held.low = {1, 1, 1};
         held.high = {};
         return;
@@ -221,7 +221,8 @@ class MeshScene {
 };
 
 /// The arrays of a mesh in a backend's memory. Other backends than host backends get a copy. On host
-/// backends nothing is copied, and what `mesh` views must outlive this object (docs/ownership.md).
+/// backends nothing is copied, and the arrays that `mesh` views must outlive this object
+/// (docs/ownership.md).
 template <Backend B>
 class MeshArrays {
  public:

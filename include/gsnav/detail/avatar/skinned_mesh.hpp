@@ -30,7 +30,7 @@ struct SkinnedMesh {
   std::vector<SurfaceMaterial> materials;    ///< Empty: white.
   std::vector<TextureImage> textures;
 
-  /// Checks the arrays. Error: invalid_argument naming the array and what is wrong with it.
+  /// Checks the arrays. Error: invalid_argument naming the array and the problem.
   Status validate() const;
 };
 

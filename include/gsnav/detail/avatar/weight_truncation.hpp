@@ -10,7 +10,7 @@
 
 namespace gsnav {
 
-/// How many weights of a Gaussian are kept, and by what measure.
+/// Number of weights that are kept for each Gaussian, and how it is chosen.
 struct WeightOptions {
   int influences = 0;  ///< 4, 8, or 0: 4 if that moves no Gaussian by more than `tolerance` in any of
                        ///< `poses`, else 8.

@@ -45,8 +45,8 @@ class WalkMotion final : public MotionSource {
   /// Fills the needed joints of `out`. An empty `needed` means all joints.
   void pose_of(const MotionInput& input, const std::vector<char>& needed, LocalPose& out) const override;
 
-  /// The pose at phase `cycles` in the middle of a walk (0: the right heel strikes, 0.5: the left). With
-  /// `walking` = 0 the person stands, at any phase. `time` (seconds) drives breathing.
+  /// The pose at phase `cycles` in the middle of a walk. The right heel strikes at 0, the left one at
+  /// 0.5. With `walking` = 0 the person stands, at any phase. `time` (seconds) drives breathing.
   void pose(double cycles, double walking, double time, LocalPose& out) const;
 
  private:

@@ -20,7 +20,7 @@ struct IndoorViewOptions {
 };
 
 /// Random cameras inside the rooms of a generated scene, spread over the rooms. A camera is at least 0.4
-/// m away from walls and furniture, also from what is below it. It looks slightly downwards, in the
+/// m away from walls and furniture, also from furniture below it. It looks slightly downwards, in the
 /// direction with the longest free view, which is at least 1.5 m. The same arguments give the same
 /// cameras. Errors: invalid_argument naming the option; nothing_navigable if no place for a camera is
 /// found.

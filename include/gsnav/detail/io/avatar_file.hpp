@@ -57,10 +57,10 @@ struct LoadedAvatar {
 /// Four or eight weights are kept for each Gaussian (`options.weights`). `LoadedAvatar::weights` reports
 /// the error of that.
 ///
-/// A file with GART's parameters is read too (docs/avatars.md): _xyz, _rotation (w, x, y, z), _scaling
-/// (scale = min_scale + sigmoid (max_scale - min_scale), with 0 and 0.1 where the file has no limits),
+/// A file with GART's parameters is read too (docs/avatars.md): _xyz, _rotation (w, x, y, z), _scaling,
 /// _opacity (logit), _features_dc [N,3], _features_rest [N,3(K-1)] (coefficient, then colour), with
-/// lbs_weights and joints_inv_bind_matrix.
+/// lbs_weights and joints_inv_bind_matrix. A scale is min_scale + sigmoid (max_scale - min_scale), with
+/// limits 0 and 0.1 if the file has none.
 ///
 /// gsnav's own files may add `capsules` [C,7] (both ends in the bind frame of a joint, and the radius,
 /// metres), `capsule_joints` [C], and `skinning` (Skinning: 0 linear, 1 linear with stretch, whose
@@ -73,15 +73,15 @@ struct LoadedAvatar {
 /// - invalid_file: an array is missing or has another shape, a value is not finite, an opacity is
 ///   outside [0, 1], a scale or weight is negative, the weights of a row are all zero, or an inverse
 ///   bind is not rigid.
-/// - unsupported: joints without names that are neither SMPL's nor SMPL-X's, more than 4096 joints, SH
-///   above degree 3, or a body that reaches further than 32 m from its root.
+/// - unsupported: joints without names whose number is neither 24 (SMPL) nor 55 (SMPL-X), more than 4096
+///   joints, SH above degree 3, or a body that reaches further than 32 m from its root.
 /// - invalid_argument: an option is out of range.
 /// - out_of_memory.
 Result<LoadedAvatar> load_avatar(const std::filesystem::path& path,
                                  const LoadAvatarOptions& options = {});
 
 /// Writes an avatar with the keys that load_avatar reads: float32 arrays, float64 inverse binds, dense
-/// weights. `joint_names` and `joint_parents` are added for joints that are not SMPL's or SMPL-X's,
+/// weights. `joint_names` and `joint_parents` are added for other skeletons than SMPL and SMPL-X,
 /// `capsules` and `capsule_joints` where there are capsules, and `skinning` where it is not linear. SH
 /// of degree 0 that Habitat-GS's rule would take for RGB is written as RGB (in float64, so that the same
 /// values are read back). Errors: those of AvatarAsset::validate; file_not_found; unsupported (4 GiB or

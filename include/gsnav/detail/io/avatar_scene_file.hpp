@@ -19,11 +19,11 @@ struct SceneAvatar {
   std::filesystem::path driver;     ///< A `.npz`. For a `.pkl` in the scene file, the `.npz` next to it.
   std::filesystem::path trajectory;  ///< [T,7] position and quaternion (x, y, z, w), applied before all
                                      ///< joint matrices; or empty.
-  double scale = 1.0;              ///< Scale about the floor below the root joint.
-  double offset_y = 0.0;           ///< Metres upwards.
-  double time_begin = 0.0;         ///< Seconds on the scene's clock.
-  std::optional<double> time_end;  ///< Empty: the avatar leaves after the driver's last frame.
-  Affine3<double> coordinates{};   ///< From the driver's frame to the world, rigid.
+  double scale = 1.0;                ///< Scale about the floor below the root joint.
+  double offset_y = 0.0;             ///< Metres upwards.
+  double time_begin = 0.0;           ///< Seconds on the scene's clock.
+  std::optional<double> time_end;    ///< Empty: the avatar leaves after the driver's last frame.
+  Affine3<double> coordinates{};     ///< From the driver's frame to the world, rigid.
   bool guess_coordinates = true;  ///< Whether the scene file names no coordinate system. An avatar whose
                                   ///< root is upside down in the first frame is then turned over.
 };
@@ -41,12 +41,12 @@ struct AvatarScene {
 };
 
 /// Reads the avatars of Habitat-GS's `*.scene_instance.json`: `gaussian_avatars` (or `avatars`),
-/// `time_max` and `time_loop`. Relative paths start at the file's folder. Keys of an avatar: name,
+/// `time_max` and `time_loop`. Relative paths start at the file's folder. An avatar has the keys name,
 /// canonical_gaussians, driver (a path, or an object with smpl_params and trajectory), scale, offset_y,
-/// time_begin, time_end, coord_system (opencv, smpl_opencv, gaussian_avatar: Y down, Z forward; habitat,
-/// world, none: the world's axes) and coord_transform (4x4 row-major, rigid). These have no effect:
-/// smpl_model_path, smpl_type, smpl_gender, use_smpl_trans, frame_time, fps, sync_cuda,
-/// trajectory_in_smpl.
+/// time_begin, time_end, coord_system (opencv, smpl_opencv and gaussian_avatar have Y down and Z
+/// forward; habitat, world and none have the world's axes) and coord_transform (4x4 row-major, rigid).
+/// These have no effect: smpl_model_path, smpl_type, smpl_gender, use_smpl_trans, frame_time, fps,
+/// sync_cuda, trajectory_in_smpl.
 ///
 /// A file without avatars gives an empty list. Never throws. Errors name the file, the avatar and the
 /// key: file_not_found; invalid_file; unsupported (proxy_urdf); out_of_memory.
@@ -60,8 +60,8 @@ Result<AvatarScene> load_avatar_scene(const std::filesystem::path& path);
 Result<std::vector<AvatarActor>> load_scene_actors(const AvatarScene& scene);
 
 /// The time on the scene's clock `seconds` after the start: in [0, time_max + blend) if it loops,
-/// otherwise limited to time_max. `actors` are the scene's; they determine time_max where the file has
-/// none.
+/// otherwise limited to time_max. `actors` are the actors of the scene; they determine time_max if the
+/// file has none.
 double scene_time(const AvatarScene& scene, const std::vector<AvatarActor>& actors,
                   double seconds) noexcept;
 

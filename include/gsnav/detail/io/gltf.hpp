@@ -18,7 +18,7 @@ struct LoadGltfOptions {
   /// those of a PLY (x right, y down, z forward), by half a turn about z that includes SH bands.
   bool keep_axes = false;
   /// Also read primitives compressed by the draft extension KHR_gaussian_splatting_compression_spz_2.
-  /// The axes of the SPZ data are taken for the file's. Untested on a real file.
+  /// The SPZ data are taken to have the axes of the file. Untested on a real file.
   bool spz_compression = false;
   ReadLimits limits{};  ///< Only json_depth is used.
 };
@@ -52,7 +52,7 @@ Result<LoadedCloud> parse_gltf(std::span<const std::byte> bytes, std::string sou
 
 /// Options of save_glb.
 struct SaveGlbOptions {
-  /// Keep the cloud's axes. Otherwise they are taken for those of a PLY and turned to glTF's.
+  /// Keep the cloud's axes. Otherwise they are taken for those of a PLY and turned to the axes of glTF.
   bool keep_axes = false;
 };
 

@@ -23,9 +23,9 @@ struct LoadLodOptions {
 /// finer one, with a warning in the report. Rows are ordered by file, as the set lists the files.
 ///
 /// Errors: those of load_sog; file_not_found (no level of a node exists); invalid_argument (a level that
-/// the set does not have, with those it has); unsupported (a tree deeper than `limits` allow);
-/// invalid_file (files outside of the folder, rows that two nodes share or that lie beyond the end of
-/// their file). Never throws.
+/// the set does not have, with those it has); unsupported (a tree deeper than `limits` allow). A set is
+/// invalid_file if it names files outside of its folder, or rows that two nodes share or that lie beyond
+/// the end of their file. Never throws.
 Result<LoadedCloud> load_lod_set(const std::filesystem::path& path, const LoadLodOptions& options = {});
 
 /// A streamed set with its levels of detail, to be drawn with a LodCut.

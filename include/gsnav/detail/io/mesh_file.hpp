@@ -35,19 +35,23 @@ Result<TriangleMesh> load_ply_mesh(const std::filesystem::path& path);
 /// Reads the triangles of a glTF 2.0 file, GLB or JSON: every primitive of the scene with mode
 /// TRIANGLES, STRIP or FAN, with its node's transform applied. Triangles under a mirroring transform are
 /// reversed, so that outsides stay outside. Other primitives, skins and morph targets are left out. Axes
-/// and units are the file's. Memory is at most 30 bytes for each byte of the file and its buffers. Never
-/// throws.
-/// @return the result, or file_not_found; invalid_file (indices, offsets and sizes that do not fit each other or the
-/// data, or no triangle primitive); unsupported (a required extension that is not read, such as
-/// compressed geometry; JSON nested deeper than `limits` allow); invalid_argument (`limits`);
-/// out_of_memory.
+/// and units are those of the file. Memory is at most 30 bytes for each byte of the file and its
+/// buffers. Never throws.
+/// @return the result, or one of these errors:
+/// - file_not_found.
+/// - invalid_file: indices, offsets and sizes that do not fit each other or the data, or no triangle
+///   primitive.
+/// - unsupported: a required extension that is not read, such as compressed geometry, or JSON nested
+///   deeper than `limits` allow.
+/// - invalid_argument: `limits` out of range.
+/// - out_of_memory.
 Result<TriangleMesh> load_gltf_mesh(const std::filesystem::path& path, const ReadLimits& limits = {});
 
 /// Reads the triangles of a glTF 2.0 file with their materials. Each primitive of a mesh is a part, with
 /// an instance for each node that shows it. A node that mirrors or scales unevenly gets a part of its
-/// own, with its transform applied. Axes and units are the file's.
+/// own, with its transform applied. Axes and units are those of the file.
 ///
-/// What is read: normals, linear vertex colours (COLOR_0), base colour factor and texture with its
+/// It reads normals, linear vertex colours (COLOR_0), base colour factor and texture with its
 /// coordinates (KHR_texture_transform applied), alpha mode (OPAQUE, MASK with its cut-off, BLEND) with
 /// the alphas that it uses, double-sided, and KHR_materials_unlit. Textures are PNG, JPEG (in builds
 /// with libjpeg) or WebP, inside the file or next to it. For a texture that cannot be read only the

@@ -46,16 +46,19 @@ struct AmcOptions {
 
 /// Reads a motion capture from Acclaim's two files, a skeleton (`.asf`) and its motion (`.amc`). A bone
 /// becomes a joint of the same name at its near end; a bone without children adds a joint "<name>_end"
-/// at its far end. The rest pose is the skeleton's, with all joint frames parallel to the world. The
-/// rotation of a bone is therefore C M C^-1, with C from its `axis` and M from its `dof`; in both, the
-/// first rotation listed is applied first. The root's movement is the clip's root_translation. `limits`,
-/// `mass` and other sections are skipped.
+/// at its far end. The rest pose is that of the skeleton, with all joint frames parallel to the world.
+/// The rotation of a bone is therefore C M C^-1, with C from its `axis` and M from its `dof`; in both,
+/// the first rotation listed is applied first. The root's movement is the clip's root_translation.
+/// `limits`, `mass` and other sections are skipped.
 ///
 /// Errors name the file, the line and the word. Never throws.
-/// @return the result, or file_not_found; invalid_file (syntax, a bone that is defined twice or is missing from the
-/// hierarchy, a value for an unknown bone, another number of values than its `dof`, a frame without a
-/// bone that has `dof`, no frames); unsupported (a `dof` that is not a rotation); invalid_argument (the
-/// options); out_of_memory.
+/// @return the result, or one of these errors:
+/// - file_not_found.
+/// - invalid_file: syntax, a bone that is defined twice or is missing from the hierarchy, a value for an
+///   unknown bone, a wrong number of values, a bone without values in some frame, or no frames.
+/// - unsupported: a `dof` that is not a rotation.
+/// - invalid_argument: an option is out of range.
+/// - out_of_memory.
 Result<LoadedMotion> load_amc(const std::filesystem::path& skeleton, const std::filesystem::path& motion,
                               const AmcOptions& options = {});
 
@@ -107,7 +110,7 @@ struct SmplMotionOptions {
 /// jaw and eyes then rest. Rest joints are J_regressor (v_template + shapedirs betas).
 ///
 /// Errors name the file, the array and the value: file_not_found; invalid_file; unsupported (poses for
-/// other joints than the model's); out_of_memory. Never throws.
+/// joints that the model does not have); out_of_memory. Never throws.
 Result<LoadedMotion> load_smpl_motion(const std::filesystem::path& path,
                                       const std::filesystem::path& model,
                                       const SmplMotionOptions& options = {});

@@ -12,7 +12,7 @@ namespace gsnav::io {
 ///
 /// - Numbers: cellSize, cellHeight, agentHeight, agentRadius, agentMaxClimb, agentMaxSlope,
 ///   regionMinSize, regionMergeSize, edgeMaxLen, edgeMaxError, vertsPerPoly, detailSampleDist,
-///   detailSampleMaxError; and of gsnav only: tileSize, maxCells.
+///   detailSampleMaxError, and of gsnav only tileSize and maxCells.
 /// - True or false: filterLowHangingObstacles, filterLedgeSpans, filterWalkableLowHeightSpans,
 ///   includeStaticObjects.
 ///

@@ -29,10 +29,13 @@ namespace gsnav::io {
 ///   f_dc.
 ///
 /// Rows that are not drawable Gaussians are dropped and counted in the report. Never throws.
-/// @return the result, or file_not_found; invalid_file (malformed header, fewer rows than promised, a property that is
-/// missing or occurs twice, another number of f_rest, chunks that do not fit the vertices); unsupported
-/// (list properties of a vertex, a compressed PLY with lists or in another format than
-/// binary_little_endian); out_of_memory.
+/// @return the result, or one of these errors:
+/// - file_not_found.
+/// - invalid_file: malformed header, fewer rows than promised, a property that is missing or occurs
+///   twice, a wrong number of f_rest, or chunks that do not fit the vertices.
+/// - unsupported: list properties of a vertex, or a compressed PLY with lists or in another format than
+///   binary_little_endian.
+/// - out_of_memory.
 Result<LoadedCloud> load_ply(const std::filesystem::path& path);
 
 /// Reads the bytes of a file. `source` names them in messages and in the report.

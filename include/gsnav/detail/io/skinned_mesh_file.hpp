@@ -37,8 +37,8 @@ struct GltfOptions {
 };
 
 /// Reads the skinned meshes of one rig, and all animations, from a glTF 2.0 file (`.glb`, or `.gltf`
-/// with buffers inside or next to it). What is read: positions, JOINTS_n and WEIGHTS_n (n = 0, 1, ...;
-/// sums other than 1 are divided out and counted), TEXCOORD_0, COLOR_0, base colour factor and texture
+/// with buffers inside or next to it). It reads positions, JOINTS_n and WEIGHTS_n (n = 0, 1, ...; sums
+/// other than 1 are divided out and counted), TEXCOORD_0, COLOR_0, base colour factor and texture
 /// (PNG, or JPEG in builds with libjpeg), alpha cut-off, and animations (step, linear, cubic spline) of
 /// nodes. Morph targets, other textures, and meshes without a skin that is read are skipped with a
 /// warning.

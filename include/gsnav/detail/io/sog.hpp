@@ -15,10 +15,13 @@ namespace gsnav::io {
 ///
 /// Memory is at most 62 MB plus 2 kB for each byte of the images, because constant images of any size
 /// compress to a few bytes. Errors name the file, the field and the value. Never throws.
-/// @return the result, or file_not_found (an image is missing); invalid_file (sizes of images that do not fit the count
-/// or each other, a quaternion mode outside 252..255, a palette label or codebook index beyond its end,
-/// a damaged zip or WebP, more pixels than the number of bytes makes plausible); unsupported (other
-/// versions, lossy images, encrypted bundles); out_of_memory.
+/// @return the result, or one of these errors:
+/// - file_not_found: an image is missing.
+/// - invalid_file: sizes of images that do not fit the count or each other, a quaternion mode outside
+///   252..255, a palette label or codebook index beyond its end, a damaged zip or WebP, or more pixels
+///   than the number of bytes makes plausible.
+/// - unsupported: other versions, lossy images, or encrypted bundles.
+/// - out_of_memory.
 Result<LoadedCloud> load_sog(const std::filesystem::path& path);
 
 /// Writes a cloud as SOG version 2: a bundle if `path` ends in `.sog`, otherwise files next to `path`,
@@ -37,8 +40,8 @@ Result<LoadedCloud> load_sog(const std::filesystem::path& path);
 /// - opacity: 1/510.
 /// - log-scales (-infinity is written as -20) and coefficients of degree 0: 1/255 of their range; exact
 ///   if there are at most 256 different values.
-/// - higher SH bands: they share a palette of N/2 entries, at least 1024 and at most 65536. If there are
-///   no more different ones, the error is the codebook's, 1/255 of the range.
+/// - higher SH bands: they share a palette of N/2 entries, at least 1024 and at most 65536. With no more
+///   distinct values than that, the error is 1/255 of the range.
 ///
 /// Errors: file_not_found (the folder is missing); write_failed; invalid_argument (arrays of different
 /// lengths, another name); unsupported (more than 268 million Gaussians, a bundle of 4 GiB);

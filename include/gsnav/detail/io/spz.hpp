@@ -18,12 +18,12 @@ struct LoadSpzOptions {
   bool keep_axes = false;
 };
 
-/// Reads Niantic's SPZ, versions 1 to 3 (one gzip stream) and 4 (one zstd stream for each field):
-/// positions of 24 bits (float16 in version 1), log-scales of 8 bits in steps of 1/16, quaternions of 3
-/// x 8 bits (from version 3 on 3 x 10), and colours, opacities and SH bands of 8 bits. Of SH degree 4
-/// the bands up to degree 3 are read, with a warning. The antialiased flag sets the filter to mip.
-/// Extensions are skipped with a warning. Versions 3 and 4 are tested on bytes that Niantic's own
-/// library wrote; versions 1 and 2 are untested on a real file.
+/// Reads Niantic's SPZ, versions 1 to 3 (one gzip stream) and 4 (one zstd stream for each field).
+/// Positions have 24 bits (float16 in version 1), log-scales 8 bits in steps of 1/16, quaternions 3 x 8
+/// bits (from version 3 on 3 x 10), and colours, opacities and SH bands 8 bits. The fourth SH band is
+/// left out, with a warning. The antialiased flag sets the filter to mip. Extensions are skipped with a
+/// warning. Versions 3 and 4 are tested on bytes that Niantic's own library wrote; versions 1 and 2 are
+/// untested on a real file.
 ///
 /// Memory is at most 100 times the file's size plus the resulting cloud. Never throws. Errors:
 /// file_not_found; invalid_file (a stream that is damaged or has another size, a bad header, fewer bytes
@@ -37,7 +37,7 @@ Result<LoadedCloud> parse_spz(std::span<const std::byte> bytes, std::string sour
 
 /// Options of save_spz.
 struct SaveSpzOptions {
-  /// Keep the cloud's axes. Otherwise they are taken for those of a PLY and turned to SPZ's.
+  /// Keep the cloud's axes. Otherwise they are taken for those of a PLY and turned to the axes of SPZ.
   bool keep_axes = false;
   /// Positions are stored in steps of 2^-fractional_bits metres, 0 to 23. Fewer bits are used if the
   /// farthest mean does not fit into 24 bits (at 12 bits: beyond 2047.9 m).

@@ -17,8 +17,8 @@ Status save_visible_sets(const std::filesystem::path& path, const VisibleSets& s
                          const GaussianCloud& cloud);
 
 /// Reads what save_visible_sets wrote for `cloud`. Allocates no more than the file's size. Never throws.
-/// Errors: file_not_found; invalid_argument (of another cloud or another version); invalid_file, naming
-/// what is wrong (not such a file, truncated, too long, wrong checksum, or a value out of range).
+/// Errors: file_not_found; invalid_argument (of another cloud or another version); invalid_file (not
+/// such a file, truncated, too long, wrong checksum, or a value out of range).
 Result<VisibleSets> load_visible_sets(const std::filesystem::path& path, const GaussianCloud& cloud);
 
 /// Path of the cached visible sets of a scene: next to the asset, under a name with a hash of everything

@@ -97,13 +97,13 @@ struct OpenedScene {
   std::shared_ptr<const SimulatorScene> scene;  ///< assets[0] of it are the Gaussians, if there are any.
   LoadReport report;                            ///< Report of reading the Gaussians.
   std::string up = "y";                         ///< The file's up axis, in the form of OpenOptions::up.
-  bool up_guessed = false;         ///< Whether `up` was guessed from the ground; report.up_confidence
-                                   ///< then applies.
-  std::string navmesh_source;      ///< Origin of the NavMesh: "from the mesh", "from FILE", ...; empty:
-                                   ///< there is none.
-  std::vector<std::string> notes;  ///< What was found and built, step by step.
-  std::vector<std::string> warnings;             ///< What was left out, or done differently than asked
-                                                 ///< for.
+  bool up_guessed = false;            ///< Whether `up` was guessed from the ground; report.up_confidence
+                                      ///< then applies.
+  std::string navmesh_source;         ///< Origin of the NavMesh, such as "from the mesh" or "from FILE";
+                                      ///< empty without one.
+  std::vector<std::string> notes;     ///< A line for each thing that was found or built.
+  std::vector<std::string> warnings;  ///< A line for each thing that was left out, or done
+                                      ///< differently than asked for.
   double load_seconds = 0, navmesh_seconds = 0;  ///< Seconds taken.
 };
 

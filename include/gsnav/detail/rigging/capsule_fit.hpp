@@ -14,9 +14,9 @@ struct CapsuleFitOptions {
                              ///< contains, in (0.5, 1].
   double contained = 0.99;  ///< Least share of all centres that the capsules must contain in every pose,
                             ///< in [0, 1].
-  double shortest = 0.08;   ///< Metres. A bone whose Gaussians reach less far is joined to its parent's
-                           ///< part (fingers, face).
-  std::size_t least = 40;  ///< Least number of Gaussians of a part that gets a capsule.
+  double shortest = 0.08;   ///< Metres. A bone whose Gaussians reach less far is joined to the part
+                            ///< of its parent (fingers, face).
+  std::size_t least = 40;   ///< Least number of Gaussians of a part that gets a capsule.
 };
 
 /// How well capsules cover a body, over poses. Lengths are in metres.

@@ -41,8 +41,8 @@ class NearestTriangle {
 }  // namespace detail
 
 struct CloudBindingOptions {
-  Similarity mesh_from_cloud{};  ///< Transform from the cloud's frame to the mesh's. HumanGaussian's
-                                 ///< clouds are scaled and shifted.
+  Similarity mesh_from_cloud{};  ///< Transform from the frame of the cloud to that of the mesh.
+                                 ///< HumanGaussian's clouds are scaled and shifted.
   double furthest = 0.05;        ///< Metres. Gaussians further from the surface are left out.
   WeightOptions weights;
 };

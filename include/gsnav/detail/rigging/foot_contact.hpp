@@ -15,8 +15,8 @@ struct SolePoint {
   Vec3d local{};  ///< In the joint's frame, metres.
 };
 
-/// One foot: its joints, the ankle first, and the points where it touches the ground: heel, ball and tip
-/// of the toes.
+/// The joints of one foot, the ankle first, and the points where it touches the ground: heel, ball and
+/// tip of the toes.
 struct Foot {
   std::vector<std::size_t> joints;
   std::vector<SolePoint> sole;
@@ -59,7 +59,8 @@ class FootSlideMeter {
   FootSlideMeter(std::vector<Foot> feet, double clearance = 0.02)
       : feet_(std::move(feet)), clearance_(clearance) {}
 
-  /// Adds a frame. `joints`: [J] to the world, rigid; `body`: position of the walker on the floor.
+  /// Adds a frame. `joints` [J] are rigid transforms to the world, and `body` is the walker's position
+  /// on the floor.
   void add(const std::vector<Affine3<double>>& joints, const Vec3d& body);
 
   /// Measures the frames [first, last).

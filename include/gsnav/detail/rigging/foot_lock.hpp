@@ -34,9 +34,9 @@ struct FootLockReport {
 Result<std::vector<Leg>> find_legs(const Skeleton& skeleton, const std::vector<Foot>& feet);
 
 /// Keeps the feet of a recorded walk in place while they are down, by inverse kinematics of two bones.
-/// Of a foot that is down (by the rule of FootSlideMeter) the point that slides least is held: heel,
-/// ball and toes in turn. Between two contacts the correction changes smoothly from one to the next.
-/// Errors: invalid_argument (sizes; those of find_legs).
+/// While a foot is down (by the rule of FootSlideMeter), its point that slides least is held: heel, ball
+/// and toes in turn. Between two contacts the correction changes smoothly from one to the next. Errors:
+/// invalid_argument (sizes; those of find_legs).
 /// @param bodies [T] position of the walker on the floor.
 /// @param frames [T][J] joints in the world, corrected in place.
 Result<FootLockReport> lock_feet(const Skeleton& skeleton, const std::vector<Foot>& feet,

@@ -8,8 +8,8 @@
 
 namespace gsnav {
 
-/// Names of a body joint by which the skeletons of people are matched: SMPL's, and those of the CMU
-/// captures (ASF/AMC), MakeHuman's default rig, MakeHuman's BVH files and Mixamo's rig (without
+/// Names of a body joint by which the skeletons of people are matched: the name in SMPL, and those in
+/// the CMU captures (ASF/AMC), MakeHuman's default rig, MakeHuman's BVH files and Mixamo's rig (without
 /// "mixamorig:"). Upper and lower case are equal.
 struct BodyJointNames {
   const char* smpl;
@@ -22,15 +22,15 @@ const std::array<BodyJointNames, 22>& body_joint_names() noexcept;
 /// Index in the skeleton of each body joint (body_joint_names), or -1.
 std::array<int, 22> find_body_joints(const Skeleton& skeleton);
 
-/// Direction in which a skeleton faces in its rest pose, from its hips: radians about +Y from -Z. Error:
-/// invalid_argument (a hip is missing, or both are at one point).
+/// Direction in which a skeleton faces in its rest pose, in radians about +Y from -Z. It is found from
+/// the hips. Error: invalid_argument (a hip is missing, or both are at one point).
 Result<double> rest_heading(const Skeleton& skeleton);
 
-/// Options for `retarget`, with joints paired by name and the rotation from the source's heading to the
-/// target's. The target's root is paired with the source's. Arms and legs point as the source's do.
-/// Trunk, collars, head and feet rotate relative to their rest pose as the source's do, because in both
-/// rest poses the body stands upright on flat feet. Error: invalid_argument (fewer joints in common than
-/// both hips, knees and ankles).
+/// Options for `retarget`, with joints paired by name and the rotation from the heading of the source to
+/// that of the target. The roots are paired. Arms and legs point as the source's do. Trunk, collars,
+/// head and feet rotate relative to their rest pose as the source's do, because in both rest poses the
+/// body stands upright on flat feet. Error: invalid_argument (fewer joints in common than both hips,
+/// knees and ankles).
 Result<RetargetOptions> match_joints(const Skeleton& source, const Skeleton& target);
 
 }  // namespace gsnav

@@ -26,7 +26,7 @@ struct RetargetOptions {
 
 /// Transfers a clip from one skeleton to another. Each paired joint rotates in space as its source does,
 /// relative to the source's rest pose. Where the rest poses hold a limb differently (a T pose and an A
-/// pose), the limb takes the direction of the source's. Bones keep the target's lengths. The root's path
+/// pose), the limb takes the direction of the source. Bones keep the target's lengths. The root's path
 /// is scaled by the ratio of leg lengths. Further roots of the target move as if they were fixed to the
 /// first. Both rest poses have Y up. Errors: invalid_argument (a skeleton or the clip; a name in neither
 /// skeleton; no pair for the target's root; or, if root_scale is 0, a root that is not above the lowest

@@ -114,9 +114,9 @@ inline void orthogonal_columns(Mat3d& a, Mat3d& rotation, Vec3d& lengths) {
 
 /// Moves a cloud by an invertible affine map, M and a translation: uneven scales, shears and mirrors. A
 /// covariance C becomes M C M^T, which is split into a rotation and scales again. Colours turn with the
-/// orthogonal factor Q of M = Q P (P symmetric and positive definite): what was seen from direction d is
-/// seen from Q d. A direction that is only stretched keeps its colours. Where M mirrors, so does Q: SH
-/// bands of odd degree change sign and then turn by the rotation -Q.
+/// orthogonal factor Q of M = Q P (P symmetric and positive definite): the colour seen from direction d
+/// is then seen from Q d. A direction that is only stretched keeps its colours. Where M mirrors, so does
+/// Q: SH bands of odd degree change sign and then turn by the rotation -Q.
 ///
 /// Chunk bounds are dropped, so sort again. Error: invalid_argument where M is not finite or too flat
 /// (smallest stretch at most 1e-6 of the largest); the cloud is then unchanged.
@@ -158,7 +158,7 @@ inline Status transform(GaussianCloud& cloud, const Affine3<double>& by) {
     for (std::size_t k = 0; k < 4; ++k) cloud.quats[k][i] = static_cast<float>(parts[k]);
     for (int k = 0; k < 3; ++k)
       cloud.scales[static_cast<std::size_t>(k)][i] = static_cast<float>(scales[k]);
-    // Of the coefficients in shN, 0 to 2 are degree 1 and 8 to 14 degree 3.
+    // In shN, coefficients 0 to 2 are degree 1 and 8 to 14 degree 3.
     for (std::size_t k = 0; sign < 0 && k < rest / 3; ++k) {
       if (k >= 3 && k < 8) continue;
       for (std::size_t c = 0; c < 3; ++c) cloud.shN[i * rest + 3 * k + c] *= -1.0f;

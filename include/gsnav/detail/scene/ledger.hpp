@@ -17,7 +17,8 @@
 
 namespace gsnav {
 
-/// What a frame skipped, merged and rounded: counts and error bounds. It is computed on request.
+/// Counts and error bounds of everything that a frame skipped, merged or rounded. It is computed on
+/// request.
 struct FrameLedger {
   // Skipped without changing the image.
   CullCounts culled;              ///< Gaussians of chunks out of view or not in the cut.
@@ -31,7 +32,7 @@ struct FrameLedger {
   std::uint64_t unseen = 0;  ///< Gaussians left out by a visible set (VisibleSets).
   double unseen_weight = 0;  ///< Largest share of a pixel that any viewpoint saw of an unseen Gaussian.
                              ///< It is sampled, not a bound.
-  LodStats lod;                      ///< What the cut drew. Zeros without level of detail.
+  LodStats lod;              ///< Counts of the cut. Zeros without level of detail.
   std::uint64_t sh_skipped = 0;      ///< SH coefficients in bands that are not read, in memory or not.
   double sh_error = 0;               ///< Largest change of a colour by the skipped bands.
   std::uint64_t sh_bytes = 0;        ///< Bytes that the dropped bands would take.

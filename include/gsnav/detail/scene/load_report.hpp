@@ -11,12 +11,12 @@
 
 namespace gsnav {
 
-/// What a reader does with a row of a file.
+/// Result of reading a row: kept, or the reason why it was dropped.
 enum class RowFate : std::uint8_t { kept, non_finite, zero_quat, transparent };
 
 /// What packing changed: the largest error of any row.
 struct PackErrors {
-  int mean_bits = 16;  ///< Bits of a mean's coordinate: 16, or 32 (float).
+  int mean_bits = 16;          ///< Bits of a mean's coordinate: 16, or 32 (float).
   int sh_bits = 8;             ///< Bits of an SH coefficient: 8, 16 or 32.
   double mean = 0;             ///< Movement of a mean, metres.
   double mean_deviations = 0;  ///< Movement of a mean, in its Gaussian's largest standard deviations.
@@ -28,7 +28,7 @@ struct PackErrors {
                               ///< square.
 };
 
-/// What a loader found in a file and did with it. Every repaired or dropped row is counted here.
+/// The report of a loader on a file. Every repaired or dropped row is counted here.
 struct LoadReport {
   std::string source;                     ///< Path or description.
   std::uint64_t read = 0;                 ///< Rows in the file.

@@ -213,7 +213,7 @@ class LodBuilder {
 
 /// Builds the level-of-detail tree of a cloud in spatial order (sort_spatially). Takes about 15 s for
 /// each million Gaussians on one core. The result has the same bits on any host backend and for any
-/// number of threads. Errors: invalid_argument (the cloud is not sorted: it has no chunk bounds; a
+/// number of threads. Errors: invalid_argument (a cloud without chunk bounds, which is not sorted; a
 /// setting out of range).
 template <Backend B>
 requires is_host_backend<B> Result<LodTree> build_lod(B& backend, const GaussianCloud& cloud,

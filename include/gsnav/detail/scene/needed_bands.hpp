@@ -38,7 +38,7 @@ void cut_rows(const T* rows, std::size_t n, std::size_t from, std::size_t to, T*
 struct SceneBands {
   std::vector<std::uint8_t> chunk_sh_degrees;  ///< [chunks], for ColorRows::chunk_degrees.
   std::uint64_t sh_numbers = 0;       ///< SH coefficients above degree 0 in the cloud, in all channels.
-  std::uint64_t sh_numbers_read = 0;  ///< Of these, the ones in needed bands.
+  std::uint64_t sh_numbers_read = 0;  ///< Number of those in needed bands.
   double color_error = 0;             ///< Largest change of a colour by leaving out the rest; 0 where
                                       ///< only zeros are left out.
   // Set by drop_bands (detail/scene/drop_bands.hpp), which keeps every band that some chunk needs.

@@ -17,7 +17,8 @@ namespace gsnav {
 struct PlacedMeshes {
   MeshScene meshes;
   std::vector<TexturedScene::Instance> instances;
-  std::vector<std::string> warnings;  ///< What is drawn differently than the file asks for.
+  std::vector<std::string> warnings;  ///< A line for each thing that is drawn differently than the file
+                                      ///< asks for.
 
   /// All instances in the world, for BasicRenderer::set_meshes on host backends. Their ids count up from
   /// `first_id`. Valid while this object lives and no mesh is added.

@@ -147,9 +147,9 @@ inline std::vector<std::uint32_t> rows_as_read(const GaussianCloud& cloud) {
 }
 
 /// Sorts the rows along Hilbert's curve through their means and computes the bounds of each chunk. A
-/// renderer then touches only what is near the view, and neighbours lie together in memory. `row_ids`
-/// keeps each row's place, so that images keep their bits. Large Gaussians go to the end: one among
-/// small ones would inflate the bounds of its chunk. The order is the same for any number of threads.
+/// renderer then touches only rows near the view, and neighbours lie together in memory. `row_ids` keeps
+/// each row's place, so that images keep their bits. Large Gaussians go to the end: one among small ones
+/// would inflate the bounds of its chunk. The order is the same for any number of threads.
 template <Backend B>
 void sort_spatially(B& backend, GaussianCloud& cloud) {
   static_assert(is_host_backend<B>);

@@ -22,8 +22,9 @@ struct SurfaceMaterial {
   std::int32_t texture = -1;  ///< Index into the scene's textures, or -1. Textures repeat beyond [0, 1].
   bool double_sided = false;  ///< Whether it is visible from behind.
   bool unlit = false;         ///< Whether the colour is shown as it is, without shading.
-  bool blend = false;         ///< Whether it is blended with what is behind it, by alpha.
-  double alpha = 1.0;  ///< Alpha in [0, 1], times the texture's. Used with alpha_cutoff and blend only.
+  bool blend = false;         ///< Whether it is blended with the background, by alpha.
+  double alpha = 1.0;  ///< Alpha in [0, 1], multiplied with that of the texture. Used with alpha_cutoff
+                       ///< and blend only.
 };
 
 }  // namespace gsnav

@@ -31,7 +31,7 @@ struct TexturedScene {
   std::vector<TexturedPart> parts;
   std::vector<TextureImage> textures;
   std::vector<Instance> instances;
-  std::vector<std::string> warnings;  ///< What was left out or interpreted differently.
+  std::vector<std::string> warnings;  ///< A line for each thing that was left out or changed.
 };
 
 }  // namespace gsnav
