@@ -94,8 +94,8 @@ class CloudSink {
   std::size_t size() const noexcept { return at_ - first_; }
   const LoadReport& report() const noexcept { return report_; }
 
-  /// Writes the origin ids of the rows, as numbered by `all`, to `to` from index `at` on. Only needed if
-  /// has_origins().
+  /// Adds the origins of the rows to `all`, and writes the id of each row's origin to to[at], to[at +
+  /// 1], ... Needed only if has_origins().
   void give_origins(OriginLattice& all, std::vector<std::uint32_t>& to, std::size_t at) const {
     std::vector<std::uint32_t> ids;
     for (const Vec3d& origin : lattice_.origins()) ids.push_back(all.id_of_point(origin));

@@ -16,9 +16,9 @@ namespace gsnav {
 struct MotionInput {
   double time = 0.0;      ///< Seconds since the actor appeared.
   double distance = 0.0;  ///< Metres walked since then.
-  /// Distances at which the present walk began and at which it will stop; infinite where there is no
-  /// such start or stop.
+  /// Distance at which the present walk began, metres; -infinity if it had no start.
   double leg_begin = -std::numeric_limits<double>::infinity();
+  /// Distance at which it will stop, metres; infinity if it has no end.
   double leg_end = std::numeric_limits<double>::infinity();
   double turned = 0.0;   ///< Radians turned on the spot since then, positive for either direction.
   double walking = 0.0;  ///< Speed as a share of the walking speed, in [0, 1].

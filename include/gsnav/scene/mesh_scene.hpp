@@ -65,8 +65,8 @@ class MeshTexture {
   TextureView view() const&& = delete;
 
  private:
-  /// Appends the next coarser level of one of w x h texels that begins at `from`. Where a side is odd,
-  /// the last texel averages three instead of two.
+  /// Appends the next coarser level to a level of w x h texels whose first texel is at `from`. If a side
+  /// is odd, the last texel averages three texels instead of two.
   void reduce(std::size_t from, int w, int h) {
     const int half_w = std::max(w / 2, 1), half_h = std::max(h / 2, 1);
     for (int y = 0; y < half_h; ++y) {

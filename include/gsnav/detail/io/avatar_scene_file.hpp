@@ -33,9 +33,9 @@ struct AvatarScene {
   std::vector<SceneAvatar> avatars;
   double time_max = 0.0;  ///< Length of the clock's period, seconds. 0: until the last avatar has left.
   bool time_loop = true;
-  /// Least length of the blend that a looping clock adds after `time_max`, seconds. Avatars that are
-  /// present both at the end and at the beginning move back during it; it is longer where they would be
-  /// faster than 1.4 m/s. 0: they jump, as in Habitat-GS.
+  /// Least duration of the blend that a looping clock adds after `time_max`, seconds. During the blend,
+  /// avatars that are present at both ends of the period move from where they stop to where they start.
+  /// It lasts longer if an avatar would move faster than 1.4 m/s. 0: avatars jump, as in Habitat-GS.
   double loop_blend = 0.5;
   std::vector<std::string> warnings;  ///< Keys that have no effect here.
 };

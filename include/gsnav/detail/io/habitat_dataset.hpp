@@ -51,9 +51,9 @@ struct HabitatDataset {
 
 /// Reads a dataset with Habitat-GS's additions: stages and scene_instances (`paths` by extension;
 /// folders, or patterns with `*` in their last parts, relative to the dataset's file),
-/// default_attributes of stages, and navmesh_instances (a map from names to paths). A dataset with
-/// stages only has one scene for each stage. Light setups, objects and semantic descriptions are left
-/// out, with a warning.
+/// default_attributes of stages, and navmesh_instances (a map from names to paths). In a dataset without
+/// scenes, each stage becomes a scene. Light setups, objects and semantic descriptions are left out,
+/// with a warning.
 ///
 /// Paths in these files may be absolute and may contain `..`, as in Habitat's own datasets. Files they
 /// name are read, never written; `warnings` names those outside the dataset's folder. Do not read
