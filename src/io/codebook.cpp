@@ -121,8 +121,8 @@ class Splitter {
   const float* vector(std::size_t i) const noexcept { return vectors_.data() + order_[i] * width_; }
 
   /// Measures a group and leaves its mean in mean_. Sums are of differences to the first vector, so that
-  /// identical vectors have an error of exactly zero. They are in double, where the difference of
-  /// squares is precise enough for floats.
+  /// identical vectors have an error of exactly zero. They are in double, so that the difference of
+  /// squares loses none of the precision of floats.
   Group measured(std::size_t first, std::size_t last) {
     Group g{0, first, last, 0, 0};
     std::fill(mean_.begin(), mean_.end(), 0.0);

@@ -21,7 +21,7 @@ inline constexpr unsigned kSpzAntialiased = 1, kSpzExtensions = 2;
 inline constexpr std::array<float, 15> kHalfTurnAboutX = {-1, -1, 1,  -1, 1, 1,  -1, 1,
                                                           -1, 1,  -1, -1, 1, -1, 1};
 
-/// The header of an SPZ, of any version.
+/// The header of an SPZ file of any version.
 struct SpzHeader {
   std::uint32_t version = 4, count = 0;
   int degree = 0;  ///< 0 to 4.

@@ -20,7 +20,8 @@ struct MotionInput {
   double leg_begin = -std::numeric_limits<double>::infinity();
   /// Distance at which it will stop, metres; infinity if it has no end.
   double leg_end = std::numeric_limits<double>::infinity();
-  double turned = 0.0;   ///< Radians turned on the spot since then, positive for either direction.
+  double turned = 0.0;   ///< Radians turned on the spot since the actor appeared. Turns to both sides
+                         ///< count as positive.
   double walking = 0.0;  ///< Speed as a share of the walking speed, in [0, 1].
   double turning = 0.0;  ///< Weight of turning on the spot, in [0, 1].
 };

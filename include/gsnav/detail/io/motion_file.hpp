@@ -106,8 +106,9 @@ struct SmplMotionOptions {
 ///
 /// `model` is the body model as npz, which its licence requires users to get themselves. It has
 /// v_template [V,3], J_regressor [J,V], kintree_table [2,J] and, if the motion has betas, shapedirs
-/// [V,3,S], with 24 joints (SMPL) or 55 (SMPL-X). A SMPL-X model takes SMPL-H's poses for its hands; its
-/// jaw and eyes then rest. Rest joints are J_regressor (v_template + shapedirs betas).
+/// [V,3,S], with 24 joints (SMPL) or 55 (SMPL-X). A motion with 52 joints (SMPL-H) moves body and hands
+/// of an SMPL-X model; jaw and eyes then rest. Rest joints are J_regressor (v_template + shapedirs
+/// betas).
 ///
 /// Errors name the file, the array and the value: file_not_found; invalid_file; unsupported (poses for
 /// joints that the model does not have); out_of_memory. Never throws.
