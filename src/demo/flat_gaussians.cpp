@@ -1,5 +1,4 @@
-// SPDX-License-Identifier: Apache-2.0
-// From painted surfaces to Gaussians and triangles.
+// SPDX-License-Identifier: Apache-2.0 Turns painted surfaces into Gaussians and triangles.
 #include <algorithm>
 #include <cmath>
 #include <optional>

@@ -1,5 +1,4 @@
-// SPDX-License-Identifier: Apache-2.0
-// Where the furniture of a floor plan stands.
+// SPDX-License-Identifier: Apache-2.0 Places the furniture of a floor plan.
 #include "plan_furniture.hpp"
 
 #include <algorithm>

@@ -1,5 +1,4 @@
-// SPDX-License-Identifier: Apache-2.0
-// What furniture a room should have.
+// SPDX-License-Identifier: Apache-2.0 Lists the furniture that a room should have.
 #include "plan_furniture.hpp"
 
 namespace gsnav::plan {

@@ -10,9 +10,9 @@
 namespace gsnav::io::detail {
 
 /// 256 sorted values that represent many. If there are at most 256 distinct values, the entries are
-/// these (the last one repeated). Otherwise half of the entries are spread evenly over the range, and
-/// half with the cube root of the values' density, which is best for the mean square error. Every value
-/// is within 1/255 of the range of its entry.
+/// these (the last one repeated). Otherwise half of the entries are spread evenly over the range. The
+/// density of the other half is the cube root of that of the values, which is best for the mean square
+/// error. Every value is within 1/255 of the range of its entry.
 class ScalarCodebook {
  public:
   explicit ScalarCodebook(std::span<const float> values);

@@ -16,7 +16,8 @@ namespace gsnav::io::detail {
 struct GltfMaterial {
   SurfaceMaterial surface;
   std::size_t texcoord = 0;                        ///< The TEXCOORD_n of its texture.
-  std::array<double, 6> uv_map{1, 0, 0, 0, 1, 0};  ///< u' = m0 u + m1 v + m2, v' = m3 u + m4 v + m5.
+  std::array<double, 6> uv_map{1, 0, 0, 0, 1, 0};  ///< KHR_texture_transform: u' = m0 u + m1 v + m2, v'
+                                                   ///< = m3 u + m4 v + m5.
 
   std::array<double, 2> uv(double u, double v) const noexcept {
     return {uv_map[0] * u + uv_map[1] * v + uv_map[2], uv_map[3] * u + uv_map[4] * v + uv_map[5]};

@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-// One rig of the skins of a glTF file, and the rigid skeleton made of it.
+// SPDX-License-Identifier: Apache-2.0 The rig that the skins of a glTF file share, and the rigid
+// skeleton made from it.
 #include <algorithm>
 #include <cmath>
 #include <optional>

@@ -32,7 +32,7 @@ Mat3d adjugate_transposed(const Mat3d& m) {
 }
 
 /// Applies a transform to a part. Normals transform by the cofactors, which keeps them perpendicular;
-/// triangles are reversed if it mirrors. Returns false if a vertex is then not finite.
+/// triangles are reversed if the transform mirrors. Returns false if a vertex is then not finite.
 bool transform(TexturedPart& part, const Affine3<double>& a) {
   const bool mirrored = determinant(a.linear) < 0;
   const Mat3d cofactors = adjugate_transposed(a.linear) * (mirrored ? -1.0 : 1.0);

@@ -30,7 +30,7 @@ class GzipReader {
 
  private:
   ByteSource left_;              ///< Input not yet given to zlib.
-  std::vector<std::byte> room_;  ///< Input from a file that zlib has.
+  std::vector<std::byte> room_;  ///< Bytes of a file that were passed to zlib.
   z_stream stream_{};
   int code_ = Z_OK;
   bool open_ = false;

@@ -29,7 +29,7 @@ constexpr std::array<Level, 3> kLevels = {{{4, 4, 1}, {2, 2, 32767}, {2, 1, 3276
 
 struct Section {
   std::size_t count = 0, capacity = 0;  ///< Number of Gaussians, and the size of a full bucket.
-  std::size_t full = 0, partial = 0;    ///< Number of buckets.
+  std::size_t full = 0, partial = 0;    ///< Number of full and of partial buckets.
   std::size_t record = 0;               ///< Bytes of a record.
   int degree = 0;
   double range = 0, step = 0;

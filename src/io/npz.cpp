@@ -11,8 +11,8 @@
 namespace gsnav::io {
 namespace {
 
-// Constant poses and weights that are mostly zero compress by more than the factor of 100 of images and
-// text.
+// Constant poses and weights that are mostly zero compress by more than the factor of 100 that is enough
+// for images and text.
 constexpr std::uint64_t kSlack = std::uint64_t{256} << 20;
 constexpr std::string_view kSuffix = ".npy";
 

@@ -40,8 +40,7 @@ void put(std::vector<std::byte>& to, double value) {
 /// The logit that is read back as this opacity, or as the nearest opacity that a float32 logit has. It
 /// is always finite, because trainers differentiate what they read.
 float logit_of(float opacity) {
-  // exp(-18) is less than half of the last place of 1 in float32, in float32 and in double arithmetic.
-  // exp(110) is beyond float32.
+  // 1 + exp(-18) rounds to 1 in float32, and exp(110) is beyond float32.
   constexpr float kOpaque = 18, kClear = -110;
   if (opacity >= 1) return kOpaque;
   if (!(opacity > 0)) return kClear;

@@ -52,8 +52,8 @@ class AvatarActor {
 
   /// Whether the actor is in the scene at time t (seconds on the scene's clock, as everywhere below).
   bool active(double t) const noexcept;
-  /// The same actor with another `loop_period` and `loop_blend` (seconds, ActorOptions). Errors: as of
-  /// create.
+  /// The same actor with another `loop_period` and `loop_blend` (seconds, ActorOptions). Errors: those
+  /// of create.
   Result<AvatarActor> looped(double period, double blend) const;
 
   /// Transform from the avatar's root frame (Y up, facing -Z, feet on y = 0) to the world.

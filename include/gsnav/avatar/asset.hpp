@@ -25,7 +25,7 @@ struct ProxyCapsule {
 /// mostly `linear`.
 enum class Skinning : std::uint8_t {
   linear,            ///< Linear blend skinning. Shapes turn by the polar factor of the blended matrix.
-  linear_stretched,  ///< Positions as of `linear`; shapes are stretched like the skin, by
+  linear_stretched,  ///< Positions are those of `linear`; shapes are stretched like the skin, by
                      ///< AvatarAsset::weight_gradients.
   dual_quaternion,   ///< Dual quaternion blending: twisted limbs keep their width.
 };

@@ -107,7 +107,7 @@ class SkinnedGaussians {
     }
   }
 
-  /// Poses the Gaussians as of time t (seconds on the scene's clock). If the actor is not in the scene
+  /// Poses the Gaussians for time t (seconds on the scene's clock). If the actor is not in the scene
   /// then, the set is empty. The Gaussians are complete after `backend.synchronize()`, which rendering
   /// calls. Error: invalid_argument for an actor of another asset.
   Status pose(const AvatarActor& actor, double t) {

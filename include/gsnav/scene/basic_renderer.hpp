@@ -104,15 +104,15 @@ class BasicRenderer {
       if (job.camera == nullptr || job.config == nullptr) {
         return {Errc::invalid_argument, "FrameJob: camera and config must not be null"};
       }
-      if (Status s = validate(*job.camera); !s) return s;  // scratch is sized by it
+      if (Status s = validate(*job.camera); !s) return s;  // scratch is sized by the camera
     }
     return render_jobs(
         jobs.size(), [&](std::size_t c) { return jobs[c]; }, stats);
   }
 
   /// Starts one frame with images in the backend's memory. They are complete once the backend has been
-  /// synchronised. Errors: as of render above; a failure on the device after this call is reported by
-  /// `synchronize()`.
+  /// synchronised. Errors: those of render above; `synchronize()` reports failures on the device after
+  /// this call.
   Status render_on_backend(const FrameJob<S>& job, RenderStats& stats) {
     if (job.camera == nullptr || job.config == nullptr) {
       return {Errc::invalid_argument, "FrameJob: camera and config must not be null"};
@@ -120,7 +120,7 @@ class BasicRenderer {
     return with_sizes(1, job, [&] { return draw(job, stats); });
   }
 
-  /// Sizes `out` for the images `outputs` (a bitmask of kRgb, ...) of these cameras. Errors: as of
+  /// Sizes `out` for the images `outputs` (a bitmask of kRgb, ...) of these cameras. Errors: those of
   /// render above.
   static Status size_frames(std::span<const Camera> cameras, unsigned outputs, Frames<S>& out) {
     if (cameras.empty()) return {Errc::invalid_argument, "no camera to render from"};

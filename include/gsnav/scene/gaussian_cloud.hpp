@@ -45,7 +45,7 @@ struct GaussianCloud {
   int sh_degree = 0;                      ///< 0 to 3.
   std::vector<std::uint32_t> origin_ids;  ///< [N] index of each origin. Empty while every origin is
                                           ///< zero.
-  std::vector<Vec3d> origins;             ///< Lattice points in use. Empty like origin_ids.
+  std::vector<Vec3d> origins;             ///< Lattice points in use. Empty if origin_ids is empty.
   // Filled by sort_spatially (detail/scene/spatial_order.hpp). Clear chunk_bounds and part_bounds after
   // moving, adding or scaling rows.
   std::vector<std::uint32_t> row_ids;     ///< [N] place of each row in the order of reading, or empty.

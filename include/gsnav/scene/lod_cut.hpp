@@ -79,9 +79,9 @@ class LodCut {
   /// Chooses the nodes for a camera and returns what to draw: chunks of the cloud and merged Gaussians,
   /// filtered for the pixels of O_photo(choice.photo). Valid until the next call.
   /// @param world_from_asset placement of the cloud in the world.
-  /// @param seen chunks and rows that may be seen from the camera's cell (VisibleSets::seen_from, in the
-  /// backend's memory). Nodes without a seen chunk are left out, and of chunks of the cloud the rows
-  /// that are not seen. Empty: everything may be seen.
+  /// @param seen chunks and rows that may be seen from the camera's cell (VisibleSets::seen_from, in
+  /// host memory). Nodes without a seen chunk are left out, and so are unseen rows of the cloud's
+  /// chunks. Empty: everything may be seen.
   std::span<const GaussianSet> select(const Camera& camera, const LodChoice& choice = {},
                                       const Similarity& world_from_asset = {},
                                       View<const std::uint32_t> seen = {}) {

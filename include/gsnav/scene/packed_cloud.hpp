@@ -40,7 +40,7 @@ struct PackedCloud {
   std::vector<std::uint16_t> sh0;    ///< [N][3], binary16.
   std::vector<std::int8_t> shN;      ///< [N][(degree+1)^2 - 1][3]; empty if `rest` has the bands.
   std::vector<PackedChunk> chunks;   ///< [ceil(N / kProjectChunk)].
-  std::size_t count = 0;             ///< N.
+  std::size_t count = 0;             ///< N, the number of Gaussians.
   /// Everything that is not packed: ids, origins, chunk bounds, settings of the asset, and planes that a
   /// limit kept.
   GaussianCloud rest;
@@ -276,7 +276,7 @@ inline PackedCloud pack_rows(GaussianCloud& cloud, const PackLimits& limits, Pac
 
 }  // namespace detail
 
-/// Packs a cloud, which is consumed plane by plane. `errors`, if not null, gets the errors of that.
+/// Packs a cloud, which is consumed plane by plane. `errors`, if not null, gets the errors of packing.
 inline PackedCloud pack_cloud(GaussianCloud cloud, const PackLimits& limits = {},
                               PackErrors* errors = nullptr) {
   PackErrors found;

@@ -40,7 +40,7 @@ class SkinnedCrowd {
     return actors_.size() - 1;
   }
 
-  /// Poses actors[i] (or *actors[i]) at place i, as of time t (seconds). The sets of actors that are not
+  /// Poses actors[i] (or *actors[i]) at place i, for time t (seconds). The sets of actors that are not
   /// in the scene then are empty. Error: invalid_argument if the numbers of actors and places differ, or
   /// an actor's asset is not that of its place; no Gaussians are changed then.
   Status pose(std::span<const AvatarActor> actors, double t) {

@@ -45,8 +45,8 @@ struct UpGuess {
 
 namespace detail {
 
-/// The ground that one axis would give: the slab across the axis that is covered best by flat Gaussians
-/// facing along it.
+/// The best candidate for the ground across one axis: the slab that is covered most by flat Gaussians
+/// facing along the axis.
 struct GroundSearch {
   double area = 0;   ///< Covered area of that slab, square metres.
   double share = 0;  ///< Share of the box's cross section that the slab covers.
