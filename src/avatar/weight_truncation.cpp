@@ -12,9 +12,8 @@ namespace gsnav {
 
 namespace {
 
-using Influence = std::pair<double, std::size_t>;
+using Influence = std::pair<double, std::size_t>;  // weight, joint
 
-// weight, joint
 /// Position of x under the influences, whose weights are divided by their sum.
 Vec3d blended_place(const std::vector<Affine3<double>>& joints, const Influence* begin,
                     const Influence* end, const Vec3d& x) {

@@ -37,7 +37,7 @@ class AvatarActor {
   /// @param motion null: the asset's idle pose, or its rest pose where it has none.
   /// @param trajectory null: stands at the world's origin.
   /// @return the result, or invalid_argument for an asset or a motion that does not validate, a motion
-  /// with another number of joints, or options out of range; or the asset's other errors.
+  /// with another number of joints, or options out of range; or another error of AvatarAsset::validate.
   static Result<AvatarActor> create(std::shared_ptr<const AvatarAsset> asset,
                                     std::shared_ptr<const MotionSource> motion = nullptr,
                                     std::shared_ptr<const Trajectory> trajectory = nullptr,
@@ -85,10 +85,9 @@ class AvatarActor {
   double blend_begin() const noexcept { return options_.loop_period - options_.loop_blend; }
   bool blending(double t) const noexcept { return options_.loop_blend > 0 && t > blend_begin(); }
 
-  /// Narrows [from, to] to the time during which the actor is present, on a looping clock. The body does
-  /// not move between its last position in one round and its first in the next. If it is present at
-  /// neither end, the interval becomes the first stay between them. Returns false if it is never
-  /// present.
+  /// Narrows [from, to] to the time during which the actor is present, on a looping clock. An actor that
+  /// does not blend is absent while the clock wraps. If it is present at neither end, the interval
+  /// becomes the first stay between them. Returns false if it is never present.
   bool narrow_to_stay(double& from, double& to) const noexcept;
 
   /// `needed` [J] marks the joints to pose; null means all joints.

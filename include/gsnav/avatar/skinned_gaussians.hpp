@@ -71,11 +71,11 @@ class AvatarArrays {
   std::vector<Buffer<float, B>> floats_;
 };
 
-/// The Gaussians of one actor, posed on a backend, to be rendered together with the scene. A frame
-/// writes only means and orientations, into buffers that are reused; for SH of degree 1 and more also
-/// the rotations that turn view directions back, and with stretched skinning the shapes. All else stays
-/// in the asset's arrays, which other backends than host backends upload once. The backend must outlive
-/// this object.
+/// The Gaussians of one actor, posed on a backend, to be rendered together with the scene. Only means
+/// and orientations are written in each frame, into buffers that are reused. SH of degree 1 and more
+/// also needs the rotations that turn view directions back, and stretched skinning the shapes. All else
+/// stays in the asset's arrays, which other backends than host backends upload once. The backend must
+/// outlive this object.
 ///
 ///     SkinnedGaussians skin(backend, actor.asset());
 ///     skin.pose(actor, t).throw_if_error();

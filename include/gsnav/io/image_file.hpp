@@ -48,7 +48,7 @@ struct PngImage {
   /// Pixels.
   int width = 0, height = 0;
   /// 1 (grey), 2 (grey and alpha), 3 (RGB) or 4 (RGBA).
-  int channels = 0;                    ///< 1 grey, 2 grey alpha, 3 RGB, 4 RGBA
+  int channels = 0;
   int bits = 0;                        ///< 8 or 16
   std::vector<std::uint16_t> samples;  ///< [height][width][channels], values as stored, without gamma
                                        ///< correction.

@@ -53,7 +53,7 @@ class SkinnedCrowd {
   }
 
   /// Poses the actors for rendering with `config` from these cameras, in two steps like
-  /// SkinnedGaussians::prepare. The first step is the host's alone; several threads may prepare
+  /// SkinnedGaussians::prepare. The first step runs on the host only; several threads may prepare
   /// different crowds at once. Errors: as above.
   Status prepare(std::span<const AvatarActor> actors, double t, std::span<const Camera> cameras,
                  const RenderConfig& config) {

@@ -93,8 +93,8 @@ class WalkMotion final : public MotionSource {
   // Pitch of a standing foot at phase p of its cycle, degrees: heel strike, flat, heel rise.
   double stance_pitch(double p, double walking) const noexcept;
 
-  // Position of the ankle of a foot that is pitched about heel or toes, for a footfall `forward` of the
-  // root.
+  // Position of the ankle of a foot that is pitched about heel or toes, for a footfall `forward` metres
+  // ahead of the root.
   Vec3d ankle(int side, double forward, double pitch) const;
 
   Foot foot(int side, const Steps& s, double walking) const;

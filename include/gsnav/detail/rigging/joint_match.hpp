@@ -29,8 +29,8 @@ Result<double> rest_heading(const Skeleton& skeleton);
 /// Options for `retarget`, with joints paired by name and the rotation from the heading of the source to
 /// that of the target. The roots are paired. Arms and legs point as the source's do. Trunk, collars,
 /// head and feet rotate relative to their rest pose as the source's do, because in both rest poses the
-/// body stands upright on flat feet. Error: invalid_argument (fewer joints in common than both hips,
-/// knees and ankles).
+/// body stands upright on flat feet. Error: invalid_argument, unless the skeletons have both hips, knees
+/// and ankles in common.
 Result<RetargetOptions> match_joints(const Skeleton& source, const Skeleton& target);
 
 }  // namespace gsnav

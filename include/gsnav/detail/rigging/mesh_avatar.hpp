@@ -42,11 +42,10 @@ struct MeshSample {
 /// Makes an avatar of Gaussians from a rigged surface. Points are spread evenly over it by dart
 /// throwing: two points that face the same way are at least `spacing` apart. Each becomes a Gaussian
 /// that is flattened along its triangle, with the surface's colour there (SH degree 0, display-referred)
-/// and the weights of the triangle's corners. In the bind pose, Gaussians lie on the surface. In other
-/// poses they lie on the surface up to the error of the kept weights where it is flat between vertices:
-/// a point moves by its own blended weights, not with its triangle. The same input gives the same
-/// Gaussians. Errors: those of the mesh; invalid_argument naming the option; unsupported (a body that
-/// reaches further than 32 m from its root).
+/// and the weights of the triangle's corners. In the bind pose, Gaussians lie on the triangles. In
+/// another pose each moves by its own blended weights, so that it is near its posed triangle, but not
+/// exactly on it. The same input gives the same Gaussians. Errors: those of the mesh; invalid_argument
+/// naming the option; unsupported (a body that reaches further than 32 m from its root).
 Result<MeshAvatar> make_mesh_avatar(const SkinnedMesh& mesh, const MeshAvatarOptions& options = {});
 
 }  // namespace gsnav

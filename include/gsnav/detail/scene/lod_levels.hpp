@@ -264,9 +264,6 @@ struct LevelForest {
 /// number of threads.
 /// @param levels are consumed.
 /// @param boxes number of boxes.
-/// @return the result, or invalid_argument (no level; compact SH; a box index beyond `boxes`, levels
-/// with different filters), unsupported (boxes so small that filled chunks would take more than about
-/// four times the rows).
 /// @return the result, or one of these errors:
 /// - invalid_argument: no level, compact SH, a box index beyond `boxes`, or levels with different
 ///   filters.

@@ -32,8 +32,8 @@ inline std::vector<Camera> views_around(const Aabb<double>& box, const Vec3d& up
   return out;
 }
 
-/// Cameras around a cloud. Its outermost tenth on each side is not counted to its box. Empty for an
-/// empty cloud.
+/// Cameras around a cloud. Its outermost tenth on each side is left out of the box. Empty for an empty
+/// cloud.
 inline std::vector<Camera> views_around(const GaussianCloud& cloud, const Vec3d& up, int count,
                                         int width, int height) {
   if (cloud.size() == 0) return {};
