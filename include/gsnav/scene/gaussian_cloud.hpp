@@ -22,12 +22,11 @@ namespace gsnav {
 
 /// One Gaussian as files store it, before any activation.
 struct RawGaussian {
-  Vec3d mean{};              ///< Metres, asset frame.
-  Quatd quat{};              ///< w, x, y, z, of any length.
-  Vec3d log_scales{};        ///< Natural logarithms of the standard deviations.
-  double opacity_logit = 0;  ///< opacity = 1 / (1 + exp(-logit)); infinities are allowed.
-  /// SH coefficients of degree 0, RGB.
-  std::array<float, 3> sh0{};
+  Vec3d mean{};                ///< Metres, asset frame.
+  Quatd quat{};                ///< w, x, y, z, of any length.
+  Vec3d log_scales{};          ///< Natural logarithms of the standard deviations.
+  double opacity_logit = 0;    ///< opacity = 1 / (1 + exp(-logit)); infinities are allowed.
+  std::array<float, 3> sh0{};  ///< SH coefficients of degree 0, RGB.
   const float* shN = nullptr;  ///< [(degree+1)^2 - 1][3], colour inner; null for degree 0.
 };
 
@@ -54,17 +53,12 @@ struct GaussianCloud {
                                           ///< both.
 
   // How the asset was trained. Copied into each GaussianSet that is made of the cloud.
-  /// Filter on the image.
-  Filter filter = Filter::classic;
-  /// Term on the diagonal of the 2D covariance, px^2.
-  float eps2d = 0.3f;
-  /// Order in which Gaussians are blended.
-  SortOrder sort_order = SortOrder::z_depth;
-  /// Space in which colours are blended.
-  ColorSpace color_space = ColorSpace::display;
+  Filter filter = Filter::classic;               ///< Filter on the image.
+  float eps2d = 0.3f;                            ///< Term on the diagonal of the 2D covariance, px^2.
+  SortOrder sort_order = SortOrder::z_depth;     ///< Order in which Gaussians are blended.
+  ColorSpace color_space = ColorSpace::display;  ///< Space in which colours are blended.
 
-  /// Number of Gaussians, N.
-  std::size_t size() const noexcept { return opacities.size(); }
+  std::size_t size() const noexcept { return opacities.size(); }  ///< Number of Gaussians, N.
 
   /// Mean of Gaussian i in the asset's frame, metres.
   Vec3d mean(std::size_t i) const noexcept {
@@ -118,13 +112,11 @@ inline constexpr double kOriginLattice = 64.0;
 
 /// A Gaussian after the activations.
 struct ActiveGaussian {
-  /// Metres, asset frame.
-  Vec3d mean{};
+  Vec3d mean{};                   ///< Metres, asset frame.
   std::array<float, 4> quat{};    ///< w, x, y, z, unit.
   std::array<float, 3> scales{};  ///< Standard deviations, metres.
-  /// In [0, 1].
-  float opacity = 0;
-  bool clamped = false;  ///< Whether a log-scale was outside [-20, 20].
+  float opacity = 0;              ///< In [0, 1].
+  bool clamped = false;           ///< Whether a log-scale was outside [-20, 20].
 };
 
 /// Activates a raw Gaussian with `rest` numbers in shN, by the rules of the contract. The result says
@@ -247,10 +239,8 @@ class GaussianCloudBuilder {
     return true;
   }
 
-  /// The report of all rows so far.
-  LoadReport& report() noexcept { return report_; }
-  /// The cloud so far.
-  GaussianCloud& cloud() noexcept { return cloud_; }
+  LoadReport& report() noexcept { return report_; }   ///< The report of all rows so far.
+  GaussianCloud& cloud() noexcept { return cloud_; }  ///< The cloud so far.
 
  private:
   GaussianCloud cloud_;
@@ -284,10 +274,8 @@ inline void expand_sh(GaussianCloud& cloud) {
 
 /// A cloud and the report of how it was read.
 struct LoadedCloud {
-  /// The cloud.
-  GaussianCloud cloud;
-  /// What reading found, changed and left out.
-  LoadReport report;
+  GaussianCloud cloud;  ///< The cloud.
+  LoadReport report;    ///< What reading found, changed and left out.
 };
 
 /// Appends `b` to `a`, for example to merge the tiles of a scene. The SH degree becomes the larger of
