@@ -93,7 +93,7 @@ void AvatarActor::for_each_capsule(double t, const F& f) const {
   const Similarity world = placement(t, pose, &holds_capsules_);
   const Skeleton& skeleton = asset_->skeleton;
   globals.resize(skeleton.size());
-  // Of the joints that hold capsules alone.
+  // Only the joints that capsules depend on.
   for (std::size_t j = 0; j < globals.size(); ++j) {
     if (holds_capsules_[j] == 0) continue;
     const Affine3<double> local{rotation_matrix(pose.rotations[j]), pose.translations[j]};
@@ -140,13 +140,13 @@ double AvatarActor::clock(double t) const noexcept {
   const double period = options_.loop_period;
   if (!(period > 0)) return t;
   const double at = t - std::floor(t / period) * period;
-  return at >= 0 && at < period ? at : 0.0;  // rounding at the begin of a round
+  return at >= 0 && at < period ? at : 0.0;  // rounding at the start of a round
 }
 
 bool AvatarActor::narrow_to_stay(double& from, double& to) const noexcept {
   const bool at_begin = active(from), at_end = active(to);
   if (at_begin && at_end) return true;
-  // Whoever is there while others get back is always there; of others each round has one stay.
+  // An actor that takes part in the blend is always present. Any other has one stay in each round.
   const double period = options_.loop_period, come = max(options_.time_begin, 0.0);
   const double leave =
       min(options_.time_end, options_.loop_blend > 0 ? blend_begin() : std::nextafter(period, 0.0));
@@ -187,7 +187,7 @@ Similarity AvatarActor::placement_at(double t, LocalPose& pose, const std::vecto
   } else {
     motion_->pose(input, pose);
   }
-  // The path of a clip goes into the placement, so that joint matrices stay small numbers.
+  // Put the path of a clip into the placement, so that joint matrices stay small numbers.
   const Similarity base{axis_angle(Vec3d{0, 1, 0}, at.yaw), at.position, scale};
   return {base.rotation, base * pose.root, base.scale};
 }

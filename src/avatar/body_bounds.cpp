@@ -34,7 +34,7 @@ ChunkBounds BodyBounds::at(const std::vector<Affine3<double>>& joints) const noe
   bool first = true;
   for (std::size_t j = 0; j < reach_.size(); ++j) {
     if (reach_[j] < 0) continue;
-    const double r = reach_[j] * (1 + 1e-5) + 1e-5;  // skinning's own rounding
+    const double r = reach_[j] * (1 + 1e-5) + 1e-5;  // allow for the rounding of skinning
     for (int k = 0; k < 3; ++k) {
       const double c = joints[j].translation[k];
       out.low[k] = first ? c - r : min(out.low[k], c - r);
@@ -42,9 +42,10 @@ ChunkBounds BodyBounds::at(const std::vector<Affine3<double>>& joints) const noe
     }
     first = false;
   }
-  // Where the joints put a Gaussian apart by d_k from where the first does, the blend q = sum w_k q_k
-  // puts it apart by sum w_k d_k q_k conj(q) / |q|^2: at most sum w_k |d_k| / |q|. |q| is at least the
-  // first weight, because no q_k points away from the first.
+  // Let d_k be the distance between the positions that joint k and the first joint give a Gaussian. The
+  // blend q = sum w_k q_k moves it away from the first one's by sum w_k d_k q_k conj(q) / |q|^2, which
+  // is at most sum w_k |d_k| / |q|. |q| is at least the first weight, because no q_k points away from
+  // the first.
   const Vec3d grow = Vec3d{1, 1, 1} * (bulge_ * norm(out.high - out.low));
   out.low -= grow;
   out.high += grow;

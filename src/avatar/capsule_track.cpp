@@ -23,7 +23,8 @@ Result<TrackedCapsules> capsules_from_track(const Skeleton& skeleton, const Moti
   };
   std::vector<Ends> first(count * joints);
   std::vector<double> spread(count * joints, 0.0);
-  std::vector<std::vector<Affine3<double>>> back(frames);  // the driver's frame to joint
+  std::vector<std::vector<Affine3<double>>> back(frames);  // from the driver's frame to that of the
+                                                           // joint
   LocalPose pose;
   for (std::size_t t = 0; t < frames; ++t) {
     if (track[t].size() != count) return bad("frames of different numbers of capsules");
@@ -49,7 +50,7 @@ Result<TrackedCapsules> capsules_from_track(const Skeleton& skeleton, const Moti
   for (std::size_t c = 0; c < count; ++c) {
     std::size_t best = 0;
     for (std::size_t j = 1; j < joints; ++j) {
-      // Of joints that do not move against each other the first is as good as any.
+      // Joints that do not move relative to each other are equally good: keep the first.
       if (spread[c * joints + j] < spread[c * joints + best] - 1e-6) best = j;
     }
     ProxyCapsule p{static_cast<std::uint16_t>(best), {}, {}, 0.0};

@@ -43,14 +43,14 @@ std::vector<std::pair<double, std::size_t>> NearestPoints::near(std::size_t i, s
           if (found == cells_.end()) continue;
           for (const std::size_t k : found->second) {
             const Vec3d d = points_[k] - points_[i];
-            // Cells that share a key are looked at more than once.
+            // Cells that share a key are visited more than once.
             if (k != i && cell_of(points_[k]) == Cell{c[0] + x, c[1] + y, c[2] + z})
               out.emplace_back(dot(d, d), k);
           }
         }
       }
     }
-    // Everything within `ring` cells is there now.
+    // All points within `ring` cells are in `out` now.
     const double reach = static_cast<double>(ring) * cell_;
     if (out.size() < count) continue;
     std::nth_element(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(count - 1), out.end());

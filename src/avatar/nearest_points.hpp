@@ -13,16 +13,17 @@
 
 namespace gsnav::detail {
 
-/// Median distance from a point to its nearest, by a sample of them; 0 for fewer than two.
+/// Median distance from a point to its nearest neighbour, estimated from a sample. 0 for fewer than two
+/// points.
 double typical_spacing(const std::vector<Vec3d>& points);
 
-/// Points by cells, for the nearest of a point.
+/// Points in a grid of cells, for finding nearest neighbours.
 class NearestPoints {
  public:
   explicit NearestPoints(std::vector<Vec3d> points);
 
-  /// The `count` nearest to point i, itself left out, at most kRings cells away: (squared distance,
-  /// number).
+  /// The `count` nearest neighbours of point i, at most kRings cells away: pairs of squared distance and
+  /// index.
   std::vector<std::pair<double, std::size_t>> near(std::size_t i, std::size_t count) const;
 
  private:

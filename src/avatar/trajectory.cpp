@@ -92,7 +92,7 @@ void WalkTrajectory::build_closed(std::vector<Vec3d> path) {
       return;
     }
   }
-  // No stop anywhere: the round begins in the middle of a segment.
+  // No stop anywhere: begin the round in the middle of a segment.
   endless_ = true;
   const Vec3d middle = lerp(path[0], path[1], 0.5);
   std::vector<Vec3d> round{middle};
@@ -138,7 +138,7 @@ void WalkTrajectory::finish() {
       loop_turn_ = leg.heading.front() - leg.heading.back();
       loop_turn_ = leg.heading.back() + wrapped(loop_turn_) - leg.heading.front();
     } else {
-      // Up to speed, on, and down again; a short leg never gets to full speed.
+      // Accelerate, walk, decelerate. On a short leg the walker never reaches full speed.
       leg.peak = min(options_.speed, sqrt(options_.acceleration * leg.length));
       leg.walk_time = leg.length / leg.peak + leg.peak / options_.acceleration;
       const Leg& next = legs_[(i + 1) % legs_.size()];

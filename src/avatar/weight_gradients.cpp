@@ -24,7 +24,7 @@ Status bake_weight_gradients(AvatarAsset& asset, const WeightGradientOptions& op
   std::vector<Vec3d> places(n);
   for (std::size_t i = 0; i < n; ++i) places[i] = asset.cloud.mean(i);
   const detail::NearestPoints nearest(places);
-  // Weight that Gaussian i gives to a joint.
+  // Weight of a joint for Gaussian i.
   const auto weight = [&](std::size_t i, std::uint16_t joint) {
     double sum = 0.0;
     for (std::size_t k = i * row; k < (i + 1) * row; ++k) {
@@ -53,7 +53,7 @@ Status bake_weight_gradients(AvatarAsset& asset, const WeightGradientOptions& op
     }
     const Svd3<double> e = svd(spread);
     for (std::size_t k = 1; k < row; ++k) {
-      // A joint may be in a row twice where it has no second weight.
+      // A row may name a joint twice, the second time with weight 0.
       if (parts[k] == 0 && std::find(joints, joints + k, joints[k]) != joints + k) continue;
       Vec3d g{};
       for (int v = 0; v < 3; ++v) {

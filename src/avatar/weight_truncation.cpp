@@ -12,10 +12,9 @@ namespace gsnav {
 
 namespace {
 
-using Influence = std::pair<double, std::size_t>;
+using Influence = std::pair<double, std::size_t>;  // weight, joint
 
-// weight, joint
-/// Where the influences, divided by their sum, put x.
+/// Position of x under the influences, whose weights are divided by their sum.
 Vec3d blended_place(const std::vector<Affine3<double>>& joints, const Influence* begin,
                     const Influence* end, const Vec3d& x) {
   Vec3d sum{};
@@ -27,7 +26,7 @@ Vec3d blended_place(const std::vector<Affine3<double>>& joints, const Influence*
   return sum * (1.0 / all);
 }
 
-/// Fills the position errors of `report` for the weights that the asset has now; `poses` are joint
+/// Fills the position errors of `report` for the present weights of the asset. `poses` are joint
 /// matrices.
 void measure_truncation(const AvatarAsset& asset, std::size_t k,
                         const std::vector<std::uint16_t>& indices, const std::vector<float>& weights,

@@ -10,21 +10,21 @@
 
 namespace gsnav {
 
-/// What a piece of the body's surface is made of.
+/// Material of a piece of the body's surface.
 enum class BodyPart : std::uint8_t { skin, hair, top, trousers, shoes };
 
-/// A limb's piece: elliptical sections along the segment a b, rounded at both ends. Radii are across,
+/// A piece of a limb: elliptical sections along the segment a b, rounded at both ends. Radii are across,
 /// along and through the piece, in its own axes.
 struct Lobe {
   Vec3d a{}, b{};                  ///< metres, bind pose, root frame
-  Vec3d radii_a{}, radii_b{};      ///< at a and at b
-  Mat3d axes = Mat3d::identity();  ///< rows: across, along, through
-  double blend = 0.02;             ///< metres over which it grows together with what is there already
-  std::uint16_t joint = 0;         ///< what moves it
+  Vec3d radii_a{}, radii_b{};      ///< At a and at b.
+  Mat3d axes = Mat3d::identity();  ///< Rows: across, along, through.
+  double blend = 0.02;             ///< Metres over which it merges with the lobes before it.
+  std::uint16_t joint = 0;         ///< The joint that moves it.
   BodyPart part = BodyPart::skin;
 
-  /// Signed distance of p, to first order near the surface; metres, negative inside. `normal` (not null)
-  /// gets the outward unit normal there.
+  /// Signed distance of p in metres, negative inside; exact to first order near the surface. If `normal`
+  /// is not null, it gets the outward unit normal there.
   double distance(const Vec3d& p, Vec3d* normal = nullptr) const noexcept {
     const Vec3d ab = b - a, ap = p - a;
     const double length2 = product(ab, ab);
@@ -42,12 +42,12 @@ struct Lobe {
     return k0 * (k0 - 1) / k1;
   }
 
-  /// a . b without fma, which is a library call where the compiler may not assume one.
+  /// a . b without fma, which is a library call unless the compiler may assume the instruction.
   static double product(const Vec3d& x, const Vec3d& y) noexcept {
     return x.x * y.x + x.y * y.y + x.z * y.z;
   }
 
-  /// Radius of a ball around the middle of the segment that holds the lobe.
+  /// Radius of a ball around the middle of the segment that contains the lobe.
   double reach() const noexcept {
     double r = 0;
     for (int k = 0; k < 3; ++k) r = max(r, max(radii_a[k], radii_b[k]));
@@ -60,25 +60,25 @@ struct Lobe {
   }
 };
 
-/// A ball that holds a lobe.
+/// A ball that contains a lobe.
 struct LobeBall {
   Vec3d center{};
   double radius = 0;
 };
 
-/// A body as the smooth union of its lobes, in their order, cut off flat at the ground. The union is the
+/// A body: the smooth union of its lobes in order, cut off flat at the ground. The union is the
 /// quadratic polynomial smooth minimum (Quilez, "smooth minimum").
 struct BodyShape {
   std::vector<Lobe> lobes;
-  std::vector<LobeBall> balls;  ///< one a lobe, by `enclose`
+  std::vector<LobeBall> balls;  ///< One for each lobe, made by `enclose`.
 
-  /// To be called once the lobes are there.
+  /// Computes `balls`. Call it after the lobes are complete.
   void enclose() {
     balls.clear();
     for (const Lobe& l : lobes) balls.push_back({l.middle(), l.reach()});
   }
 
-  /// Indices of the lobes that can matter within `margin` metres of lobe `i`.
+  /// Indices of the lobes that can have an effect within `margin` metres of lobe `i`.
   std::vector<std::size_t> neighbours(std::size_t i, double margin) const {
     std::vector<std::size_t> out;
     for (std::size_t k = 0; k < lobes.size(); ++k) {
@@ -89,15 +89,15 @@ struct BodyShape {
     return out;
   }
 
-  /// Signed distance to the union of the lobes named by `among`. `gradient` (not null) gets its
-  /// direction outwards, about of unit length.
+  /// Signed distance of p to the union of the lobes in `among`. If `gradient` is not null, it gets the
+  /// outward direction, of about unit length.
   double distance(const Vec3d& p, const std::vector<std::size_t>& among,
                   Vec3d* gradient = nullptr) const noexcept {
     double d = 1e3;
     Vec3d sum{0, 1, 0}, normal;
     for (const std::size_t k : among) {
       const double blend = lobes[k].blend;
-      // Too far away to change anything.
+      // Skip lobes too far away to change anything.
       const Vec3d apart = p - balls[k].center;
       const double limit = balls[k].radius + blend + max(d, 0.0);
       if (Lobe::product(apart, apart) > limit * limit) continue;
@@ -115,8 +115,8 @@ struct BodyShape {
     return d;
   }
 
-  /// Moves p onto the surface along the gradient, which is left in `gradient`; false where it does not
-  /// get there.
+  /// Moves p onto the surface along the gradient, which is left in `gradient`. Returns false if it does
+  /// not reach the surface.
   bool project(Vec3d& p, const std::vector<std::size_t>& among, Vec3d& gradient) const noexcept {
     for (int i = 0; i < 10; ++i) {
       const double d = distance(p, among, &gradient);

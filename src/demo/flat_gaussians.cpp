@@ -1,5 +1,4 @@
-// SPDX-License-Identifier: Apache-2.0
-// From painted surfaces to Gaussians and triangles.
+// SPDX-License-Identifier: Apache-2.0 Turns painted surfaces into Gaussians and triangles.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -15,7 +14,7 @@
 namespace gsnav::flat {
 namespace {
 
-constexpr double kSigmaPerSpacing = 0.70;  // neighbours overlap until about 1 % shines through
+constexpr double kSigmaPerSpacing = 0.70;  // neighbours overlap until only about 1 % shines through
 constexpr double kThickness = 0.0012;      // metres, one sigma
 constexpr double kOpacityLogit = 6.0;
 
@@ -23,7 +22,8 @@ struct Tangents {
   Vec3d ds, dt, normal;
 };
 
-/// Central differences, kept inside the patch; poles borrow the neighbouring direction.
+/// Derivatives by central differences, inside the patch. At a pole, where they vanish, that of a
+/// neighbouring point is used.
 Tangents tangents(const Field& position, double s, double t) {
   constexpr double h = 1e-3;
   const auto difference = [&](double s0, double t0, double s1, double t1) {
@@ -64,7 +64,7 @@ bool hidden(const std::vector<Box>& covers, const Vec3d& p) noexcept {
   });
 }
 
-/// Filmic shoulder, then sRGB encoding.
+/// Tone mapping with a filmic shoulder, then sRGB encoding.
 double display(double x) noexcept {
   const double c = 1.0 - std::exp(-x);
   return c <= 0.0031308 ? 12.92 * c : 1.055 * std::pow(c, 1.0 / 2.4) - 0.055;
@@ -72,7 +72,7 @@ double display(double x) noexcept {
 
 }  // namespace
 
-/// Light over a patch. It varies slowly: it is computed on a coarse grid and interpolated.
+/// Light over a patch. It varies slowly, so it is computed on a coarse grid and interpolated.
 class Painter::PatchLight {
  public:
   PatchLight(const Painter& painter, const Patch& patch, double length_s, double length_t) {
@@ -80,7 +80,7 @@ class Painter::PatchLight {
     const auto cells = [cell](double length) { return length < 0.08 ? 0 : count_for(length, cell); };
     cells_s_ = cells(length_s);
     cells_t_ = cells(length_t);
-    // The grid stands a little inside, clear of what touches the patch's border.
+    // Keep the grid a little inside, clear of things that touch the border of the patch.
     const auto grid = [](int i, int n) { return n == 0 ? 0.5 : 0.02 + 0.96 * i / n; };
     for (int j = 0; j <= cells_t_; ++j) {
       for (int i = 0; i <= cells_s_; ++i) {
@@ -107,7 +107,7 @@ class Painter::PatchLight {
   std::vector<Vec3d> light_;
 };
 
-/// Boxes of the room that may hide points of the patch.
+/// Boxes of the room that may cover points of the patch.
 std::vector<Box> Painter::covers_of(const Patch& patch) const {
   std::vector<Box> covers = rooms_[patch.room].covered;
   if (!patch.flat) return covers;
@@ -168,7 +168,7 @@ void Painter::emit_gaussians(const Patch& patch, const Cut& cut, std::size_t fir
   }
 }
 
-/// What emit_gaussians makes of the patch where no row has extra Gaussians.
+/// The numbers that emit_gaussians makes of the patch without extra Gaussians.
 Painter::Counted Painter::count(const Patch& patch, double stretch) const {
   const std::vector<Box> covers = covers_of(patch);
   const int rows = count_for(column_length(patch.position, 0.5, patch.flat), patch.spacing.v * stretch);
@@ -202,11 +202,12 @@ Result<Painter::Cut> Painter::cut_at(double stretch, ThreadPool& pool) const {
 }
 
 Result<Painter::Cut> Painter::cut_into(std::size_t gaussians, ThreadPool& pool) const {
-  // The number falls with the square of `stretch`, in steps. What is then missing is made up for by
-  // longer rows, most of them by one Gaussian at most.
+  // The number falls with the square of `stretch`, in steps. Search a stretch that gives slightly too
+  // few; rows then get the missing Gaussians, most of them one at most.
   const double goal = static_cast<double>(gaussians);
   std::optional<Cut> best;
-  double few = 0, many = 0;  // stretches that gave no more than `gaussians`, and more; 0: none yet
+  double few = 0, many = 0;  // largest and smallest stretches known to give at most `gaussians`, and
+                             // more; 0: none yet
   double stretch = 1.07 * std::sqrt(400000 / goal);
   constexpr int kTries = 16;
   for (int i = 0; i < kTries; ++i) {
@@ -260,7 +261,8 @@ void Painter::emit_triangles(const Patch& patch, DefaultScene& scene) {
 
 Status Painter::emit(const Cut& cut, const std::function<void(double)>& progress, ThreadPool& pool,
                      GaussianCloudBuilder& builder) const {
-  constexpr std::size_t kBatch = 1 << 20;  // Gaussians that wait to be put in order
+  constexpr std::size_t kBatch = 1 << 20;  // number of Gaussians that are made before they are written
+                                           // in order
   std::size_t first_row = 0, done = 0;
   std::vector<std::size_t> first_rows;
   std::vector<std::vector<RawGaussian>> made;

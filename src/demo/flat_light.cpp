@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-// Light of the default scene: sky through windows, sun, lamps, and what walls and floor throw back.
+// SPDX-License-Identifier: Apache-2.0 Light of the default scene: sky through windows, sun, lamps, and
+// reflections from walls and floor.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -17,10 +17,10 @@ Vec3d inverse_of(const Vec3d& d) noexcept {
   return {safe(d.x), safe(d.y), safe(d.z)};
 }
 
-constexpr double kClear = 0.02;  // metres: rays to a window end so far in front of it
+constexpr double kClear = 0.02;  // metres: rays to a window end this far in front of it
 
-/// A room's boxes about a point, without those behind the plane through it: no ray goes there, but one
-/// to a window that lies in the plane may by what it ends in front of the window.
+/// The boxes of a room, relative to a point, without those behind the plane through it. Rays do not go
+/// there, except to a window in the plane. Such a ray ends just in front of the window.
 class NearBoxes {
  public:
   NearBoxes(const Room& room, const Vec3d& point, const Vec3d& normal) {
@@ -33,10 +33,12 @@ class NearBoxes {
     }
   }
 
-  /// Where the ray t d enters the first of them, at most `t`; a start inside does not count.
+  /// Distance t at which the ray t d first enters a box, at most `t`. A box around the start does not
+  /// count.
   double first(const Vec3d& d, double t) const noexcept {
     const Vec3d inverse = inverse_of(d);
-    const int x = inverse.x < 0, y = inverse.y < 0, z = inverse.z < 0;  // the plane that it enters by
+    // index of the plane through which the ray enters
+    const int x = inverse.x < 0, y = inverse.y < 0, z = inverse.z < 0;
     for (const Slabs& b : boxes_) {
       const double in_x = b.x[x] * inverse.x, in_y = b.y[y] * inverse.y, in_z = b.z[z] * inverse.z;
       const double in_xy = in_x > in_y ? in_x : in_y, in = in_xy > in_z ? in_xy : in_z;
@@ -46,17 +48,17 @@ class NearBoxes {
     }
     return t;
   }
-  /// Whether one lies between the point and the end of `d`.
+  /// Whether a box lies between the point and the end of `d`.
   bool between(const Vec3d& d) const noexcept { return first(d, 0.999) < 0.999; }
 
  private:
   struct Slabs {
-    double x[2], y[2], z[2];  ///< low and high
+    double x[2], y[2], z[2];  ///< Low and high.
   };
   std::vector<Slabs> boxes_;
 };
 
-/// Where a ray that starts inside leaves the box.
+/// Distance at which a ray that starts inside leaves the box.
 double leave(const Box& b, const Vec3d& o, const Vec3d& d) noexcept {
   const Vec3d inverse = inverse_of(d);
   double t1 = std::numeric_limits<double>::infinity();
@@ -71,7 +73,7 @@ double leave(const Box& b, const Vec3d& o, const Vec3d& d) noexcept {
 Vec3d Painter::light_at(const Room& room, const Vec3d& point, const Vec3d& n) const {
   const Vec3d p = point + n * 0.015;
 
-  // Ambient: near surfaces darken, low ones give the floor's colour.
+  // Ambient light: near surfaces darken it, low ones give it the floor's colour.
   const Vec3d u = normalized(cross(abs(n.y) < 0.9 ? Vec3d{0, 1, 0} : Vec3d{1, 0, 0}, n)),
               v = cross(n, u);
   const NearBoxes boxes(room, p, n);

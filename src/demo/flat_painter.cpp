@@ -40,8 +40,8 @@ double noise(double x, double y, int seed) noexcept {
 }
 
 Painter::Painter() {
-  // Cosine-weighted directions about +Z on a spiral: the same for every point, so that neighbours
-  // differ by what they see and not by chance.
+  // Cosine-weighted directions about +Z on a spiral. They are the same for every point, so that
+  // neighbours differ by their surroundings only, not by chance.
   constexpr int kRays = 56;
   for (int i = 0; i < kRays; ++i) {
     const double r2 = (i + 0.5) / kRays, r = std::sqrt(r2);
@@ -116,7 +116,7 @@ void Painter::rounded_box(const Vec3d& low, const Vec3d& high, double radius, co
   const Vec3d core = half - Vec3d{r, r, r};
   for (int axis = 0; axis < 3; ++axis) {
     for (const double sign : {-1.0, 1.0}) {
-      if (axis == 1 && sign < 0) continue;  // nobody sees an underside
+      if (axis == 1 && sign < 0) continue;  // undersides are never visible
       const int i = (axis + 1) % 3, j = (axis + 2) % 3;
       const auto position = [=](double s, double t) {
         const double a = sign > 0 ? s : t, b = sign > 0 ? t : s;

@@ -14,10 +14,10 @@ namespace gsnav::flat {
 Vec3d srgb(unsigned hex) noexcept;
 /// Hash of three integers to [0, 1).
 double hash01(int a, int b, int c = 0) noexcept;
-/// Smooth value noise in [0, 1), one feature a unit.
+/// Smooth value noise in [0, 1), with one feature per unit.
 double noise(double x, double y, int seed = 0) noexcept;
 
-/// A value over a patch, parameters in [0, 1] x [0, 1].
+/// A function over a patch, with parameters in [0, 1] x [0, 1].
 using Field = std::function<Vec3d(double s, double t)>;
 
 inline Field plain(const Vec3d& c) {
@@ -42,55 +42,57 @@ struct Lamp {
 struct Room {
   Box inside{};
   std::vector<Box> blockers{};
-  std::vector<Box> covered{};  ///< where a rug or picture hides what lies right behind it
+  std::vector<Box> covered{};  ///< Boxes of rugs and pictures, which hide the surface right behind them.
   std::vector<Window> windows{};
   std::vector<Lamp> lamps{};
-  Vec3d bounce{};  ///< colour of light off the floor
+  Vec3d bounce{};  ///< Colour of light reflected by the floor.
 };
 
-/// How densely a surface is covered, metres between neighbours; v may differ from u.
+/// Distances between neighbouring Gaussians on a surface, metres, along u and v.
 struct Spacing {
   double u, v;
   Spacing(double d) : u(d), v(d) {}
   Spacing(double du, double dv) : u(du), v(dv) {}
 };
 
-/// Collects surfaces, then bakes the light and turns each into Gaussians and triangles. Lengths are
-/// metres; primitives are given in a local frame (`place`) of the current room (`room`).
+/// Collects surfaces, then bakes the light and turns each surface into Gaussians and triangles. Lengths
+/// are in metres. Primitives are given in a local frame (`place`) of the current room (`room`).
 class Painter {
  public:
   Painter();
 
-  /// Depth of trims and picture frames against the embedded flat's. Deeper ones hide the wall behind
-  /// them from more directions: Gaussians are drawn in the order of their centres.
+  /// Depth of trims and picture frames, relative to that in the embedded flat. Deeper ones cover the
+  /// wall behind them from more directions, because Gaussians are drawn in the order of their centres.
   double relief = 1.0;
 
   Room& add_room(const Box& inside, const Vec3d& bounce);
   Room& room() { return rooms_.back(); }
-  /// Local frame of what follows: turned by `yaw` (radians about +Y), then moved.
+  /// Sets the local frame of the following primitives: rotated by `yaw` (radians about +Y), then moved
+  /// to `origin`.
   void place(const Vec3d& origin = {}, double yaw = 0.0);
   Vec3d world(const Vec3d& p) const noexcept { return rotate(turn_, p) + origin_; }
 
-  /// A surface; its front is on the side of dP/ds x dP/dt. `cells_s` x `cells_t` triangulates it.
+  /// Adds a surface. Its front is on the side of dP/ds x dP/dt; `cells_s` x `cells_t` cells are
+  /// triangulated.
   void patch(Field position, Field color, Spacing spacing, int cells_s, int cells_t, bool glows = false);
   void rect(const Vec3d& o, const Vec3d& a, const Vec3d& b, Field color, Spacing spacing,
             bool glows = false);
 
-  /// Which faces of a box are made.
+  /// Faces of a box, as a bitmask.
   enum Face : unsigned { kXn = 1, kXp = 2, kYn = 4, kYp = 8, kZn = 16, kZp = 32, kAll = 63 };
   void box(const Vec3d& low, const Vec3d& high, const Field& color, Spacing spacing,
            unsigned faces = kAll & ~unsigned{kYn}, bool blocks = true);
   void rounded_box(const Vec3d& low, const Vec3d& high, double radius, const Field& color,
                    Spacing spacing, bool blocks = true);
-  /// Upright truncated cone; the top is closed where `cap`.
+  /// Adds an upright truncated cone; its top is closed if `cap`.
   void cone(const Vec3d& base, double radius0, double radius1, double height, const Field& color,
             Spacing spacing, bool cap = true, bool glows = false);
   void ellipsoid(const Vec3d& center, const Vec3d& radii, const Field& color, Spacing spacing,
                  bool glows = false);
   void disc(const Vec3d& center, double radius, const Field& color, Spacing spacing);
   void blocker(const Vec3d& low, const Vec3d& high);
-  /// No Gaussians of this room within the box: sorted by their centres, they would shine through
-  /// whatever lies a few millimetres in front of them.
+  /// Keeps the box free of this room's Gaussians. As they are sorted by their centres, they would shine
+  /// through things a few millimetres in front of them.
   void cover(const Vec3d& low, const Vec3d& high);
 
   /// Bakes the light and makes the scene. Errors: invalid_argument (sampling), out_of_memory.
@@ -104,19 +106,19 @@ class Painter {
     bool glows, flat;
     std::size_t room;
   };
-  /// Gaussians of a patch, and rows of it that nothing covers.
+  /// Number of Gaussians of a patch, and of its rows without covered points.
   struct Counted {
     std::size_t gaussians = 0, open_rows = 0;
   };
   /// How patches are cut into Gaussians.
   struct Cut {
-    double stretch = 1;         ///< of all spacings
-    std::size_t gaussians = 0;  ///< altogether
-    std::size_t rows = 0;       ///< open rows, numbered through all patches
-    std::size_t missing = 0;    ///< Gaussians that open rows get beyond what `stretch` gives
+    double stretch = 1;         ///< Factor on all spacings.
+    std::size_t gaussians = 0;  ///< Total number.
+    std::size_t rows = 0;       ///< Open rows, counted through all patches.
+    std::size_t missing = 0;    ///< Gaussians that open rows get in addition to those from `stretch`.
     std::vector<Counted> patches;
 
-    /// Of `missing` that of one open row: shared out evenly.
+    /// The part of `missing` for one open row; it is shared out evenly.
     int extra(std::size_t row) const noexcept {
       return static_cast<int>((row + 1) * missing / rows - row * missing / rows);
     }
@@ -129,7 +131,7 @@ class Painter {
   std::vector<Box> covers_of(const Patch& patch) const;
   Counted count(const Patch& patch, double stretch) const;
   Result<Cut> cut_at(double stretch, ThreadPool& pool) const;
-  /// The cut that gives exactly so many.
+  /// The cut that gives exactly `gaussians`.
   Result<Cut> cut_into(std::size_t gaussians, ThreadPool& pool) const;
   void emit_gaussians(const Patch& patch, const Cut& cut, std::size_t first_row,
                       std::vector<RawGaussian>& out) const;

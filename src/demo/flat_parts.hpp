@@ -5,15 +5,15 @@
 
 #include "flat_painter.hpp"
 
-// The parts of the default scene. Furniture stands in the painter's local frame: its back at z = 0,
-// its front towards +z, centred on x = 0.
+// The parts of the default scene. Furniture is in the painter's local frame: its back at z = 0, its
+// front towards +z, centred on x = 0.
 namespace gsnav::flat {
 
 inline constexpr double kCeiling = 2.7;
 inline constexpr double kWallThickness = 0.12;
-inline constexpr double kQuarter = 1.5707963267948966;  ///< of a turn, radians
+inline constexpr double kQuarter = 1.5707963267948966;  ///< Quarter of a turn, radians.
 
-/// Which wall of a room, by where it lies.
+/// A wall of a room, by its side.
 enum class Side { x_low, x_high, z_low, z_high };
 
 /// A hole in a wall: world coordinates along the wall, and heights.

@@ -10,7 +10,7 @@ namespace {
 
 const Vec3d kTrim = srgb(0xf4f1ea);
 
-/// What is outside: sky, a line of trees, a meadow.
+/// The view outside: sky, a line of trees, a meadow.
 Vec3d outside(double x, double y) {
   const double hill = 0.30 + 0.05 * std::sin(5 * x) + 0.10 * noise(9 * x, 0.5, 3);
   if (y > hill) {

@@ -18,12 +18,12 @@ namespace {
 
 constexpr double kLeastSide = 2.4;   // of a room, metres
 constexpr double kDoorMargin = 0.3;  // between a door and a corner
-constexpr double kLeastDoor = 0.85;  // a leaf of 0.8 and its stops
+constexpr double kLeastDoor = 0.85;  // a door leaf of 0.8 with its stops
 constexpr double kDoorHeight = 2.1;
 
 double rounded(double metres) { return std::round(metres * 20) / 20; }
 
-/// Cuts a rectangle into `n` of about one size, by walls from side to side.
+/// Cuts a rectangle into `n` rectangles of similar size, by walls from side to side.
 void cut(const FloorRect& r, int n, Rng& rng, std::vector<FloorRect>& out) {
   if (n == 1) {
     out.push_back(r);
@@ -43,7 +43,7 @@ void cut(const FloorRect& r, int n, Rng& rng, std::vector<FloorRect>& out) {
   cut(b, n - first, rng, out);
 }
 
-/// What is left of a cell of the outline between its walls; outer walls lie outside.
+/// The floor of a cell of the outline between its inner walls. Outer walls lie outside of the outline.
 FloorRect between_walls(const FloorRect& cell, const FloorRect& outline) {
   return {cell.x0 + (cell.x0 > outline.x0 ? kHalfWall : 0),
           cell.z0 + (cell.z0 > outline.z0 ? kHalfWall : 0),
@@ -55,11 +55,11 @@ bool has_outer_wall(const FloorRect& r, const FloorRect& outline) {
   return r.x0 == outline.x0 || r.z0 == outline.z0 || r.x1 == outline.x1 || r.z1 == outline.z1;
 }
 
-/// A piece of wall that two rooms share.
+/// A piece of wall between two rooms.
 struct SharedWall {
   std::size_t a, b;       // a on the side of lower coordinates
-  bool across_x;          // it divides along x
-  double wall, from, to;  // where a door may be
+  bool across_x;          // whether it separates them along x
+  double wall, from, to;  // position of the wall, and range in which a door may be
 };
 
 std::vector<SharedWall> shared_walls(const std::vector<PlannedRoom>& rooms) {
@@ -89,7 +89,7 @@ PlannedDoor door_in(const SharedWall& w, bool wide, Rng& rng) {
   const double wanted =
       wide ? rng.uniform(1.3, 1.9) : kLeastDoor + 0.05 * static_cast<double>(rng.below(4));
   const double width = std::min(wanted, room);
-  // Near an end of the wall more of it is left for furniture.
+  // Prefer the ends of the wall, which leave more of it for furniture.
   const double place = rng.uniform();
   d.from = w.from + (room - width) * (place < 0.35 ? 0.0 : place < 0.7 ? 1.0 : rng.uniform());
   d.to = d.from + width;
@@ -97,7 +97,8 @@ PlannedDoor door_in(const SharedWall& w, bool wide, Rng& rng) {
   return d;
 }
 
-/// Doors along a spanning tree of the rooms, and some more. False where rooms cannot all be joined.
+/// Adds doors along a spanning tree of the rooms, and some more. Returns false if not all rooms can be
+/// joined.
 bool join_rooms(FloorPlan& plan, Rng& rng) {
   struct Candidate {
     SharedWall wall;
@@ -151,7 +152,7 @@ void add_windows(FloorPlan& plan, Rng& rng) {
   }
 }
 
-/// Kinds of rooms, from the largest room to the smallest.
+/// Kinds of rooms, from the largest to the smallest.
 RoomKind kind_of(std::size_t place) {
   using K = RoomKind;
   constexpr K kinds[kMostRooms] = {K::living_room, K::bedroom, K::kitchen,     K::study,
@@ -160,8 +161,8 @@ RoomKind kind_of(std::size_t place) {
   return kinds[place];
 }
 
-/// One try at rooms and doors. Nothing where a room is too narrow or cannot be reached; where `strict`,
-/// nor where one has no outer wall or is a corridor.
+/// Tries to make rooms and doors. Fails if a room is too narrow or cannot be reached; with `strict` also
+/// if a room has no outer wall or is a corridor.
 std::optional<FloorPlan> try_rooms(const FloorPlanOptions& options, Rng& rng, bool strict) {
   FloorPlan plan;
   plan.seed = options.seed;

@@ -22,7 +22,7 @@ double smooth(double u) noexcept {
   return u * u * (3 - 2 * u);
 }
 
-// Rotation that takes the bone direction `from` of the bind pose to `to`, and the bind pose's +X, made
+// The rotation that takes the bind pose's bone direction `from` to `to`, and the bind pose's +X, made
 // perpendicular to the bone, to `hinge`.
 Quatd align(const Vec3d& from, const Vec3d& to, const Vec3d& hinge) {
   const auto frame = [](const Vec3d& bone, const Vec3d& x) {
@@ -80,14 +80,14 @@ void WalkMotion::pose_of(const MotionInput& input, const std::vector<char>& need
     steps.stride = 2 * length / std::ceil(length / (0.5 * stride_));
     steps.gone = input.distance - input.leg_begin;
     steps.left = input.leg_end - input.distance;
-    // Off with the right foot in the air and the left one below the body.
+    // Start with the right foot in the air and the left one below the body.
     steps.cycles = 0.5 + upright() + steps.gone / steps.stride;
   } else {
     steps.cycles = options_.start_phase + input.distance / stride_;
   }
   steps.turn_cycles = input.turned / 2.1;  // one step for 60 degrees
   steps.turning = input.turning;
-  // The body sways fully already at half the speed: steps are as long as ever.
+  // The body sways fully from half the speed on, since steps keep their length.
   const double slow = 1.0 - clamp(input.walking, 0.0, 1.0);
   pose(steps, 1.0 - slow * slow * slow, input.time, needed, out);
 }
@@ -103,7 +103,7 @@ void WalkMotion::pose(const Steps& steps, double walking, double time, const std
                       LocalPose& out) const {
   const double cycles = steps.cycles;
   const double phase = cycles - std::floor(cycles);
-  thread_local std::vector<Quatd> turn;  // of each joint from the bind pose, in the root frame
+  thread_local std::vector<Quatd> turn;  // rotation of each joint from the bind pose, in the root frame
   thread_local std::vector<char> set;
   turn.resize(parents_.size());
   set.assign(parents_.size(), 0);
@@ -112,7 +112,7 @@ void WalkMotion::pose(const Steps& steps, double walking, double time, const std
   out.translations[at(kPelvis)] = b.pelvis;
   out.root = {};
 
-  // Everything first hangs on its parent as in the bind pose.
+  // Each joint first follows its parent as in the bind pose.
   const auto give = [&](std::size_t joint, const Quatd& q) {
     turn[joint] = q;
     set[joint] = 1;
@@ -122,7 +122,7 @@ void WalkMotion::pose(const Steps& steps, double walking, double time, const std
   const double lean = -4.0 * walking + 0.4 * breath;
   Quatd chest = b.rotation;
   for (int k = 0; k < 3; ++k) {
-    // Against the pelvis: its roll is taken back, its yaw is turned into the opposite.
+    // Turn against the pelvis: undo its roll and reverse its yaw.
     chest = chest * (about_y(-11.0 / 3 * walking * c) * about_z(-b.roll / 3) * about_x(lean / 3));
     give(at(kSpine1 + k), chest);
   }
@@ -161,20 +161,21 @@ void WalkMotion::pose(const Steps& steps, double walking, double time, const std
 }
 
 void WalkMotion::prepare() {
-  const double height = rest(kHead).y / 0.894;  // the head's joint lies at the base of the skull
+  const double height = rest(kHead).y / 0.894;  // the head's joint is at the base of the skull
   stride_ =
       options_.stride > 0 ? options_.stride : height * clamp(0.43 + 0.27 * options_.speed, 0.45, 0.9);
   for (int side = 0; side < 2; ++side) {
     const int first = side == 0 ? kRightHip : kLeftHip;
     const Vec3d arm = rest(first + 6) - rest(first + 5);
-    // From the bind pose to hanging 8 degrees away from the body.
+    // Rotation from the bind pose to an arm that hangs 8 degrees away from the body.
     hang_[side] = -(82.0 - std::atan2(-arm.y, abs(arm.x)) * 360 / kTau);
     const Vec3d ankle = rest(first + 2), ball = rest(first + 3);
-    // Over the toes' joint, so that the toes stay flat on the floor; and over the heel's edge.
+    // Pivots of the foot: the joint of the toes, so that the toes stay flat on the floor, and the edge
+    // of the heel.
     ball_[side] = {0, ball.y - ankle.y, ball.z - ankle.z};
     heel_[side] = {0, -ankle.y, 0.40 * (ankle.z - ball.z)};
   }
-  // The highest pelvis at which no leg has to be longer than it is.
+  // Find the highest pelvis for which no leg must be longer than it is.
   double low = 0.0, high = 0.25 * height;
   for (int i = 0; i < 40; ++i) {
     const double drop = 0.5 * (low + high);
@@ -196,8 +197,8 @@ void WalkMotion::prepare() {
 
 WalkMotion::Body WalkMotion::body(double phase, double walking, double drop) const {
   Body b;
-  const double mid = 0.5 * options_.duty;  // the right leg stands upright
-  const double stand = 0.012;              // knees never lock
+  const double mid = 0.5 * options_.duty;  // phase at which the right leg is upright
+  const double stand = 0.012;              // keeps knees from locking
   b.roll = 3.0 * walking * std::cos(kTau * (phase - mid));
   b.rotation =
       about_y(6.0 * walking * std::cos(kTau * phase)) * about_z(b.roll) * about_x(-2.0 * walking);
@@ -224,7 +225,8 @@ WalkMotion::Foot WalkMotion::foot(int side, const Steps& s, double walking) cons
   double p = s.cycles + (side == 0 ? 0.0 : 0.5);
   p -= std::floor(p);
   const double duty = options_.duty;
-  // Of the footfall that is or was, and of the next: never before the start nor beyond the stop.
+  // Positions of the present or last footfall and of the next, never before the start nor beyond the
+  // stop.
   const double here = clamp(s.stride * (upright() - p), -s.gone, s.left);
   const double next = clamp(s.stride * (upright() - p + 1), -s.gone, s.left);
   Foot f;
@@ -233,8 +235,8 @@ WalkMotion::Foot WalkMotion::foot(int side, const Steps& s, double walking) cons
     f.ankle = ankle(side, here, f.pitch);
     f.toe = max(-f.pitch, 0.0);
   } else {
-    // Swing: from where the toes leave to where the heel will strike, with the feet's own velocity at
-    // both. After a start or before a stop a part of it has to do.
+    // Swing: from where the toes leave to where the heel will strike, matching the foot's velocity at
+    // both ends. After a start or before a stop only a part of the swing happens.
     const double span = 1 - duty;
     double from = 0.0, to = 1.0;
     if (s.stride > 0) {

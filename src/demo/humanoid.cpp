@@ -18,7 +18,7 @@ namespace gsnav {
 
 namespace {
 
-/// Where the capsules of the procedural person lie before they are fitted.
+/// Capsules of the procedural person before they are fitted.
 std::vector<ProxyCapsule> humanoid_capsules(const Skeleton& skeleton, double scale, double build) {
   std::vector<ProxyCapsule> out;
   const std::vector<Affine3<double>> rest = skeleton.rest_globals();
@@ -30,7 +30,7 @@ std::vector<ProxyCapsule> humanoid_capsules(const Skeleton& skeleton, double sca
     const Affine3<double> back = rigid_inverse(rest[j]);
     out.push_back({static_cast<std::uint16_t>(j), back * a, back * b, radius * scale});
   };
-  // The trunk is wider than deep: capsules lie across it.
+  // The trunk is wider than it is deep, so its capsules lie across it.
   const auto across = [&](const std::string& name, double width, double y, double z, double radius) {
     add(name, Vec3d{-width * build, y, z} * scale, Vec3d{width * build, y, z} * scale, radius * build);
   };

@@ -11,8 +11,8 @@
 
 namespace gsnav::detail {
 
-/// Joints and surface of the procedural person in its bind pose: arms 50 degrees below the horizontal,
-/// Y up, facing -Z, the right side at +X. Written for 1.70 m and scaled.
+/// Joints and surface of the procedural person in its bind pose: Y up, facing -Z, the right side at +X,
+/// arms 50 degrees below the horizontal. Dimensions are for 1.70 m and scaled.
 class HumanoidBuilder {
  public:
   explicit HumanoidBuilder(const HumanoidOptions& o);
@@ -32,7 +32,7 @@ class HumanoidBuilder {
 
   Lobe& add(const std::string& name, BodyPart part, const Vec3d& a, const Vec3d& b, const Vec3d& ra,
             const Vec3d& rb, double blend);
-  // A round limb between two places; its ends are as round as it is thick.
+  // A round limb between two points; its ends have the radius of the limb.
   Lobe& limb(const std::string& name, BodyPart part, const Vec3d& a, const Vec3d& b, double ra,
              double rb, double blend);
 

@@ -23,22 +23,22 @@ namespace gsnav::detail {
 
 namespace {
 
-/// A point of the surface before it becomes a Gaussian.
+/// A point of the surface, before it becomes a Gaussian.
 struct SurfacePoint {
   Vec3d position{}, normal{};
-  double spacing = 0;    // metres to the nearest other point, at least
-  std::size_t lobe = 0;  // the nearest
+  double spacing = 0;    // least distance to other points, metres
+  std::size_t lobe = 0;  // the nearest lobe
 };
 
-/// Spreads points over the surface of the shape: random ones on the lobes, moved to the smooth union,
-/// kept where no other is near (dart throwing).
+/// Spreads points over the surface: random points on the lobes are moved to the smooth union and kept if
+/// no other is near (dart throwing).
 std::vector<SurfacePoint> sample_surface(const BodyShape& shape, const HumanoidOptions& o,
                                          const std::vector<double>& density) {
   Rng rng(o.seed);
   double weighted = 0;
   for (std::size_t i = 0; i < shape.lobes.size(); ++i)
     weighted += shape.lobes[i].area() * density[i] * density[i];
-  // Measured: lobes overlap by more than half, and dart throwing gives 0.7 points per square of the
+  // Measured: lobes overlap by more than half, and dart throwing keeps 0.7 points per square of the
   // spacing.
   const double spacing = std::sqrt(0.285 * weighted / o.gaussians);
   const double scale = o.height / 1.70;
@@ -58,14 +58,14 @@ std::vector<SurfacePoint> sample_surface(const BodyShape& shape, const HumanoidO
     const double z = rng.uniform(-1, 1), angle = rng.uniform(0, 6.283185307179586),
                  q = std::sqrt(1 - z * z);
     const Vec3d unit{q * std::cos(angle), z, q * std::sin(angle)};
-    // A share of the points goes to the round ends by their length.
+    // The round ends get a share of the points in proportion to their length.
     const double straight = norm(l.b - l.a), ends = l.radii_a.y + l.radii_b.y;
     SurfacePoint p;
     const Mat3d back = transpose(l.axes);
     if (rng.uniform() * (straight + ends) < straight) {
       const double t = rng.uniform(), c = std::cos(angle), s = std::sin(angle);
       const Vec3d r = lerp(l.radii_a, l.radii_b, t);
-      // Around the segment, whatever its direction is against the axes.
+      // Around the segment, whatever its direction relative to the axes.
       const Vec3d along = normalized(l.axes * (l.b - l.a));
       Vec3d u = abs(along.y) < 0.9 ? cross(along, Vec3d{0, 1, 0}) : cross(along, Vec3d{1, 0, 0});
       u = normalized(u);
@@ -93,8 +93,8 @@ std::vector<SurfacePoint> sample_surface(const BodyShape& shape, const HumanoidO
   return out;
 }
 
-/// Colour of a point: its part, small features of the face, folds, and shading from above and from
-/// crevices, as light in a room would leave in a captured person.
+/// Computes the colour of a point: its part, small features of the face, folds, and shading from above
+/// and in crevices, like the light of a room in a captured person.
 class HumanoidPainter {
  public:
   HumanoidPainter(const HumanoidOptions& o, const BodyShape& shape)
@@ -137,7 +137,7 @@ class HumanoidPainter {
   }
 
  private:
-  // Clothes end where they would, not where lobes meet: neckline, hem, sleeves.
+  // Clothes end at neckline, hem and sleeves, not where lobes meet.
   BodyPart part(const Vec3d& x, const Lobe& lobe) const noexcept {
     const double side = abs(x.x);
     if (lobe.part == BodyPart::skin || lobe.part == BodyPart::top) {
@@ -148,7 +148,7 @@ class HumanoidPainter {
     if ((lobe.part == BodyPart::trousers || lobe.part == BodyPart::top) && side < 0.22 && x.y < 1.1) {
       return x.y > 0.955 ? BodyPart::top : BodyPart::trousers;
     }
-    // Along the arm from the shoulder, metres: it hangs 50 degrees below the horizontal.
+    // Distance along the arm from the shoulder, metres. The arm hangs 50 degrees below the horizontal.
     const double along = 0.643 * (side - 0.165 * o_.shoulders) + 0.766 * (1.385 - x.y);
     if (o_.short_sleeves && lobe.part == BodyPart::top && side > 0.19 && along > 0.17)
       return BodyPart::skin;
@@ -194,7 +194,8 @@ class HumanoidWeigher {
   HumanoidWeigher(const BodyShape& shape, const Skeleton& skeleton, double scale) : shape_(shape) {
     const std::size_t n = skeleton.size();
     softness_.assign(n * n, 0.0);
-    const auto above = [&](std::size_t a, std::size_t b) {  // b is a or at most two steps above it
+    // whether b is a, or at most two steps above it
+    const auto above = [&](std::size_t a, std::size_t b) {
       for (int step = 0; step < 3; ++step) {
         if (a == b) return true;
         if (skeleton.parents[a] < 0) return false;
@@ -202,7 +203,7 @@ class HumanoidWeigher {
       }
       return false;
     };
-    // How far a joint's motion reaches into what lies above it, metres.
+    // Distance over which a joint's motion reaches into the part above it, metres.
     const auto soft = [&](const std::string& name) {
       const auto has = [&](const char* word) { return name.find(word) != name.npos; };
       if (has("spine") || has("collar")) return 0.030;
@@ -220,8 +221,8 @@ class HumanoidWeigher {
     distance_.resize(n);
   }
 
-  /// Fills `row` [J]: falling off exponentially with the distance from what each joint moves, among the
-  /// joints within two steps up or down the tree from the nearest one's.
+  /// Fills `row` [J]. Weights fall off exponentially with the distance from the lobes of each joint.
+  /// Only joints within two steps up or down the tree from the nearest lobe's joint get weight.
   void weigh(const SurfacePoint& p, std::vector<float>& row) {
     const std::size_t n = distance_.size(), home = shape_.lobes[p.lobe].joint;
     std::fill(distance_.begin(), distance_.end(), 1e3);
@@ -239,7 +240,7 @@ class HumanoidWeigher {
 
  private:
   const BodyShape& shape_;
-  std::vector<double> softness_;  // [J][J], 0: not related
+  std::vector<double> softness_;  // [J][J]; 0: not related
   std::vector<double> distance_;
 };
 
@@ -279,7 +280,7 @@ Status cover_with_gaussians(const HumanoidOptions& o, const BodyShape& shape, Av
     g.shN = rest.empty() ? nullptr : rest.data();
     if (!builder.add(g)) continue;
     weigher.weigh(p, row);
-    // The heaviest eight are enough for set_weights to choose four from.
+    // The heaviest eight suffice for set_weights to choose four from.
     std::array<std::size_t, 8> best{};
     for (auto& b : best) {
       b = static_cast<std::size_t>(std::max_element(row.begin(), row.end()) - row.begin());

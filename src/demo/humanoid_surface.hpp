@@ -6,7 +6,7 @@
 
 namespace gsnav::detail {
 
-/// Fills cloud and weights of `asset` with the surface of `shape`. Errors: as of
+/// Fills the cloud and weights of `asset` from the surface of `shape`. Errors: those of
 /// AvatarAsset::set_weights.
 Status cover_with_gaussians(const HumanoidOptions& o, const BodyShape& shape, AvatarAsset& asset);
 

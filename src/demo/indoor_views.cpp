@@ -14,7 +14,7 @@ namespace gsnav {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kClear = 0.4;       // metres about an eye
+constexpr double kClear = 0.4;       // free distance around a camera, metres
 constexpr double kLeastSight = 1.5;  // metres
 constexpr double kDown = 0.12;       // slope of a view
 
@@ -33,7 +33,7 @@ Status validate(const IndoorViewOptions& o) {
   return {};
 }
 
-/// The mesh of a scene, to see whether a place is free and how far it is to what a ray meets.
+/// The mesh of a scene, for testing whether a place is free and how far a ray goes.
 class Surfaces {
  public:
   explicit Surfaces(const DefaultScene& scene) {
@@ -56,7 +56,7 @@ class Surfaces {
     });
   }
 
-  /// Distance along a unit ray; infinity where it meets nothing.
+  /// Distance along a unit ray to the first triangle; infinity if there is none.
   double first(const Vec3d& eye, const Vec3d& ray) const noexcept {
     double nearest = std::numeric_limits<double>::infinity();
     for (const Triangle& t : triangles_) {
@@ -79,7 +79,8 @@ class Surfaces {
   Aabb<double> bounds_{};
 };
 
-/// The direction that sees furthest to both of its neighbours; nothing where no such is long enough.
+/// The direction for which the shortest of it and its two neighbours is longest. Nothing if none is long
+/// enough.
 std::optional<Vec3d> longest_sight(const Surfaces& surfaces, const Vec3d& eye, double turn) {
   constexpr int kDirections = 18;
   const auto direction = [&](int i) {
@@ -108,7 +109,7 @@ struct Sight {
   Vec3d eye, ray;
 };
 
-/// Nothing where many places in a row were taken.
+/// A random view. Nothing if too many places in a row were not free.
 std::optional<Sight> random_view(const Surfaces& surfaces, double height, Rng& rng) {
   const Aabb<double>& all = surfaces.bounds();
   constexpr int kTries = 1000;
@@ -133,7 +134,7 @@ Result<std::vector<Camera>> indoor_views(const DefaultScene& scene, const Indoor
   std::vector<Camera> out;
   std::vector<Vec3d> eyes;
   while (static_cast<int>(out.size()) < o.count) {
-    // Of several the one that is furthest from all before it, so that views spread over the rooms.
+    // Take the candidate furthest from all earlier views, so that views spread over the rooms.
     constexpr int kCandidates = 6;
     std::optional<Sight> best;
     double furthest = -1;

@@ -16,11 +16,11 @@
 namespace gsnav {
 namespace {
 
-constexpr double kRound = 48.0;     // seconds: everybody is back at the start of their way after that
-constexpr double kApart = 0.75;     // metres between two people, root to root, where it can be had
-constexpr double kUsualPace = 1.0;  // metres a second
+constexpr double kRound = 48.0;     // seconds after which everyone is back at the start of their path
+constexpr double kApart = 0.75;     // metres between two people, root to root, where possible
+constexpr double kUsualPace = 1.0;  // metres per second
 
-/// Where somebody goes, and how fast.
+/// The path of a person, and its speed.
 struct Way {
   std::vector<Vec3d> points;
   WalkOptions walk;
@@ -35,8 +35,8 @@ std::optional<Way> make_way(const std::vector<Vec3d>& points, double speed) {
   return Way{points, walk, std::move(*trajectory)};
 }
 
-/// A way through random places, walked back and forth in `kRound` seconds. None where chance gave a way
-/// that would have to be walked too fast or too slowly.
+/// A path through random places, walked back and forth in `kRound` seconds. Nothing if the random path
+/// would need too high or too low a speed.
 std::optional<Way> random_way(const NavMesh& mesh, Rng& rng) {
   std::vector<Vec3d> points{mesh.random_point(rng, 0).position};
   double length = 0;
@@ -47,7 +47,7 @@ std::optional<Way> random_way(const NavMesh& mesh, Rng& rng) {
     points.insert(points.end(), path->points.begin() + 1, path->points.end());
   }
   double speed = kUsualPace;
-  for (int i = 0; i < 30; ++i) {  // turns on the spot take their own time: the speed is found by trial
+  for (int i = 0; i < 30; ++i) {  // turns on the spot take time too, so find the speed by iteration
     auto way = make_way(points, speed);
     if (!way || !(way->trajectory.period() > 0) || speed < 0.6 || speed > 1.4) return {};
     if (std::abs(way->trajectory.period() - kRound) < 1e-9) return way;

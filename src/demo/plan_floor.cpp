@@ -12,7 +12,7 @@ std::uint64_t bits(int from, int to) noexcept {
   return from < to ? below(to) & ~below(from) : 0;
 }
 
-/// The runs of `free` that have a bit of `seeds`.
+/// The runs of set bits of `free` that contain a bit of `seeds`.
 std::uint64_t runs_of(std::uint64_t seeds, std::uint64_t free) noexcept {
   std::uint64_t up = seeds & free, down = up, free_up = free, free_down = free;
   for (int step = 1; step < 64; step *= 2) {
@@ -42,7 +42,7 @@ FreeFloor::FreeFloor(const FloorRect& inside, double clearance)
 }
 
 void FreeFloor::take(const FloorRect& rect) {
-  // Rounded outwards, so that a free cell is free all over.
+  // Round outwards, so that a free cell is free everywhere.
   const auto low = [&](double v, double origin) {
     return std::max(static_cast<int>(std::floor((v - clearance_ - origin) / kCell + 1e-9)), 0);
   };
@@ -66,7 +66,7 @@ bool FreeFloor::in_one_piece() {
   const std::size_t n = free_.size();
   for (bool grows = true; grows;) {
     grows = false;
-    for (std::size_t k = 0; k < 2 * n; ++k) {  // down and up again
+    for (std::size_t k = 0; k < 2 * n; ++k) {  // forwards, then backwards
       const std::size_t j = k < n ? k : 2 * n - 1 - k;
       if (reached_[j] == free_[j]) continue;
       const std::uint64_t beside = (j > 0 ? reached_[j - 1] : 0) | (j + 1 < n ? reached_[j + 1] : 0);

@@ -17,18 +17,18 @@ inline bool contains(const FloorRect& outer, const FloorRect& inner) noexcept {
   return inner.x0 >= outer.x0 && inner.z0 >= outer.z0 && inner.x1 <= outer.x1 && inner.z1 <= outer.z1;
 }
 
-/// The floor of one room, where a disc can stand: cells of 0.1 m, taken where any part of them is too
-/// near to a wall or a piece of furniture. Neighbouring free cells are joined, and so are all points in
-/// them for the disc. The shorter side of the room is at most kMostShortSide.
+/// The floor of one room as a grid of 0.1 m cells, which are free where a disc can stand. A cell is
+/// taken if any part of it is too near to a wall or to furniture. The disc can move between all points
+/// of neighbouring free cells. The shorter side of the room is at most kMostShortSide.
 class FreeFloor {
  public:
-  static constexpr double kMostShortSide = 6.4;  // metres: 64 cells, bits of a row
+  static constexpr double kMostShortSide = 6.4;  // metres: 64 cells, the bits of a row
 
   FreeFloor(const FloorRect& inside, double clearance);
 
-  /// Takes the floor about a rectangle.
+  /// Marks the floor around a rectangle as taken.
   void take(const FloorRect& rect);
-  /// Whether all free cells are joined, and there is one.
+  /// Whether there is a free cell, and all free cells are connected.
   bool in_one_piece();
 
  private:
@@ -37,8 +37,8 @@ class FreeFloor {
   double clearance_;
   bool rows_along_x_;
   int columns_, rows_;
-  std::vector<std::uint64_t> free_;     // [rows_], a bit for each column
-  std::vector<std::uint64_t> reached_;  // scratch, the same
+  std::vector<std::uint64_t> free_;     // [rows_] one bit for each column
+  std::vector<std::uint64_t> reached_;  // scratch, like free_
 };
 
 }  // namespace gsnav::plan

@@ -1,5 +1,4 @@
-// SPDX-License-Identifier: Apache-2.0
-// Where the furniture of a floor plan stands.
+// SPDX-License-Identifier: Apache-2.0 Places the furniture of a floor plan.
 #include "plan_furniture.hpp"
 
 #include <algorithm>
@@ -13,16 +12,16 @@ namespace {
 
 constexpr double kQuarter = 1.5707963267948966;
 constexpr double kGap = 0.03;            // between pieces of different groups
-constexpr double kAtWall = 0.02;         // from the wall
-constexpr double kBehindCurtain = 0.14;  // where curtains hang behind
+constexpr double kAtWall = 0.02;         // between a piece and the wall
+constexpr double kBehindCurtain = 0.14;  // between a piece and the wall, if curtains hang behind it
 constexpr double kCurtainDepth = 0.12;
-// Radii of other discs for which no part of the floor that FreeFloor sees is cut off.
+// Radii of smaller discs. For these, too, no part of the floor that FreeFloor sees may be cut off.
 constexpr double kSlim = 0.2, kSlimmest = 0.1;
 
-/// A frame that is turned by quarters, moved to x, z.
+/// A frame that is rotated by quarter turns and moved to x, z.
 struct Frame {
   double x = 0, z = 0;
-  int quarters = 0;  // about +Y
+  int quarters = 0;  // quarter turns about +Y
 
   Vec2<double> at(double u, double v) const noexcept {
     switch (quarters) {
@@ -56,7 +55,7 @@ FloorRect bounds_of(const Group& g) {
   return all;
 }
 
-/// A strip of floor at a wall of a room.
+/// A strip of floor along a wall of a room.
 FloorRect strip(const FloorRect& in, WallSide side, double from, double to, double depth) {
   switch (side) {
     case WallSide::x_low:
@@ -99,7 +98,7 @@ class Furnisher {
     }
   }
 
-  /// Places the first of the groups that fits. False where none does.
+  /// Places the first of the groups that fits. Returns false if none does.
   bool place_one_of(const std::vector<Group>& groups) {
     for (const Group& g : groups) {
       std::vector<Place> places = g.at_wall ? wall_places(g) : floor_places(g);
@@ -120,7 +119,7 @@ class Furnisher {
 
   std::vector<Place> wall_places(const Group& g) {
     const FloorRect b = bounds_of(g);
-    // Plants and lamps stand about their centre, all else with its back to the wall.
+    // Plants and lamps stand around their centre, all others with their back to the wall.
     const double back = -b.z0;
     std::vector<Place> out;
     for (int quarters = 0; quarters < 4; ++quarters) {

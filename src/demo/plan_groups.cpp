@@ -1,5 +1,4 @@
-// SPDX-License-Identifier: Apache-2.0
-// What furniture a room should have.
+// SPDX-License-Identifier: Apache-2.0 Lists the furniture that a room should have.
 #include "plan_furniture.hpp"
 
 namespace gsnav::plan {
@@ -95,7 +94,7 @@ std::vector<std::vector<Group>> furniture_for(const PlannedRoom& room, bool only
       break;
     case RoomKind::bedroom:
       out.push_back({bed(2, rng.uniform() < 0.6), bed(2, false), bed(1, false), bed(0, false)});
-      // Rather before a window than none.
+      // Better in front of a window than no bed at all.
       out.back().push_back(bed(1, false));
       out.back().back().tall = false;
       want(1.0, by_size(K::wardrobe, {2.2, 1.65, 1.1}, 0.6));
@@ -129,7 +128,8 @@ std::vector<std::vector<Group>> furniture_for(const PlannedRoom& room, bool only
 }
 
 FloorRect footprint_of(const Group::Piece& p) noexcept {
-  // Not much more than what the painter makes of it: fronts have handles, chairs are turned a little.
+  // Leave some margin around the drawn piece, because fronts have handles and chairs are turned a
+  // little.
   const auto at_wall = [](double w, double depth) { return FloorRect{-w / 2, 0, w / 2, depth}; };
   const auto centred = [](double w, double d) { return FloorRect{-w / 2, -d / 2, w / 2, d / 2}; };
   switch (p.kind) {

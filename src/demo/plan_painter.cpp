@@ -73,7 +73,7 @@ void walls(Painter& p, const FloorPlan& plan, std::size_t room, const Palette& c
   }
   for (const PlannedWindow& w : plan.windows) {
     if (w.room != room || !w.curtains) continue;
-    // In the frame of the wall, whose x runs to the right as one looks at it.
+    // The frame of the wall: x runs to the right as seen from inside the room.
     double low = w.from, high = w.to;
     switch (w.side) {
       case WallSide::z_low:

@@ -24,7 +24,7 @@ int gpu_count() noexcept {
 #endif
 }
 
-/// "; there are: serial cpu cuda:0"
+/// Text for errors: "; there are: serial cpu cuda:0".
 std::string there_are() {
   std::string text = "; there are:";
   for (const std::string& name : Device::available()) text += " " + name;
@@ -34,7 +34,7 @@ std::string there_are() {
   return text;
 }
 
-/// The number behind "cpu:" or "cuda:", in [low, high].
+/// The number after "cpu:" or "cuda:", if it is one in [low, high].
 std::optional<int> number_in(std::string_view text, int low, int high) {
   int n = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), n);

@@ -33,7 +33,8 @@ Status moved_from(const char* what) {
   return {Errc::invalid_argument, std::string("this ") + what + " was moved from: use what it became"};
 }
 
-/// f(*engine), whose exceptions become a status; an error where the owner, a `what`, was moved from.
+/// Calls f(*engine) and turns exceptions into a status. A missing engine means that its owner, a `what`,
+/// was moved from: an error.
 template <class Engine, class F>
 auto on_engine(const std::unique_ptr<Engine>& engine, const char* what, F&& f) -> decltype(f(*engine)) {
   if (engine == nullptr) return moved_from(what);

@@ -11,8 +11,8 @@
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/device/simulator.hpp"
 
-// What a backend does for the classes over Device: an interface for each of them, and for each backend a
-// function that makes one.
+// Interfaces behind the classes over Device: one for each class, and for each backend a function that
+// makes one.
 
 namespace gsnav::detail {
 
@@ -57,16 +57,16 @@ class BatchEngine {
   virtual void set_rendering(bool on) noexcept = 0;
 };
 
-/// What a batch simulator is made of.
+/// Arguments of a batch simulator.
 struct BatchParts {
   std::vector<std::shared_ptr<const SimulatorScene>> scenes;
-  std::shared_ptr<SceneLibrary> library;  ///< in place of scenes, where it is set
+  std::shared_ptr<SceneLibrary> library;  ///< used instead of `scenes` if not null
   BatchConfig config;
   std::size_t environments = 0;
   EpisodeSource next_episode;
 };
 
-/// Makes engines on one kind of device. May throw what guarded() turns into a Status.
+/// Makes engines for one kind of device. May throw anything that guarded() turns into a Status.
 struct EngineFactory {
   std::unique_ptr<RendererEngine> (*renderer)(const Device&, std::shared_ptr<const SimulatorScene>,
                                               const RenderOptions&);
@@ -79,7 +79,7 @@ struct EngineFactory {
 extern const EngineFactory serial_engines;
 #if defined(GSNAV_DEVICE_OPENMP)
 extern const EngineFactory openmp_engines;
-/// Threads that a CPU device of so many has, and the name of its SIMD lanes.
+/// Number of threads of a CPU device that was asked for `threads`, and the name of its SIMD lanes.
 int cpu_threads(int threads);
 const char* cpu_lanes();
 #endif

@@ -14,7 +14,7 @@
 #include "gsnav/sim/basic_batch.hpp"
 #include "gsnav/sim/basic_simulator.hpp"
 
-// The engines on a backend B. Each has a backend of its own; `MakeBackend` makes one of a Device.
+// The engines for a backend B. Each engine owns its backend, which `make` creates from a Device.
 
 namespace gsnav::detail {
 
@@ -116,7 +116,7 @@ class BatchOn final : public BatchEngine {
   BasicBatchSimulator<B> sim_;
 };
 
-/// `make`: a std::unique_ptr<B> of a Device.
+/// `make` returns a std::unique_ptr<B> for a Device.
 template <class B, auto make>
 constexpr EngineFactory engines_on() {
   return {

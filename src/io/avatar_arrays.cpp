@@ -28,7 +28,7 @@ class AvatarArrayReader {
     return read_sh(colors, warnings);
   }
 
-  /// GART's parameters, as its model names them, are stored before their activations.
+  /// Reads GART's parameters, which are stored before their activations.
   Status read_gart() {
     if (Status s = read_common(kGart); !s) return s;
     if (Status s = activate(); !s) return s;
@@ -112,7 +112,7 @@ class AvatarArrayReader {
     return {};
   }
 
-  /// GART keeps the coefficients of degree 0 and the others apart.
+  /// Reads GART's coefficients, which are stored in two arrays: degree 0, and the others.
   Status read_features() {
     const std::size_t n = out.count;
     NpyArray dc, rest;
@@ -135,7 +135,7 @@ class AvatarArrayReader {
     return find_degree("_features_rest");
   }
 
-  /// The degree of `shs`. `name` is the array whose shape says how many coefficients there are.
+  /// Finds the degree of `shs`. `name` is the array whose shape has the number of coefficients.
   Status find_degree(const char* name) {
     const std::size_t k = out.shs.shape[1];
     int& degree = out.sh_degree;

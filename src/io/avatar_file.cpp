@@ -54,7 +54,7 @@ class AvatarReader {
     std::vector<Affine3<double>> globals;
     for (std::size_t j = 0; j < joints; ++j) {
       const Affine3<double>& m = skeleton.inverse_binds[j];
-      // Float32 matrices are only nearly rigid.
+      // Float32 matrices are only approximately rigid.
       globals.push_back(rigid_inverse(Affine3<double>{polar_rotation(m.linear), m.translation}));
       const std::int32_t parent = skeleton.parents[j];
       skeleton.rest_local.push_back(parent < 0 || static_cast<std::size_t>(parent) >= j
@@ -195,7 +195,7 @@ class AvatarReader {
                ", must be 0 (linear), 1 (with stretch) or 2 (dual quaternions)");
   }
 
-  /// Capsules fixed to joints, if the file has any.
+  /// Reads the capsules, if the file has any.
   Status read_capsules() {
     if (!file_.contains("capsules")) return {};
     const auto capsules = arrays_.read("capsules", {detail::NpzArrays::kAny, 7});
@@ -222,7 +222,7 @@ class AvatarReader {
   const LoadAvatarOptions& options_;
   detail::AvatarFileArrays in_;
   LoadedAvatar out_;
-  std::vector<std::size_t> kept_;  ///< rows of the file that are in the cloud
+  std::vector<std::size_t> kept_;  ///< Rows of the file that are in the cloud.
 };
 
 }  // namespace

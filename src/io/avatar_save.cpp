@@ -20,7 +20,7 @@ std::vector<float> interleaved(const std::array<std::vector<float>, K>& planes, 
   return out;
 }
 
-/// Whether a reader that knows 24 and 55 joints finds the same tree.
+/// Whether a reader that only knows the trees of 24 and 55 joints would find this one.
 bool known_joints(const Skeleton& skeleton) {
   const BodyJoints known = body_joints(skeleton.size());
   return !known.names.empty() &&

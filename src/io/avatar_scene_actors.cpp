@@ -17,7 +17,7 @@
 namespace gsnav::io {
 namespace {
 
-/// Where the clip's root joint goes, on the floor below it: what an avatar is scaled about.
+/// The path of the clip's root joint, on the floor below it. Avatars are scaled about it.
 class ClipPath final : public Trajectory {
  public:
   ClipPath(std::shared_ptr<const MotionClip> clip, std::vector<double> floor, double offset_y)
@@ -46,7 +46,7 @@ class ClipPath final : public Trajectory {
   double offset_y_;
 };
 
-/// The clip without the way that ClipPath has.
+/// The clip without the movement that ClipPath has.
 class ClipInPlace final : public MotionSource {
  public:
   ClipInPlace(std::shared_ptr<const MotionClip> clip, std::shared_ptr<const ClipPath> path)
@@ -65,15 +65,16 @@ class ClipInPlace final : public MotionSource {
   std::shared_ptr<const ClipPath> path_;
 };
 
-/// Moves the whole clip, and its capsules, by a rigid map of each key: every root of the skeleton alike.
-/// The clip is as load_driver makes it, with each joint's place at each key and a path.
+/// Moves the whole clip and its capsules by one rigid map for each frame (the last of `by` for further
+/// frames). All roots of the skeleton move alike. The clip is one that load_driver made: with a position
+/// for each joint and frame, and a path.
 void move_clip(const Skeleton& skeleton, LoadedDriver& driver, const std::vector<Affine3<double>>& by) {
   MotionClip& clip = driver.clip;
   for (std::size_t t = 0; t < clip.frames(); ++t) {
     const Affine3<double>& m = by[std::min(t, by.size() - 1)];
     Quatd* rotations = &clip.rotations[t * clip.joints];
     Vec3d* places = &clip.translations[t * clip.joints];
-    // The first root keeps its place in the clip: the path makes up for the change.
+    // The first root keeps its position in the clip. Its movement goes into the path.
     const Vec3d before = clip.root_translation[t], after = m * (before + places[0]) - places[0];
     for (std::size_t j = 0; j < clip.joints; ++j) {
       if (skeleton.parents[j] >= 0) continue;
@@ -88,7 +89,7 @@ void move_clip(const Skeleton& skeleton, LoadedDriver& driver, const std::vector
   }
 }
 
-/// The floor below the clip: the lowest joint within half a second, at each key.
+/// Height of the floor below the clip in each frame: the lowest joint within half a second.
 std::vector<double> floor_of(const Skeleton& skeleton, const MotionClip& clip) {
   const std::size_t n = clip.frames();
   std::vector<double> lowest(n), out(n);
@@ -153,7 +154,7 @@ Result<AvatarActor> load_actor(const SceneAvatar& a,
   }
   Affine3<double> coordinates = a.coordinates;
   if (a.guess_coordinates) {
-    // Habitat-GS's rule: a root that stands on its head comes from a frame with Y down.
+    // Habitat-GS's rule: a root that is upside down comes from a frame with Y down.
     const Mat3d first =
         rotation_matrix(driver->clip.rotations[0]) * transpose(body->skeleton.rest_local[0].linear);
     if (first(1, 1) < -0.7 && first(2, 2) < -0.7)
@@ -161,7 +162,7 @@ Result<AvatarActor> load_actor(const SceneAvatar& a,
   }
   move_clip(body->skeleton, *driver, {coordinates});
   if (body->capsules.empty() && !driver->capsules.empty() && !driver->capsules[0].empty()) {
-    // The file's body stays as it is: another entry may have another driver.
+    // Keep the file's body as it is, because another entry may have another driver.
     std::shared_ptr<const AvatarAsset>& of_driver =
         bodies[a.canonical.string() + '\n' + a.driver.string()];
     if (of_driver == nullptr) {
@@ -183,10 +184,10 @@ Result<AvatarActor> load_actor(const SceneAvatar& a,
   return AvatarActor::create(body, std::make_shared<const ClipInPlace>(clip, path), path, options);
 }
 
-/// Has actors repeat after `last` seconds and as many more as those who are there at both ends need to
-/// get back.
+/// Makes actors repeat after `last` seconds plus a blend, long enough for those that are present at both
+/// ends to move back.
 Status loop_actors(std::vector<AvatarActor>& actors, double last, double least) {
-  constexpr double kSpeed = 1.4;  // metres a second
+  constexpr double kSpeed = 1.4;  // metres per second
   double blend = 0.0;
   std::vector<Affine3<double>> from, to;
   for (const AvatarActor& a : actors) {

@@ -11,15 +11,15 @@
 #include "file.hpp"
 #include "gsnav/detail/scene/content_hash.hpp"
 
-// Files that keep what was built of a cloud. A header stands at the front, and arrays follow.
+// Cache files for data built from a cloud: a header, followed by arrays.
 
 namespace gsnav::io::detail {
 
-/// What each header begins with.
+/// The beginning of each header.
 struct CacheFront {
   char magic[8];
-  std::uint32_t version, size;  ///< of what builds it; of the header, in bytes
-  std::uint64_t built_of[2];    ///< hash of all that it is made of, and of the version
+  std::uint32_t version, size;  ///< Version of the builder; size of the header in bytes.
+  std::uint64_t built_of[2];    ///< Hash of everything it was built from, and of the version.
 
   CacheFront() = default;
   CacheFront(const char (&name)[9], std::uint32_t builder, std::size_t header, const Hasher& of)
@@ -29,8 +29,9 @@ struct CacheFront {
   }
 };
 
-/// Opens a file that begins as `front` does, and reads its header. `kind` is what the file should be.
-/// Errors: as of read_file; invalid_file; invalid_argument where it was built of something else.
+/// Opens a file whose header begins like `front`, and reads the header. `kind` names the kind of file in
+/// messages. Errors: those of read_file; invalid_file; invalid_argument if it was built from something
+/// else.
 template <class Header>
 Status open_cache(const std::filesystem::path& path, const CacheFront& front, const std::string& kind,
                   RandomFile& file, Header& header) {
@@ -50,7 +51,7 @@ Status open_cache(const std::filesystem::path& path, const CacheFront& front, co
           path.string() + ": was built of another scene, by other settings or by another version"};
 }
 
-/// Reads arrays that lie one behind the other from `at` on; false where the file ends before.
+/// Reads consecutive arrays, the first at `at`. Returns false if the file ends too early.
 class ArrayReader {
  public:
   ArrayReader(const RandomFile& file, std::uint64_t at) : file_(file), at_(at) {}

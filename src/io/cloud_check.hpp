@@ -8,11 +8,11 @@
 
 namespace gsnav::io::detail {
 
-/// What every writer asks of a cloud first: arrays of one length, ids inside their tables.
-/// Error: invalid_argument, which names `path`.
+/// Checks what every writer requires of a cloud: arrays of one length, and ids inside their tables.
+/// Error: invalid_argument, naming `path`.
 Status check_arrays(const std::filesystem::path& path, const GaussianCloud& cloud);
 
-/// Numbers a Gaussian in shN: 3 ((degree + 1)^2 - 1).
+/// Number of values in shN for each Gaussian: 3 ((degree + 1)^2 - 1).
 std::size_t rest_width(const GaussianCloud& cloud) noexcept;
 
 }  // namespace gsnav::io::detail

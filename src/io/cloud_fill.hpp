@@ -19,27 +19,27 @@
 
 namespace gsnav::io::detail {
 
-/// Rows of a file that are read at a time: enough for a call, few enough for the cache.
+/// Rows that are read at a time: enough to be worth a call, few enough for the cache.
 inline constexpr std::size_t kRowsAtOnce = 1024;
 
-/// SH bands that are read apart from the rest of a file, a part of the rows each time: floats of them
-/// all would take several times what a packed cloud does. While `out` is null a file is read without its
-/// bands.
+/// Lets SH bands be read separately from the rest of a file, a range of rows at a time. All bands as
+/// floats would take several times the memory of a packed cloud. While `out` is null, the file is read
+/// without its bands.
 struct BandsApart {
-  std::size_t least_rows = 1 << 16;     ///< files of fewer are read at once
-  int degree = 0;                       ///< of the file, set where its bands were left out; else 0
-  std::vector<std::uint32_t> left_out;  ///< rows of the file that are not in the cloud, ascending
-  // Of the readings that follow:
-  std::vector<std::uint32_t> places;  ///< of each row of the file: where it stands; kNowhere: nowhere
-  std::size_t first = 0, last = 0;    ///< the places that are wanted
-  float* out = nullptr;               ///< [last - first][(degree+1)^2 - 1][3]
+  std::size_t least_rows = 1 << 16;     ///< Files with fewer rows are read in one pass.
+  int degree = 0;                       ///< Degree of the file if its bands were left out, else 0.
+  std::vector<std::uint32_t> left_out;  ///< Rows of the file that are not in the cloud, ascending.
+  // For the passes that read bands:
+  std::vector<std::uint32_t> places;  ///< For each row of the file, its row in the cloud, or kNowhere.
+  std::size_t first = 0, last = 0;    ///< The range of rows in the cloud that is wanted.
+  float* out = nullptr;               ///< [last - first][(degree+1)^2 - 1][3].
   static constexpr std::uint32_t kNowhere = 0xffffffff;
 
   std::size_t numbers() const noexcept { return sh_band_numbers(degree); }
 };
 
-/// Takes consecutive rows of a file into the planes of a cloud, by the rules of activate(). Each row
-/// comes once.
+/// Writes consecutive rows of a file to the planes of a cloud, by the rules of activate(). Each row is
+/// added once.
 class CloudSink {
  public:
   CloudSink(GaussianCloud& cloud, std::size_t first, const BandsApart* apart = nullptr)
@@ -47,7 +47,7 @@ class CloudSink {
     rest_ = apart != nullptr ? apart->numbers() : sh_band_numbers(cloud.sh_degree);
   }
 
-  /// Takes a row or counts why not. Returns whether it was kept.
+  /// Adds a row, or counts why it was dropped. Returns whether it was kept.
   bool add(const RawGaussian& raw) {
     const std::size_t row = row_++;
     if (apart_ != nullptr && apart_->out != nullptr) {
@@ -85,16 +85,17 @@ class CloudSink {
     return true;
   }
 
-  /// The SH bands of the file's row i where fill_cloud was given them.
+  /// The SH bands of the file's row i, if fill_cloud was given them.
   float* bands(std::size_t i) const noexcept { return cloud_.shN.data() + rest_ * i; }
-  /// Whose planes they are: of a row that was not yet added, what fill_cloud was given.
+  /// The cloud that is filled. Rows that were not yet added have what fill_cloud was given.
   const GaussianCloud& cloud() const noexcept { return cloud_; }
 
   std::size_t first() const noexcept { return first_; }
   std::size_t size() const noexcept { return at_ - first_; }
   const LoadReport& report() const noexcept { return report_; }
 
-  /// Writes the origin of each row to `to`, numbered by `all`, where any is not zero.
+  /// Adds the origins of the rows to `all`, and writes the id of each row's origin to to[at], to[at +
+  /// 1], ... Needed only if has_origins().
   void give_origins(OriginLattice& all, std::vector<std::uint32_t>& to, std::size_t at) const {
     std::vector<std::uint32_t> ids;
     for (const Vec3d& origin : lattice_.origins()) ids.push_back(all.id_of_point(origin));
@@ -110,10 +111,10 @@ class CloudSink {
   std::vector<std::uint32_t> left_out_;
   LoadReport report_;
   OriginLattice lattice_;
-  std::vector<std::uint32_t> ids_;  ///< of the rows so far, or empty while all are zero
+  std::vector<std::uint32_t> ids_;  ///< Ids of the rows so far; empty while all are zero.
 };
 
-/// Moves n rows of all planes down, from row `from` to row `to`.
+/// Moves n rows of all planes from row `from` to the lower row `to`.
 inline void move_rows(GaussianCloud& cloud, std::size_t from, std::size_t to, std::size_t n) {
   if (from == to || n == 0) return;
   const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(cloud.sh_degree) - 1);
@@ -128,14 +129,14 @@ inline void move_rows(GaussianCloud& cloud, std::size_t from, std::size_t to, st
   if (rest != 0) plane(cloud.shN, rest);
 }
 
-/// How many pieces so many rows are worth being read in.
+/// Number of pieces in which `count` rows are read in parallel.
 inline std::size_t pieces_of(std::size_t count) noexcept {
   constexpr std::size_t kRowsWorthAThread = 1 << 15;
   return std::clamp(count / kRowsWorthAThread, std::size_t{1}, io_threads());
 }
 
-/// f(p, first, last), which returns a Status, for the rows [first, last) of each of the pieces, side by
-/// side. Of several errors the first piece's is returned; throws std::bad_alloc where one did.
+/// Calls f(p, first, last), which returns a Status, in parallel for the rows [first, last) of each piece
+/// p. Returns the error of the first piece that fails. Throws std::bad_alloc if a call did.
 template <class F>
 Status for_pieces(std::size_t count, std::size_t pieces, const F& f) {
   ThreadPool pool(static_cast<int>(pieces));
@@ -145,7 +146,7 @@ Status for_pieces(std::size_t count, std::size_t pieces, const F& f) {
   return s;
 }
 
-/// Gives the planes of a cloud `n` rows. Memory of new ones is asked for by all threads.
+/// Resizes the planes of a cloud to `n` rows. All threads touch new memory.
 inline void resize_planes(GaussianCloud& cloud, std::size_t n) {
   const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(cloud.sh_degree) - 1);
   const auto for_planes = [&](const auto& f) {
@@ -185,15 +186,16 @@ inline void resize_planes(GaussianCloud& cloud, std::size_t n) {
   });
 }
 
-/// Reads `count` rows into a cloud of SH degree `degree`, in parallel where there are many:
-/// `decode(first, last, sink)` gives the rows [first, last) to the sink, in their order, and returns a
-/// Status. The result does not depend on the number of threads; of several errors the first one's is
-/// returned. No memory beyond the cloud's is asked for. With `parallel` false all rows come by one call.
-/// `planes`: those that are there before the rest, of `count` rows. They become the cloud's. Where shN
-/// is among them, the shN of row i is sink.bands(i); the others may have whatever `decode` makes row i
-/// of (sink.cloud()) before it adds the row or a later one.
-/// `apart`: bands are not for the cloud, whose degree is 0 then; where apart->out is there nothing else
-/// is read.
+/// Reads `count` rows into a cloud of SH degree `degree`, in parallel if there are many. The result does
+/// not depend on the number of threads. No memory is allocated besides that of the cloud.
+/// @param decode decode(first, last, sink) adds the rows [first, last) to the sink in order and returns
+/// a Status. If several calls fail, the first error is returned.
+/// @param parallel false: all rows are read by one call.
+/// @param planes planes with `count` rows that exist already; they are moved into the cloud. If shN is
+/// one of them, the shN of row i is sink.bands(i). In the other planes, `decode` may still read row i
+/// (sink.cloud()) until it adds that row or a later one.
+/// @param apart reads bands separately: the cloud then has degree 0. If apart->out is not null, only
+/// bands are read.
 template <class Decode>
 Result<LoadedCloud> fill_cloud(std::size_t count, int degree, const std::string& source,
                                const Decode& decode, bool parallel = true, GaussianCloud planes = {},

@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kEntries = 256;
 constexpr std::size_t kBins = 4096;
 
-/// The different values, sorted, or nothing where they are more than 256.
+/// The distinct values, sorted; nothing if there are more than 256.
 std::vector<float> distinct(std::span<const float> values) {
   std::unordered_set<float> seen;
   for (const float v : values) {
@@ -41,7 +41,7 @@ ScalarCodebook::ScalarCodebook(std::span<const float> values) {
   }
   for (double& d : density) d = std::cbrt(d);
   const double sum = std::accumulate(density.begin(), density.end(), 0.0);
-  double below = 0;  // of the entries' density, which is 1 as a whole
+  double below = 0;  // density of the entries so far; the whole is 1
   std::size_t bin = 0;
   const auto share = [&](std::size_t b) { return 0.5 / kBins + 0.5 * density[b] / sum; };
   for (std::size_t k = 0; k < kEntries; ++k) {
@@ -64,12 +64,12 @@ std::uint8_t ScalarCodebook::index(float value) const noexcept {
 
 namespace {
 
-/// Rows [first, last) of the order.
+/// The vectors [first, last) of the order.
 struct Group {
-  double error = 0;  ///< sum of squares about the mean
+  double error = 0;  ///< Sum of squares about the mean.
   std::size_t first = 0, last = 0;
-  std::size_t axis = 0;  ///< along which it is widest
-  double middle = 0;     ///< mean along that axis
+  std::size_t axis = 0;  ///< Axis along which it is widest.
+  double middle = 0;     ///< Mean along that axis.
 
   bool operator<(const Group& other) const noexcept {
     return error != other.error ? error < other.error : first > other.first;
@@ -101,7 +101,8 @@ class Splitter {
       open.push(measured(g.first, cut));
       open.push(measured(cut, g.last));
     }
-    // In the order of the vectors, so that neighbours have near labels and planes compress well.
+    // Sort groups in the order of the vectors, so that neighbours have similar labels and images
+    // compress well.
     std::sort(done.begin(), done.end(),
               [](const Group& a, const Group& b) { return a.first < b.first; });
     out.size = done.size();
@@ -119,9 +120,9 @@ class Splitter {
  private:
   const float* vector(std::size_t i) const noexcept { return vectors_.data() + order_[i] * width_; }
 
-  /// Leaves the mean in mean_. Sums are of differences to the first vector, so that identical vectors
-  /// have an error of exactly zero, and in double, where the difference of squares keeps all that
-  /// matters of floats.
+  /// Measures a group and leaves its mean in mean_. Sums are of differences to the first vector, so that
+  /// identical vectors have an error of exactly zero. They are in double, so that the difference of
+  /// squares loses none of the precision of floats.
   Group measured(std::size_t first, std::size_t last) {
     Group g{0, first, last, 0, 0};
     std::fill(mean_.begin(), mean_.end(), 0.0);

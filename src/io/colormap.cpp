@@ -16,7 +16,7 @@ std::uint8_t srgb_byte(double linear) {
   return to_byte(encoded);
 }
 
-/// A colour of the Oklab space (lightness, chroma, hue in radians) as sRGB.
+/// Converts a colour of the Oklab space (lightness, chroma, hue in radians) to sRGB.
 Rgb8 from_oklch(double lightness, double chroma, double hue) {
   const double a = chroma * std::cos(hue), b = chroma * std::sin(hue);
   const double l = std::pow(lightness + 0.3963377774 * a + 0.2158037573 * b, 3);
@@ -27,8 +27,8 @@ Rgb8 from_oklch(double lightness, double chroma, double hue) {
           srgb_byte(-0.0041960863 * l - 0.7034186147 * m + 1.7076147010 * s)};
 }
 
-/// Lightness falls evenly from near to far while the hue goes from yellow through red to blue; the
-/// chroma keeps inside what sRGB can show.
+/// Makes the map: lightness falls evenly from near to far, and the hue goes from yellow through red to
+/// blue. The chroma stays inside sRGB.
 std::array<Rgb8, 256> make_map() {
   std::array<Rgb8, 256> map;
   for (std::size_t i = 0; i < map.size(); ++i) {

@@ -8,8 +8,8 @@
 
 namespace gsnav::io::detail {
 
-/// Which way is usually up in a PLY or npz of this name: -y, as trainers leave their scenes, but in
-/// Habitat +y.
+/// The usual up axis of a PLY or npz with this name: -y, as trainers leave their scenes, but +y in
+/// Habitat's files.
 inline Vec3d usual_up(const std::string& source) {
   for (const char* name : {".gs.ply", ".3dgs.ply", ".4dgs.ply", ".4dgs.npz"}) {
     if (source.ends_with(name)) return {0, 1, 0};
@@ -17,7 +17,7 @@ inline Vec3d usual_up(const std::string& source) {
   return {0, -1, 0};
 }
 
-/// Completes the report of a cloud that has been read.
+/// Completes the report of a cloud that was read.
 inline Result<LoadedCloud> described(Result<LoadedCloud> loaded, const Vec3d& usual = {0, -1, 0}) {
   if (loaded) describe(loaded->cloud, loaded->report, usual);
   return loaded;

@@ -22,9 +22,9 @@ using detail::member;
 using detail::must_be;
 
 constexpr std::size_t kLeastText = std::size_t{1} << 16;
-constexpr std::size_t kMostText = std::size_t{1} << 30;  // a million episodes are half of it
+constexpr std::size_t kMostText = std::size_t{1} << 30;  // a million episodes take half of it
 
-/// The text of a file, decompressed where it begins as gzip does.
+/// The text of a file, decompressed if it is gzip.
 Result<std::vector<std::byte>> load_text(const fs::path& path, const ReadLimits& limits) {
   const auto file = detail::read_file(path);
   if (!file) return file.status();
@@ -40,7 +40,7 @@ Result<std::vector<std::byte>> load_text(const fs::path& path, const ReadLimits&
   while (!gzip.at_end()) {
     const std::size_t before = text.size();
     const std::size_t room = std::min(std::max(2 * before, kLeastText), most + 1);
-    text.reserve(room);  // resize() alone may take twice as much
+    text.reserve(room);  // resize() alone may allocate twice this size
     text.resize(room);
     const std::size_t got = gzip.read(std::span(text).subspan(before));
     text.resize(before + got);
@@ -203,15 +203,14 @@ Status save_episodes(const fs::path& path, std::span<const PointNavEpisode> epis
           {"goal_radius", is_finite(e.goal_radius)},
           {"geodesic_distance", is_finite(e.geodesic_distance)},
           {"start_time", is_finite(e.start_time)}};
-      for (const auto& [field, ok] : finite) {  // JSON has no such numbers
+      for (const auto& [field, ok] : finite) {  // JSON cannot express such numbers
         if (!ok) {
           return {Errc::invalid_argument,
                   path.string() + ": episode \"" + e.id + "\": " + field + " is not finite"};
         }
       }
       Json info{{"geodesic_distance", e.geodesic_distance}};
-      if (e.start_time != 0)
-        info["start_time"] = e.start_time;  // a place that Habitat-Lab leaves to everyone
+      if (e.start_time != 0) info["start_time"] = e.start_time;  // a key that Habitat-Lab ignores
       list.push_back(
           {{"episode_id", e.id},
            {"scene_id", e.scene_id},

@@ -98,7 +98,7 @@ void remove_stale_caches(const std::filesystem::path& path) noexcept {
       if (cache && entry.is_regular_file(error) && entry.last_write_time(error) < newest && !error)
         fs::remove(entry.path(), error);
     }
-  } catch (...) {  // no memory, a folder that vanishes: they stay until the next time
+  } catch (...) {  // no memory, or a folder that vanished: the files stay until the next time
   }
 }
 

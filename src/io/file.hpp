@@ -17,17 +17,18 @@
 
 namespace gsnav::io::detail {
 
-/// A whole file in memory, not zeroed before it is read.
+/// A whole file in memory. The memory is not zeroed before reading.
 struct FileBytes {
   std::unique_ptr<std::byte[]> data;
   std::size_t size = 0;
   std::span<const std::byte> span() const noexcept { return {data.get(), size}; }
 };
 
-/// Reads a regular file. Folders, pipes and devices are refused: reading one could wait for ever.
+/// Reads a regular file. Folders, pipes and devices are refused, because reading one could block for
+/// ever.
 Result<FileBytes> read_file(const std::filesystem::path& path);
 
-/// A regular file of which pieces are read, by any number of threads.
+/// A regular file that any number of threads may read at once.
 class RandomFile {
  public:
   RandomFile() = default;
@@ -35,10 +36,10 @@ class RandomFile {
   RandomFile& operator=(const RandomFile&) = delete;
   ~RandomFile();
 
-  /// Errors as of read_file.
+  /// Errors: those of read_file.
   Status open(const std::filesystem::path& path);
   std::uint64_t size() const noexcept { return size_; }
-  /// Fills `out` from `offset` on; false where the file ends before or cannot be read.
+  /// Fills `out` from `offset` on. Returns false if the file ends too early or cannot be read.
   bool read(std::uint64_t offset, std::span<std::byte> out) const;
 
  private:
@@ -46,8 +47,8 @@ class RandomFile {
   std::uint64_t size_ = 0;
 };
 
-/// Bytes to read from: of memory, or of a file, piece by piece, by any number of threads. What it is
-/// made of must outlive it.
+/// Bytes in memory or in a file, which any number of threads may read at once. The memory or file must
+/// outlive it.
 class ByteSource {
  public:
   ByteSource() = default;
@@ -55,14 +56,14 @@ class ByteSource {
   ByteSource(const RandomFile& file) : file_(&file), size_(file.size()) {}
 
   std::uint64_t size() const noexcept { return size_; }
-  /// The n bytes from `offset` on, which must be inside: where they lie, or read into `room`. Null:
-  /// reading failed.
+  /// The n bytes from `offset` on, which must be in range: a pointer to memory, or to `room` after
+  /// reading into it. Null if reading failed.
   const std::byte* get(std::uint64_t offset, std::size_t n, std::vector<std::byte>& room) const {
     if (file_ == nullptr) return bytes_ + offset_ + offset;
-    if (room.size() <= n) room.resize(n + 1);  // no bytes lie somewhere too
+    if (room.size() <= n) room.resize(n + 1);  // never empty, so that data() is not null even for n = 0
     return file_->read(offset_ + offset, {room.data(), n}) ? room.data() : nullptr;
   }
-  /// Part of it, which must be inside.
+  /// A part of it, which must be in range.
   ByteSource part(std::uint64_t offset, std::uint64_t size) const noexcept {
     ByteSource out = *this;
     out.offset_ += offset;
@@ -76,21 +77,21 @@ class ByteSource {
   std::uint64_t offset_ = 0, size_ = 0;
 };
 
-/// What is said where ByteSource::get fails.
+/// The error for a failure of ByteSource::get.
 inline Status reading_failed(const std::string& source) {
   return {Errc::invalid_file, source + ": reading failed, or the file became shorter"};
 }
 
-/// What is wrong with a file's content.
+/// The error for a file with bad content.
 inline Status invalid_file(const std::filesystem::path& path, const std::string& what) {
   return {Errc::invalid_file, path.string() + ": " + what};
 }
 
-/// Beside what files made of a scene lie: its own path; of tiles, the first one's. `spec` as of
-/// load_scene.
+/// Base path of the files that are cached next to a scene: the scene's own path; for several tiles, that
+/// of the first. `spec` is that of load_scene.
 std::string path_beside(const std::string& spec);
 
-/// Runs `f`, turning a failed allocation into a Status; `what` names the file.
+/// Runs `f` and turns a failed allocation into a Status; `what` names the file.
 template <class F>
 auto guarded(const std::string& what, F&& f) -> decltype(f()) {
   try {
@@ -104,7 +105,7 @@ auto guarded(const std::string& what, F&& f) -> decltype(f()) {
   }
 }
 
-/// Hands what was freed back to the system: glibc keeps it, and large arrays are never made of it.
+/// Returns freed memory to the system. glibc keeps it otherwise, and never reuses it for large arrays.
 void give_back_memory() noexcept;
 
 /// Reads a little-endian value at `p`, which need not be aligned.
@@ -115,7 +116,8 @@ T load_le(const std::byte* p) noexcept {
   return value;
 }
 
-/// Text from a file for an error message: control characters replaced, cut where long.
+/// Text from a file, prepared for an error message: control characters are replaced, and long text is
+/// cut.
 std::string in_quotes(std::string_view text);
 
 }  // namespace gsnav::io::detail

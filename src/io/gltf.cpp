@@ -139,7 +139,7 @@ class SplatReader {
     return parse_spz(*bytes, where, {.keep_axes = true});
   }
 
-  /// Attribute `name`; the first one read says how many there are.
+  /// Reads attribute `name`. The first attribute of a primitive determines the number of rows.
   Status read(const Json& attributes, const std::string& name, const char* type,
               const std::string& where, GltfValues& out) {
     const auto index = detail::get_index(attributes, name.c_str(), detail::kNoIndex, where);
@@ -150,7 +150,7 @@ class SplatReader {
     if (name == "POSITION") {
       count_ = values->size();
       total_ += count_;
-      // Nodes may share a mesh: a small file could ask for any number of copies.
+      // Nodes may share a mesh, so a small file could ask for any number of copies.
       if (total_ > file_.size()) {
         return {Errc::invalid_file, where + ": more Gaussians than the file has bytes"};
       }
@@ -213,7 +213,7 @@ class SplatReader {
     return out;
   }
 
-  /// Row i of blocks of means, quaternions (x y z w), scales, opacities and the SH coefficients.
+  /// Adds row i of the blocks: means, quaternions (x y z w), scales, opacities and SH coefficients.
   static void add(const std::vector<std::vector<double>>& block, std::size_t i,
                   detail::CloudSink& sink) {
     std::array<float, 45> rest;
@@ -228,7 +228,7 @@ class SplatReader {
         rest[3 * (b - 5) + k] = static_cast<float>(block[b][3 * i + k]);
       }
     }
-    const double opacity = block[3][i];  // outside of [0, 1]: NaN, dropped
+    const double opacity = block[3][i];  // outside of [0, 1]: NaN, so the row is dropped
     raw.opacity_logit = std::log(opacity / (1 - opacity));
     const double* q = &block[1][4 * i];
     raw.quat = {q[3], q[0], q[1], q[2]};
@@ -245,7 +245,7 @@ class SplatReader {
 bool gltf_holds_gaussians(const std::filesystem::path& path) {
   detail::RandomFile file;
   if (!file.open(path)) return false;
-  std::array<char, 20> front{};  // of a GLB: its header and that of its first chunk, the JSON
+  std::array<char, 20> front{};  // start of a GLB: its header and that of its first chunk, the JSON
   std::uint64_t from = 0, size = file.size();
   if (size >= front.size() && file.read(0, std::as_writable_bytes(std::span(front))) &&
       std::memcmp(front.data(), "glTF", 4) == 0) {

@@ -15,7 +15,7 @@ constexpr std::size_t kGlbHeader = 12, kChunkHeader = 8;
 constexpr std::int64_t kMostIndex = 0xffffffff;
 constexpr std::int64_t kMostBytes = std::int64_t{1} << 50;
 
-/// The bytes of base64 text; false where it is none.
+/// Decodes base64 text. Returns false if it is malformed.
 bool decode_base64(std::string_view text, std::vector<std::byte>& out) {
   std::array<std::int8_t, 256> value;
   value.fill(-1);
@@ -24,7 +24,7 @@ bool decode_base64(std::string_view text, std::vector<std::byte>& out) {
   for (std::size_t k = 0; k < kDigits.size(); ++k) {
     value[static_cast<unsigned char>(kDigits[k])] = static_cast<std::int8_t>(k);
   }
-  value['-'] = 62;  // as in URLs
+  value['-'] = 62;  // the alphabet of URLs
   value['_'] = 63;
   while (!text.empty() && text.back() == '=') text.remove_suffix(1);
   out.reserve(text.size() / 4 * 3 + 3);
@@ -42,7 +42,7 @@ bool decode_base64(std::string_view text, std::vector<std::byte>& out) {
   return true;
 }
 
-/// Text in which "%20" and the like stand for bytes.
+/// Text with "%20" and the like replaced by the bytes they stand for.
 std::string percent_decoded(const std::string& text) {
   const auto hex = [](char c) {
     const int low = c | 32;
@@ -60,7 +60,7 @@ std::string percent_decoded(const std::string& text) {
   return out;
 }
 
-/// Whether an extension leaves arrays and nodes what they are without it.
+/// Whether arrays and nodes keep their meaning if this extension is ignored.
 bool is_readable_extension(const std::string& name) {
   for (const char* prefix : {"KHR_materials_", "KHR_gaussian_splatting", "KHR_lights_"}) {
     if (name.starts_with(prefix)) return true;
@@ -162,7 +162,7 @@ Status GltfFile::check_asset() const {
 
 Result<std::filesystem::path> GltfFile::beside(const std::string& uri, const std::string& at) const {
   const std::string name = percent_decoded(uri);
-  // A file must not name others outside its own folder.
+  // A file must not name files outside its own folder.
   if (!is_safe_name(name)) {
     return {Errc::invalid_file, at + ": 'uri' is " + in_quotes(uri) + ": no file beside it or below"};
   }

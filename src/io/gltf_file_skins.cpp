@@ -9,7 +9,7 @@
 namespace gsnav::io::detail {
 namespace {
 
-/// The skin that a node's mesh is moved by, or kNoNode.
+/// The skin that moves a node's mesh, or kNoNode.
 std::size_t skin_of(const Json& node, std::size_t skins) {
   const Json* which = member(node, "skin");
   if (which == nullptr || !which->is_number() || member(node, "mesh") == nullptr) return kNoNode;
@@ -18,7 +18,7 @@ std::size_t skin_of(const Json& node, std::size_t skins) {
                                                                         : kNoNode;
 }
 
-/// Fills in loads and numbers of vertices. What is wrong with the arrays is found by read_surface.
+/// Fills in loads and numbers of vertices. Bad arrays are ignored here; read_surface reports them.
 void weigh_joints(const GltfFile& file, std::vector<FileSkin>& skins) {
   std::vector<FileSkin*> of(file.count("skins"), nullptr);
   for (FileSkin& s : skins) of[s.index] = &s;
@@ -92,7 +92,7 @@ Result<FileSkin> read_file_skin(const GltfFile& file, const GltfNodes& nodes, st
   return out;
 }
 
-/// The indices that `wanted` stands for; all that move a mesh where it is empty, or the first.
+/// Indices of the skins in `wanted`. If it is empty: all skins that move a mesh, or else the first skin.
 Result<std::vector<std::size_t>> wanted_skins(const GltfFile& file,
                                               const std::vector<std::string>& wanted) {
   const std::size_t count = file.count("skins");

@@ -13,7 +13,7 @@ namespace gsnav::io::detail {
 namespace {
 
 constexpr int kRepeat = 10497;
-/// Squares of ReadLimits::texture_side that all textures of a file may fill.
+/// Pixels that all textures of a file may have together, in squares of ReadLimits::texture_side.
 constexpr std::size_t kMostLargest = 8;
 
 /// Extension `name` of an object, or null.
@@ -126,7 +126,7 @@ Status GltfMaterials::read_uv_map(const Json& transform, const std::string& at,
   const auto set = get_index(transform, "texCoord", out.texcoord, at);
   if (!set) return set.status();
   out.texcoord = *set;
-  // Scaled, turned counter-clockwise as one sees it (v points down), moved.
+  // Scale, rotate (counter-clockwise as seen, since v points down), then move.
   const double c = std::cos(angle), s = std::sin(angle);
   out.uv_map = {c * scale[0], s * scale[1], offset[0], -s * scale[0], c * scale[1], offset[1]};
   return {};
@@ -143,7 +143,7 @@ Result<std::int32_t> GltfMaterials::picture(const Json& texture, std::size_t ind
   const auto source = file_.index(holder, "source", "images", at);
   if (!source) return source.status();
   if (const auto have = texture_of_.find(*source); have != texture_of_.end()) return have->second;
-  // A small picture may have many pixels, and a file many pictures, of the same bytes even.
+  // A small file may have many pixels, or many textures of the same bytes.
   const auto side = static_cast<std::size_t>(file_.limits().texture_side);
   if (pixels_ >= kMostLargest * side * side) {
     warnings_.push_back(

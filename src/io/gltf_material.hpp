@@ -12,26 +12,27 @@
 
 namespace gsnav::io::detail {
 
-/// A material's base colour.
+/// The base colour of a material.
 struct GltfMaterial {
   SurfaceMaterial surface;
-  std::size_t texcoord = 0;                        ///< the TEXCOORD_n that its texture is looked up by
-  std::array<double, 6> uv_map{1, 0, 0, 0, 1, 0};  ///< u' = m0 u + m1 v + m2, v' = m3 u + m4 v + m5
+  std::size_t texcoord = 0;                        ///< The TEXCOORD_n of its texture.
+  std::array<double, 6> uv_map{1, 0, 0, 0, 1, 0};  ///< KHR_texture_transform: u' = m0 u + m1 v + m2, v'
+                                                   ///< = m3 u + m4 v + m5.
 
   std::array<double, 2> uv(double u, double v) const noexcept {
     return {uv_map[0] * u + uv_map[1] * v + uv_map[2], uv_map[3] * u + uv_map[4] * v + uv_map[5]};
   }
 };
 
-/// Reads materials and their pictures, each picture once: PNG, JPEG or WebP, in the file or beside it.
+/// Reads materials and their images, each image once: PNG, JPEG or WebP, in the file or next to it.
 class GltfMaterials {
  public:
-  /// Pictures are put behind `textures`; what is left out or taken otherwise is said in `warnings`.
+  /// Appends images to `textures`, and a line to `warnings` for each thing left out or changed.
   GltfMaterials(const GltfFile& file, std::vector<TextureImage>& textures,
                 std::vector<std::string>& warnings)
       : file_(file), textures_(textures), warnings_(warnings) {}
 
-  /// Entry `index` of "materials". Errors: invalid_file, file_not_found.
+  /// Reads entry `index` of "materials". Errors: invalid_file, file_not_found.
   Result<GltfMaterial> read(std::size_t index);
 
  private:
@@ -43,8 +44,9 @@ class GltfMaterials {
   const GltfFile& file_;
   std::vector<TextureImage>& textures_;
   std::vector<std::string>& warnings_;
-  std::map<std::size_t, std::int32_t> texture_of_;  ///< of images that were read, -1 where one cannot be
-  std::size_t pixels_ = 0;                          ///< of all textures
+  std::map<std::size_t, std::int32_t> texture_of_;  ///< Texture of each image that was read; -1 if it
+                                                    ///< could not be read.
+  std::size_t pixels_ = 0;                          ///< Number of pixels of all textures.
 };
 
 }  // namespace gsnav::io::detail

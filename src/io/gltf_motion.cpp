@@ -15,16 +15,16 @@ namespace {
 
 enum class Blend : std::uint8_t { linear, step, cubic };
 
-/// Keys of one property of one node.
+/// The keys of one property of one node.
 struct Channel {
   std::size_t node = 0, width = 3;
   char target = 't';  // t, r or s
   Blend blend = Blend::linear;
   std::vector<double> times;
-  std::vector<double> values;  // [times][width], or [times][3][width] for cubic ones
+  std::vector<double> values;  // [times][width], or [times][3][width] for cubic splines
 };
 
-/// The channel at `time`, by the formulas of glTF 2.0, appendix C.
+/// Value of the channel at `time`, by the formulas of glTF 2.0, appendix C.
 std::array<double, 4> sample(const Channel& c, double time) {
   const std::size_t n = c.times.size(), w = c.width;
   const std::size_t stride = c.blend == Blend::cubic ? 3 * w : w,
@@ -114,9 +114,9 @@ Result<std::vector<Channel>> read_channels(const GltfFile& file, const Json& ani
   return out;
 }
 
-/// Rate and number of keys from time 0 on: the keys' own where they lie at equal times, else `rate`'s.
+/// Rate and number of keys from time 0 on: those of the keys, if they are evenly spaced, else at `rate`.
 struct Grid {
-  double first = 0.0, rate = 60.0;  // first: the time of the first key
+  double first = 0.0, rate = 60.0;  // first: time of the first key
   std::size_t keys = 1;
 };
 
@@ -133,7 +133,7 @@ Grid grid_of(const std::vector<Channel>& channels, double rate) {
   times.insert(0.0);
   const double length = *times.rbegin();
   if (!(length > 0)) return out;
-  // The least step; sets hold times that differ by a rounding too.
+  // Find the least step. The set may contain times that differ only by rounding.
   double step = length;
   for (auto a = times.begin(), b = std::next(a); b != times.end(); ++a, ++b) {
     if (*b - *a > 1e-4) step = std::min(step, *b - *a);
@@ -160,7 +160,7 @@ Status read_clips(const GltfFile& file, const GltfSkin& skin, const GltfNodes& n
     if (!channels) return channels.status();
     GltfNodes posed = nodes;
     for (const Channel& c : *channels) {
-      // An animated node must not have a matrix; what has one is taken by its other members.
+      // An animated node must not have a matrix. If it has one, use its other members.
       posed.nodes[c.node].has_matrix = false;
     }
     const Grid grid = grid_of(*channels, frame_rate);

@@ -52,7 +52,7 @@ Result<std::size_t> read_node_index(const Json& value, std::size_t nodes, const 
   return static_cast<std::size_t>(k);
 }
 
-/// The nodes that the file's scene lists.
+/// The root nodes of the file's scene, or of all nodes if there is no scene.
 Result<std::vector<std::size_t>> scene_roots(const GltfFile& file, const GltfNodes& tree) {
   std::vector<std::size_t> out;
   if (file.count("scenes") == 0) {

@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-// One rig of the skins of a glTF file, and the rigid skeleton made of it.
+// SPDX-License-Identifier: Apache-2.0 The rig that the skins of a glTF file share, and the rigid
+// skeleton made from it.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -12,7 +12,8 @@
 namespace gsnav::io::detail {
 namespace {
 
-/// A rotation times a scale; `off` is how far the linear part is from that, relative.
+/// A linear map split into a rotation and a scale. `off` is the relative distance of the map from that
+/// product.
 struct ScaledLinear {
   Mat3d rotation;
   double scale = 0.0, off = 1.0;
@@ -34,8 +35,8 @@ ScaledLinear scaled_rotation_of(const Mat3d& m) {
   return out;
 }
 
-/// The rotation of multiples of 90 degrees that is within 30 degrees of `m`, else `m`. Meshes are bound
-/// upright, whatever the pose that the file shows.
+/// The rotation by multiples of 90 degrees that is within 30 degrees of `m`, or else `m`. Meshes are
+/// bound upright, whatever pose the file shows.
 Mat3d squared(const Mat3d& m) {
   Mat3d out;
   for (int i = 0; i < 3; ++i) {
@@ -54,7 +55,7 @@ Affine3<double> inverse_of(const Affine3<double>& m) {
   return {inverse, -(inverse * m.translation)};
 }
 
-/// Equal but for rounding of float32 numbers on the way.
+/// Whether two maps are equal up to float32 rounding in the file.
 bool nearly(const Affine3<double>& a, const Affine3<double>& b, double tolerance) {
   double size = 0.0, off = 0.0;
   for (int i = 0; i < 3; ++i) {
@@ -67,13 +68,14 @@ bool nearly(const Affine3<double>& a, const Affine3<double>& b, double tolerance
   return off <= tolerance * size && norm(a.translation - b.translation) <= tolerance * (far + size);
 }
 
-/// Joints of several skins by node, with the first skin's inverse binds.
+/// The joints of several skins, indexed by node, with inverse binds in the space of the first skin.
 class SharedRig {
  public:
   explicit SharedRig(std::size_t nodes)
       : binds(nodes), loads(nodes, 0.0), there(nodes, false), joint(nodes, 0) {}
 
-  /// Adds a skin where it fits; `rig_from_mesh` takes its vertices to the first skin's space.
+  /// Adds a skin if it fits. `rig_from_mesh` gets the map from its vertices to the space of the first
+  /// skin.
   bool join(const FileSkin& s, Affine3<double>& rig_from_mesh) {
     std::vector<std::size_t> both, any;
     for (std::size_t j = 0; j < s.nodes.size(); ++j) {
@@ -101,7 +103,8 @@ class SharedRig {
     const Affine3<double> mesh_from_rig = inverse_of(rig_from_mesh);
     for (std::size_t j = 0; j < s.nodes.size(); ++j) {
       const std::size_t n = s.nodes[j];
-      // What moves nothing may have any bind; the one that moves something counts.
+      // A joint that moves nothing may have any bind, so prefer the bind of a skin in which it moves
+      // something.
       if (!there[n] || (!(loads[n] > 0) && s.loads[j] > 0)) binds[n] = s.binds[j] * mesh_from_rig;
       there[n] = true;
       loads[n] += s.loads[j];
@@ -110,10 +113,10 @@ class SharedRig {
     return true;
   }
 
-  std::vector<Affine3<double>> binds;  // [nodes], as the rest
+  std::vector<Affine3<double>> binds;  // [nodes], as are the next three
   std::vector<double> loads;
   std::vector<bool> there;
-  std::vector<std::size_t> joint;  // of the skeleton
+  std::vector<std::size_t> joint;  // index in the skeleton
 
  private:
   bool empty_ = true;
@@ -131,10 +134,11 @@ std::vector<std::string> joint_names(const GltfNodes& nodes, const std::vector<s
   return out;
 }
 
-/// The skeleton of the rig's joints, `load` of which each has, and the pose that its mesh is bound in.
+/// Makes the skeleton of the rig's joints, and the pose in which its mesh is bound. `load` is the total
+/// weight of each joint.
 Status bind_skeleton(const GltfNodes& nodes, const SharedRig& rig, const std::vector<double>& load,
                      const std::string& at, GltfSkin& out) {
-  // What the mesh is bound to is what the joint that moves most of it says.
+  // The frame of the mesh follows from the joint that moves most of it.
   const auto most = static_cast<std::size_t>(std::max_element(load.begin(), load.end()) - load.begin());
   const std::vector<Affine3<double>> globals = nodes.globals();
   const Affine3<double> placed_by = globals[out.nodes[most]] * out.inverse_binds[most];
@@ -162,8 +166,8 @@ Status bind_skeleton(const GltfNodes& nodes, const SharedRig& rig, const std::ve
     skeleton.inverse_binds.push_back({b.rotation * back, out.inverse_binds[j].translation *
                                                              (placed.scale / std::max(b.scale, 1e-12))});
   }
-  // Joints that move nothing may have any bind: they keep the place that the file shows them in beside
-  // one that does.
+  // Joints that move nothing may have any bind. Bind them where the file shows them, relative to a joint
+  // that moves something.
   const std::vector<Affine3<double>> shown_at = rigid_joints(out, globals);
   for (std::size_t j = 0; j < out.nodes.size(); ++j) {
     if (load[j] > 0) continue;

@@ -19,15 +19,15 @@ using detail::Json;
 constexpr const char* kExtension = "KHR_gaussian_splatting";
 constexpr std::size_t kMostBytes = 0xfffffff0;  // lengths have 32 bits
 
-/// One attribute: `components` floats a Gaussian, which `get(i, k)` gives.
+/// An attribute: `get(i, k)` is component k of Gaussian i.
 struct Attribute {
   std::string name;
   std::size_t components = 1;
   std::function<float(std::size_t, std::size_t)> get;
 };
 
-/// Half a turn about z, where `turned`: x and y change their signs, and with them each basis function of
-/// odd order.
+/// The attributes of a cloud. If `turned`, they are rotated by half a turn about z: x and y change sign,
+/// and so does every basis function of odd order.
 std::vector<Attribute> attributes_of(const GaussianCloud& cloud, const Vec3d& origin, bool turned) {
   const std::string prefix = std::string(kExtension) + ":";
   std::vector<Attribute> out;
@@ -36,7 +36,7 @@ std::vector<Attribute> attributes_of(const GaussianCloud& cloud, const Vec3d& or
                    return static_cast<float>(turned && k < 2 ? -v : v);
                  }});
   out.push_back({prefix + "ROTATION", 4, [&cloud, turned](std::size_t i, std::size_t k) {
-                   // x y z w of q, or of the half turn times q.
+                   // x y z w of q, or of the half turn times q
                    static constexpr std::size_t kPlain[] = {1, 2, 3, 0}, kTurned[] = {2, 1, 0, 3};
                    if (!turned) return cloud.quats[kPlain[k]][i];
                    const float v = cloud.quats[kTurned[k]][i];
@@ -62,7 +62,7 @@ std::vector<Attribute> attributes_of(const GaussianCloud& cloud, const Vec3d& or
   return out;
 }
 
-/// Smallest and largest position, which glTF demands.
+/// Adds the least and greatest position, which glTF demands.
 void add_bounds(Json& accessor, const Attribute& position, std::size_t n) {
   std::array<float, 3> low, high;
   for (std::size_t k = 0; k < 3; ++k) {

@@ -31,8 +31,8 @@ Mat3d adjugate_transposed(const Mat3d& m) {
   return out;
 }
 
-/// Applies a transform to a part: normals by its cofactors, which keep them upright, triangles turned
-/// round where it mirrors. False where a vertex is then not finite.
+/// Applies a transform to a part. Normals transform by the cofactors, which keeps them perpendicular;
+/// triangles are reversed if the transform mirrors. Returns false if a vertex is then not finite.
 bool transform(TexturedPart& part, const Affine3<double>& a) {
   const bool mirrored = determinant(a.linear) < 0;
   const Mat3d cofactors = adjugate_transposed(a.linear) * (mirrored ? -1.0 : 1.0);
@@ -73,7 +73,7 @@ class SceneReader {
   }
 
  private:
-  /// A part that only uneven nodes show is there in their copies.
+  /// Removes parts without an instance: uneven nodes have transformed copies of them.
   void drop_unused() {
     std::vector<std::size_t> place(out_.parts.size(), kUnused);
     for (const auto& instance : out_.instances) place[instance.part] = 0;
@@ -127,7 +127,8 @@ class SceneReader {
     return {};
   }
 
-  /// Accessors and meshes may be shared: a small file could ask for any number of copies.
+  /// Keeps a part. Accessors and meshes may be shared, so a small file could ask for any number of
+  /// copies.
   Status keep(TexturedPart part, const std::string& at) {
     held_ += part.geometry.vertices.size() + part.geometry.triangles.size();
     if (held_ > 2 * file_.size()) {
@@ -200,7 +201,7 @@ class SceneReader {
   const GltfFile& file_;
   TexturedScene out_;
   detail::GltfMaterials materials_;
-  std::map<std::size_t, std::vector<std::size_t>> parts_of_;  ///< of each mesh that is shown
+  std::map<std::size_t, std::vector<std::size_t>> parts_of_;  ///< parts of each mesh in use
   std::map<std::size_t, GltfMaterial> material_of_;
   std::size_t held_ = 0;  ///< vertices and triangles of all parts
 };

@@ -12,7 +12,7 @@ namespace gsnav::io {
 namespace detail {
 namespace {
 
-/// Compares the file's own skinning with that by rigid joints.
+/// Compares the file's own skinning with skinning by rigid joints.
 class RigidError final : public PoseObserver {
  public:
   RigidError(const GltfSkin& skin, const SkinnedMesh& mesh) : skin_(skin), mesh_(mesh) {
@@ -54,7 +54,7 @@ struct NoObserver final : PoseObserver {
   void look(const std::vector<Affine3<double>>&) override {}
 };
 
-/// The node of a joint's name, which joint_names may have given a number; or kNoNode.
+/// The node that a joint is named after, or kNoNode. joint_names may have added a number to the name.
 std::size_t node_called(const std::map<std::string, std::vector<std::size_t>>& by_name,
                         const std::string& joint) {
   if (const auto exact = by_name.find(joint); exact != by_name.end()) return exact->second[0];

@@ -111,7 +111,7 @@ class SurfaceReader {
     return {};
   }
 
-  /// Appends the primitive's material, white where it names none.
+  /// Reads the primitive's material; white if it has none.
   Status read_material(const Json& primitive, const std::string& at, GltfMaterial& out) {
     if (member(primitive, "material") != nullptr) {
       const auto index = file_.index(primitive, "material", "materials", at);
@@ -200,7 +200,7 @@ class SurfaceReader {
   LoadedSkinnedMesh& out_;
   SkinnedMesh& mesh_;
   GltfMaterials materials_;
-  const GltfSkinPart* part_ = nullptr;  // of the mesh that is read
+  const GltfSkinPart* part_ = nullptr;  // the skin of the mesh that is being read
   std::size_t vertices_ = 0, others_ = 0;
   bool has_uvs_ = false, has_colors_ = false;
   std::vector<std::array<double, 2>> uvs_;

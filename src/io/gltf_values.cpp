@@ -37,7 +37,8 @@ std::size_t components_of(const std::string& type) {
   return type == "MAT4" ? 16 : 0;
 }
 
-/// n elements of `width` numbers of type T, each times `scale` and at least -1 where that is not 1.
+/// Reads n elements of `width` numbers of type T, multiplied by `scale`. If `scale` is not 1, results
+/// are at least -1.
 template <class T>
 void unpack_as(const std::byte* from, std::size_t n, std::size_t stride, std::size_t width, double scale,
                double* out) {
@@ -82,7 +83,7 @@ bool GltfValues::unpack(std::size_t first, std::size_t n, std::vector<std::byte>
   return true;
 }
 
-/// Finds the bytes of `values`, whose count, type and components are there, by the "bufferView" and
+/// Finds the bytes of `values`, whose count, type and components are set, by the "bufferView" and
 /// "byteOffset" of `part`: an accessor, or the indices or values of a sparse one.
 Status GltfFile::locate(const Json& part, const std::string& where, GltfValues& values) const {
   const auto view_index = index(part, "bufferView", "bufferViews", where);
@@ -138,7 +139,7 @@ Result<GltfValues> GltfFile::values(std::size_t accessor, const std::string& typ
   if (member(json, "bufferView") != nullptr) {
     if (Status s = locate(json, at, out); !s) return s;
   } else if (sparse == nullptr || out.count_ > size_) {
-    // Zeros that nothing in the file stands for could be any number.
+    // The file holds no data for such zeros, so there could be any number of them.
     return {Errc::unsupported, at + ": without a buffer view: not read"};
   }
   if (sparse != nullptr) {
@@ -147,7 +148,7 @@ Result<GltfValues> GltfFile::values(std::size_t accessor, const std::string& typ
   return out;
 }
 
-/// Copies the elements, zeros where there are none, and puts those of `sparse` over them.
+/// Copies the elements (zeros if there are none) and overwrites those that `sparse` lists.
 Status GltfFile::apply_sparse(const Json& sparse, const std::string& where, GltfValues& values) const {
   const auto count = get_integer(sparse, "count", 0, static_cast<std::int64_t>(values.count_), where);
   if (!count) return count.status();

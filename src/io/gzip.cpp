@@ -39,7 +39,7 @@ std::size_t GzipReader::read(std::span<std::byte> out) {
     const std::size_t room = std::min(out.size() - done, kMostAtOnce);
     stream_.next_out = reinterpret_cast<Bytef*>(out.data() + done);
     stream_.avail_out = static_cast<uInt>(room);
-    code_ = inflate(&stream_, Z_NO_FLUSH);  // Z_BUF_ERROR, no progress, where the stream is cut
+    code_ = inflate(&stream_, Z_NO_FLUSH);  // Z_BUF_ERROR (no progress) if the stream is truncated
     done += room - stream_.avail_out;
   }
   return done;

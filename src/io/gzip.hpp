@@ -11,32 +11,32 @@
 
 namespace gsnav::io::detail {
 
-/// Decompresses a gzip stream in memory or in a file, piece by piece: who reads says how much is
-/// believed.
+/// Decompresses a gzip stream from memory or a file, piece by piece. The caller decides how much output
+/// to accept.
 class GzipReader {
  public:
-  /// What the bytes lie in must outlive the reader.
+  /// The memory or file must outlive the reader.
   explicit GzipReader(const ByteSource& packed);
   GzipReader(const GzipReader&) = delete;
   GzipReader& operator=(const GzipReader&) = delete;
   ~GzipReader();
 
-  /// Fills `out` as far as the stream goes; returns how many bytes that were. Fewer than asked for:
-  /// the stream ended, was cut or is damaged.
+  /// Fills `out` with the next bytes of the stream and returns their number. It is less than asked for
+  /// if the stream ended, is truncated or damaged.
   std::size_t read(std::span<std::byte> out);
 
-  /// Whether the stream's end was reached and its checksum fits.
+  /// Whether the end of the stream was reached and its checksum is right.
   bool at_end() const noexcept { return code_ == Z_STREAM_END; }
 
  private:
-  ByteSource left_;              ///< not yet given to zlib
-  std::vector<std::byte> room_;  ///< what zlib has, of a file
+  ByteSource left_;              ///< Input not yet given to zlib.
+  std::vector<std::byte> room_;  ///< Bytes of a file that were passed to zlib.
   z_stream stream_{};
   int code_ = Z_OK;
   bool open_ = false;
 };
 
-/// A gzip stream of these bytes; the same for the same bytes. Throws std::bad_alloc.
+/// Compresses bytes to a gzip stream. The same bytes give the same stream. Throws std::bad_alloc.
 std::vector<std::byte> gzip(std::span<const std::byte> bytes);
 
 }  // namespace gsnav::io::detail

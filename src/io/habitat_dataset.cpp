@@ -23,8 +23,8 @@ using namespace habitat;
 constexpr const char* kStage = ".stage_config.json";
 constexpr const char* kScene = ".scene_instance.json";
 
-/// `name` matches a pattern in which `*` stands for any text. Goes back to the last star only: never
-/// long.
+/// Whether `name` matches a pattern in which `*` stands for any text. Backtracks to the last star only,
+/// so the time is bounded.
 bool matches(std::string_view pattern, std::string_view name) {
   std::size_t p = 0, n = 0, star = std::string_view::npos, from = 0;
   while (n < name.size()) {
@@ -43,8 +43,8 @@ bool matches(std::string_view pattern, std::string_view name) {
   return pattern.find_first_not_of('*', p) == std::string_view::npos;
 }
 
-/// Folders and files that a path with patterns stands for, sorted. Errors: unsupported where they are
-/// too many to be meant.
+/// The folders and files that match a path with patterns, sorted. Error: unsupported if there are
+/// implausibly many.
 Result<std::vector<fs::path>> expanded(const fs::path& folder, const fs::path& pattern) {
   constexpr std::size_t kMost = 100000;
   std::vector<fs::path> found{pattern.is_absolute() ? pattern.root_path() : folder};
@@ -112,7 +112,7 @@ class DatasetReader {
   }
 
  private:
-  /// Says which files lie outside of the dataset's folder, where an absolute path or `..` led.
+  /// Warns of files outside the dataset's folder, which an absolute path or `..` can name.
   void warn_of_outside() {
     std::error_code error;
     const fs::path root = fs::weakly_canonical(folder_.empty() ? fs::path(".") : folder_, error);
@@ -130,7 +130,7 @@ class DatasetReader {
     }
   }
 
-  /// The files that `paths` of a part of the dataset stands for.
+  /// The files that match `paths` in a section of the dataset.
   Status files(const Json& json, const char* part, const std::string& ending,
                std::vector<fs::path>& out) {
     const Json* section = member(json, part);
@@ -198,7 +198,7 @@ class DatasetReader {
     return {};
   }
 
-  /// A stage by its handle: a name, maybe with folders before it and an ending.
+  /// The stage with a handle: its name, possibly with folders before and an ending after it.
   const StageConfig* stage(const std::string& handle) const {
     const auto found = stages_.find(name_of(fs::path(handle), kStage));
     return found == stages_.end() ? nullptr : &found->second;

@@ -11,13 +11,13 @@
 #include "gsnav/detail/io/habitat_dataset.hpp"
 #include "json.hpp"
 
-// What the files of a Habitat dataset have in common.
+// Shared by the readers of a Habitat dataset's files.
 
 namespace gsnav::io::habitat {
 
 Result<detail::Json> load_object(const std::filesystem::path& path);
 
-/// Keys that change nothing here, each with the file that had it first.
+/// Keys without effect here, each with the file that had it first.
 class LeftOut {
  public:
   void add(const detail::Json& object, const std::set<std::string_view>& known, const std::string& at) {
@@ -33,10 +33,11 @@ class LeftOut {
   std::map<std::string, std::string> first_;
 };
 
-/// Text of `key`; empty where it is missing.
+/// Text of `key`; empty if it is missing.
 Result<std::string> text(const detail::Json& object, const char* key, const std::string& at);
 
-/// What `object` says about a stage on top of what `out` has; assets lie beside `folder`.
+/// Reads the members of `object` that describe a stage into `out`. Members that are missing keep their
+/// values. Assets are relative to `folder`.
 Status read_stage(const detail::Json& object, const std::filesystem::path& folder, const std::string& at,
                   StageConfig& out, LeftOut& left_out);
 

@@ -99,7 +99,7 @@ Status read_stage(const Json& object, const fs::path& folder, const std::string&
 }  // namespace habitat
 
 Similarity StageConfig::world_from_asset() const noexcept {
-  // The asset's right, up and back become the world's x, y and z.
+  // Map the asset's right, up and back to the world's x, y and z.
   const Vec3d y = normalized(up), z = -normalized(front), x = cross(y, z);
   Similarity out;
   out.rotation = quat_from_matrix(Mat3d{{x, y, z}});

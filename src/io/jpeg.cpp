@@ -11,21 +11,21 @@
 #include <cstdio>
 #include <cstring>
 
-// After <cstdio>, which it needs and does not include.
+// After <cstdio>, which jpeglib.h needs and does not include.
 #include <jpeglib.h>
 
 namespace gsnav::io::detail {
 namespace {
 
 constexpr unsigned kLargestSide = static_cast<unsigned>(kMostJpegSide);
-// Each scan of a progressive picture goes over all of its blocks; encoders write about ten.
+// Each scan of a progressive image visits all of its blocks. Encoders write about ten.
 constexpr int kMostScans = 100;
 
 [[noreturn]] void on_error(j_common_ptr info);
 void on_message(j_common_ptr, int) {}
 void print_message(j_common_ptr) {}
 
-/// Errors jump to where setjmp was called last; messages go nowhere.
+/// An error handler that jumps to the last setjmp and drops messages.
 struct ErrorHandler {
   jpeg_error_mgr base{};
   std::jmp_buf jump{};
@@ -45,7 +45,7 @@ void on_progress(j_common_ptr info) {
   if (reinterpret_cast<j_decompress_ptr>(info)->input_scan_number > kMostScans) on_error(info);
 }
 
-/// Decoder with its own lifetime, so that allocation happens outside of setjmp's reach.
+/// A decoder as an object, so that memory is allocated outside the reach of setjmp.
 class JpegDecoder {
  public:
   JpegDecoder() { info_.err = error_.set_up(); }
@@ -53,7 +53,7 @@ class JpegDecoder {
   JpegDecoder& operator=(const JpegDecoder&) = delete;
   ~JpegDecoder() { jpeg_destroy_decompress(&info_); }
 
-  /// Reads what the picture is; nothing of its size is allocated yet.
+  /// Reads the header. Nothing of the image's size is allocated yet.
   bool read_header(std::span<const std::byte> bytes) {
     if (setjmp(error_.jump) != 0) return false;
     jpeg_create_decompress(&info_);
@@ -87,8 +87,7 @@ class JpegDecoder {
   ErrorHandler error_;
 };
 
-/// Encoder with its own lifetime, as the decoder has; what it writes lies in memory that libjpeg
-/// allocates.
+/// An encoder as an object, like the decoder. Its output is in memory that libjpeg allocates.
 class JpegEncoder {
  public:
   JpegEncoder() { info_.err = error_.set_up(); }
@@ -111,7 +110,7 @@ class JpegEncoder {
     jpeg_set_quality(&info_, quality, TRUE);
     jpeg_start_compress(&info_, TRUE);
     while (info_.next_scanline < info_.image_height) {
-      // libjpeg does not write to the rows that it compresses.
+      // libjpeg does not write to the rows that it compresses, so the cast is safe.
       JSAMPROW row =
           const_cast<JSAMPROW>(rgb) + std::size_t{3} * info_.image_width * info_.next_scanline;
       if (jpeg_write_scanlines(&info_, &row, 1) != 1) return false;
@@ -152,7 +151,7 @@ Result<PngImage> decode_jpeg(std::span<const std::byte> bytes, const std::string
   if (std::max(decoder.width(), decoder.height()) > static_cast<std::size_t>(most_side)) {
     return too_large(name, decoder.width(), decoder.height(), most_side);
   }
-  // An 8 x 8 block of three planes takes a bit of the file each at least.
+  // An 8 x 8 block of three planes takes at least one bit of the file.
   if (decoder.width() * decoder.height() / 512 > bytes.size()) {
     return {Errc::invalid_file, name + ": " + std::to_string(decoder.width()) + " x " +
                                     std::to_string(decoder.height()) + " pixels cannot be in " +

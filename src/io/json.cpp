@@ -8,8 +8,8 @@
 namespace gsnav::io::detail {
 namespace {
 
-/// The byte at which arrays and objects are nested deeper than `most`, or the text's size. Exact for as
-/// much of the text as is JSON; the parser refuses the rest.
+/// The offset at which arrays and objects are nested deeper than `most`, or the size of the text. Exact
+/// for the part of the text that is valid JSON; the parser refuses the rest.
 std::size_t too_deep_at(std::span<const std::byte> text, int most) {
   int depth = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -107,7 +107,7 @@ Result<std::int64_t> get_integer(const Json& object, const char* key, std::int64
                                  std::int64_t high, const std::string& where) {
   const Json* value = member(object, key);
   if (value == nullptr) return missing(key, where);
-  // Some writers put a dot behind every number.
+  // Some writers put a decimal point after every number.
   const double number = value->is_number() ? value->get<double>() : NAN;
   if (!(number >= static_cast<double>(low) && number <= static_cast<double>(high)) ||
       number != std::floor(number)) {

@@ -18,29 +18,31 @@ using detail::load_le;
 
 constexpr std::size_t kHeader = 4096, kSectionHeader = 1024, kBucketCentre = 12;
 
-/// Bytes of a record's fields by compression level; the four bytes of colour follow the quaternion.
+/// Sizes in bytes of a record's fields, by compression level. Four bytes of colour follow
+/// the quaternion.
 struct Level {
-  std::size_t number;   ///< of a coordinate of the position, the scale or the quaternion
-  std::size_t rest;     ///< of an SH coefficient
-  std::uint32_t range;  ///< steps from a bucket's centre to its side, where the section does not say
+  std::size_t number;   ///< Size of a coordinate of the position, the scale or the quaternion.
+  std::size_t rest;     ///< Size of an SH coefficient.
+  std::uint32_t range;  ///< Steps from a bucket's centre to its side, unless the section has its own.
 };
 constexpr std::array<Level, 3> kLevels = {{{4, 4, 1}, {2, 2, 32767}, {2, 1, 32767}}};
 
 struct Section {
-  std::size_t count = 0, capacity = 0;  ///< Gaussians; those of a full bucket
-  std::size_t full = 0, partial = 0;    ///< buckets
-  std::size_t record = 0;               ///< bytes
+  std::size_t count = 0, capacity = 0;  ///< Number of Gaussians, and the size of a full bucket.
+  std::size_t full = 0, partial = 0;    ///< Number of full and of partial buckets.
+  std::size_t record = 0;               ///< Bytes of a record.
   int degree = 0;
   double range = 0, step = 0;
-  std::size_t first = 0;                ///< place of its first Gaussian among all sections'
-  std::vector<std::byte> bucket_bytes;  ///< sizes of its partial buckets, then the centres of all
-  std::vector<std::uint64_t> ends;      ///< of each partial bucket: one past its last Gaussian
+  std::size_t first = 0;                ///< Index of its first Gaussian among those of all sections.
+  std::vector<std::byte> bucket_bytes;  ///< Sizes of its partial buckets, then the centres of all
+                                        ///< buckets.
+  std::vector<std::uint64_t> ends;      ///< For each partial bucket, one past its last Gaussian.
   detail::ByteSource records;
 
   const std::byte* centre(std::size_t bucket) const {
     return bucket_bytes.data() + 4 * partial + bucket * kBucketCentre;
   }
-  /// The bucket of Gaussian i: full ones come first; empty ones hold nothing.
+  /// The bucket of Gaussian i. Full buckets come first; empty ones hold nothing.
   std::size_t bucket_of(std::size_t i) const {
     if (i < full * capacity) return i / capacity;
     return full + static_cast<std::size_t>(std::upper_bound(ends.begin(), ends.end(), i) - ends.begin());
@@ -117,7 +119,7 @@ class KsplatReader {
     return {};
   }
 
-  /// Reads section k, whose data begin at `data`, which is moved to their end.
+  /// Reads section k, whose data begin at `data`. Moves `data` to their end.
   Status read_section(std::size_t k, std::uint64_t& data) {
     std::vector<std::byte> room;
     const std::byte* h = bytes_.get(kHeader + k * kSectionHeader, kSectionHeader, room);
@@ -142,7 +144,7 @@ class KsplatReader {
     }
     s.record = 10 * level_.number + 4 +
                level_.rest * 3 * static_cast<std::size_t>(sh_coefficient_count(s.degree) - 1);
-    // All factors have 32 bits at most, so no sum of these products overflows.
+    // All factors have at most 32 bits, so the sum of these products cannot overflow.
     const std::uint64_t size = 4 * partial + centre * buckets + s.record * most;
     if (size > bytes_.size() - data) {
       return fail(where + std::to_string(most) + " Gaussians in " + std::to_string(buckets) +
@@ -188,7 +190,7 @@ class KsplatReader {
     return rest_low_ + std::to_integer<int>(*p) / 255.0 * (rest_high_ - rest_low_);
   }
 
-  /// Gaussians [from, to) of a section.
+  /// Adds the Gaussians [from, to) of a section.
   Status add_rows(const Section& s, std::size_t from, std::size_t to, detail::CloudSink& sink) const {
     std::vector<std::byte> room;
     for (std::size_t row = from; row < to; row += detail::kRowsAtOnce) {
@@ -221,7 +223,7 @@ class KsplatReader {
     raw.opacity_logit = detail::opacity_logit(std::to_integer<unsigned>(colour[3]));
     std::array<float, 45> rest{};
     raw.shN = rest.data();
-    // Band after band; inside of a band channel after channel.
+    // Bands are stored one after another; within a band, channel after channel.
     const std::byte* p = colour + 4;
     for (std::size_t band = 1; band <= static_cast<std::size_t>(s.degree); ++band) {
       const std::size_t first = band * band - 1, width = 2 * band + 1;

@@ -19,17 +19,17 @@ namespace {
 namespace fs = std::filesystem;
 using detail::invalid_file;
 
-/// Grows with every change of what build_lod makes of a cloud.
+/// Version of the result of build_lod: increase it with every change.
 constexpr std::uint32_t kVersion = 2;
 
-/// What stands at the front; the arrays of for_each_array follow.
+/// Start of the file. The arrays of for_each_array follow.
 struct Header {
   detail::CacheFront front;
-  std::uint64_t checksum;  ///< of the arrays
+  std::uint64_t checksum;  ///< Checksum of the arrays.
 };
 static_assert(sizeof(Header) == 40);
 
-/// A node without the padding that a struct has.
+/// A node without a struct's padding.
 struct Node {
   double low[3], high[3];
   float error, scale_max, opacity_max, grain;
@@ -49,7 +49,7 @@ detail::CacheFront front_of(const GaussianCloud& cloud, const LodSettings& setti
   return {"GSNAVLOD", kVersion, sizeof(Header), hash_of(cloud, settings)};
 }
 
-/// The arrays of a tree that a file has, in its order.
+/// Calls f for the arrays of a tree, in the order of the file.
 template <class Tree, class F>
 void for_each_array(Tree& tree, std::vector<Node>& nodes, const F& f) {
   f(nodes);
@@ -63,7 +63,7 @@ void for_each_array(Tree& tree, std::vector<Node>& nodes, const F& f) {
   f(m.origin_ids);
 }
 
-/// Values that kernels and the cut rely on.
+/// Checks the values that kernels and LodCut rely on.
 Status check(const fs::path& path, const GaussianCloud& m, const std::vector<Node>& nodes,
              std::size_t origins) {
   const auto finite = [](const std::vector<float>& v) {

@@ -85,10 +85,10 @@ class LodReader {
   }
 
  private:
-  /// Rows of one step: index k holds what is drawn k levels above the finest that is there.
-  using Step = std::vector<std::vector<NodeRows>>;  ///< of each file
+  /// Rows of one step. Step k has the rows that are drawn k levels above the finest available one.
+  using Step = std::vector<std::vector<NodeRows>>;  ///< [files]
 
-  /// Reads what the set says; `coarser`: of all levels.
+  /// Reads the set; with `coarser` all of its levels.
   Status read(bool coarser) {
     coarser_ = coarser;
     const auto text = detail::read_file(path_);
@@ -127,7 +127,7 @@ class LodReader {
     return {};
   }
 
-  /// Visits all nodes; the depth of the tree costs no stack.
+  /// Visits all nodes, without recursion, so that a deep tree needs no stack.
   Status walk(const Json& json) {
     const Json* root = detail::member(json, "tree");
     if (root == nullptr) return fail("'tree' is missing");
@@ -171,7 +171,7 @@ class LodReader {
       }
     }
     ++nodes_;
-    // Where a level has no entry, nothing of the node is left at that level.
+    // No entry for the level: nothing of the node is left at that level.
     if (detail::member(lods, std::to_string(options_.level).c_str()) == nullptr) return {};
     if (there.empty()) {
       return {Errc::file_not_found, where + ": no file of any level is there, for instance " + missing};
@@ -185,7 +185,7 @@ class LodReader {
     for (auto next = std::next(chosen); coarser_ && next != there.end(); ++next) {
       const Rows& rows = next->second;
       if (rows.range.count == 0 || rows == chosen->second)
-        continue;  // nothing is left, or nothing is coarser
+        continue;  // nothing is left at this level, or it is not coarser
       if (++step == steps_.size()) steps_.emplace_back(files_.size());
       steps_[step][rows.file].push_back({rows.range, node});
       chosen = next;
@@ -193,7 +193,7 @@ class LodReader {
     return {};
   }
 
-  /// Nodes that share rows would let a small set name any number of Gaussians.
+  /// Nodes that share rows would let a small set ask for any number of Gaussians.
   Status check_overlaps() {
     for (std::size_t f = 0; f < files_.size(); ++f) {
       std::vector<RowRange> ranges;
@@ -225,8 +225,8 @@ class LodReader {
     return {};
   }
 
-  /// Rows of a step by file, and the node of each; with those of the first comes the environment, as a
-  /// node behind all others.
+  /// Loads the rows of a step by file, and the node of each row. The first step also has the
+  /// environment, as a node after all others.
   Result<LoadedCloud> load(std::size_t step, std::vector<std::uint32_t>& nodes) const {
     LoadedCloud out;
     out.report.source = source_;
@@ -272,7 +272,8 @@ class LodReader {
   std::filesystem::path environment_;
   bool coarser_ = false;
   std::vector<Step> steps_;
-  std::map<int, std::size_t> instead_;  ///< nodes read at another level than the one asked for
+  std::map<int, std::size_t> instead_;  ///< by level: number of nodes read at another level than the
+                                        ///< requested one
 };
 
 }  // namespace

@@ -77,7 +77,7 @@ Result<BaseMesh> read_base(const fs::path& path, const std::string& group) {
   return out;
 }
 
-/// Moves the vertices by `amount` of a target's offsets.
+/// Adds `amount` times the offsets of a target to the vertices.
 Status apply_target(const fs::path& path, double amount, BaseMesh& mesh) {
   const std::string source = path.string();
   if (!std::isfinite(amount))
@@ -99,7 +99,8 @@ Status apply_target(const fs::path& path, double amount, BaseMesh& mesh) {
   return {};
 }
 
-/// The bones of a `.mhskel` as a skeleton, at the means of their head vertices in `mesh`.
+/// Makes a skeleton from the bones of a `.mhskel`. A joint is at the mean of its bone's head vertices in
+/// `mesh`.
 Status read_skeleton(const Json& json, const std::string& source, const BaseMesh& mesh, Skeleton& out) {
   const auto bad = [&](const std::string& what) {
     return Status(Errc::invalid_file, source + ": " + what);
@@ -113,7 +114,7 @@ Status read_skeleton(const Json& json, const std::string& source, const BaseMesh
   std::map<std::string, Vec3d> heads;
   std::map<std::string, std::vector<std::string>> children;
   for (const auto& [name, bone] : bones->items()) {
-    // Roots are the children of no name.
+    // The empty name stands for the parent of roots.
     if (name.empty()) return bad("a bone has no name");
     const Json *parent = member(bone, "parent"), *head = member(bone, "head");
     if (head == nullptr || !head->is_string()) return bad("bone " + in_quotes(name) + " has no 'head'");
@@ -182,7 +183,8 @@ class WeightReader {
     return {};
   }
 
-  /// The weights of the vertices `used`, divided by their sums; `places` are the vertices'.
+  /// Sets the weights of the vertices `used`, divided by their sums. `places` are the positions of all
+  /// vertices.
   Status finish(const std::vector<std::uint32_t>& used, const std::vector<Vec3d>& places,
                 SkinnedMesh& mesh, SkinnedMeshReport& report) {
     std::vector<std::uint32_t> weighted;
@@ -243,7 +245,7 @@ Result<LoadedSkinnedMesh> load(const fs::path& path, const MakeHumanOptions& opt
   for (const auto& [target, amount] : options.targets) {
     if (Status s = apply_target(target, amount, *base); !s) return s;
   }
-  // Turned to face -Z, in metres, standing on the floor.
+  // Turn the body to face -Z, convert to metres, and put it on the floor.
   std::vector<std::uint32_t> used, place(base->vertices.size(), 0xffffffffu);
   double low = std::numeric_limits<double>::max();
   for (const auto& t : base->triangles) {

@@ -25,7 +25,7 @@ std::string_view take_word(std::string_view& line) {
   return word;
 }
 
-/// Parses all of `word`; false where it is anything but one number.
+/// Parses the whole of `word` as one number. Returns false if it is anything else.
 template <class T>
 bool parse(std::string_view word, T& value) {
   if (!word.empty() && word.front() == '+') word.remove_prefix(1);
@@ -68,7 +68,7 @@ class ObjParser {
       }
       v[k] = static_cast<float>(value);
     }
-    mesh_.vertices.push_back(v);  // a weight or a colour may follow
+    mesh_.vertices.push_back(v);  // a weight or a colour may follow; ignore it
     return {};
   }
 
@@ -133,7 +133,7 @@ Status save_obj(const std::filesystem::path& path, std::span<const Vec3d> vertic
     }
   }
   return replace_file(path, [&](OutputFile& file) {
-    // to_chars: the shortest text that gives the same float32, in every locale.
+    // to_chars writes the shortest text that is read back as the same float32, in every locale.
     char line[128];
     for (const Vec3d& v : vertices) {
       char* at = line;

@@ -43,7 +43,7 @@ class MeshReader {
     if (points->count == 0) return {Errc::invalid_file, at + ": a primitive without attribute POSITION"};
     auto triangles = detail::read_triangles(file_, primitive, points->count, at);
     if (!triangles) return triangles.status();
-    // Nodes may share a mesh: a small file could ask for any number of copies.
+    // Nodes may share a mesh, so a small file could ask for any number of copies.
     const std::size_t first = mesh_.vertices.size();
     if (first + points->count > file_.size() || points->count > 0xffffffff - first ||
         mesh_.triangles.size() + triangles->size() > file_.size()) {

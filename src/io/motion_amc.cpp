@@ -55,7 +55,7 @@ class AmcReader {
         if (clip.frames() > 0) {
           if (Status s = whole(); !s) return s;
         }
-        // Joints without values must not fill the memory.
+        // Joints without values take no bytes of the file. They must not fill the memory.
         if (clip.frames() * clip.joints > bytes_) return lines_.bad("more joints than bytes");
         given = 0;
         seen.assign(seen.size(), false);

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kMostBones = 1024;
 
-/// 0 to 2 for x to z in either case, else -1.
+/// 0 to 2 for x to z, in upper or lower case; otherwise -1.
 int axis_of(char c) {
   const int k = std::tolower(static_cast<unsigned char>(c)) - 'x';
   return k >= 0 && k <= 2 ? k : -1;
@@ -29,7 +29,7 @@ class AsfReader {
       section = std::string(lines_.word(0));
       if (section.front() != ':')
         return lines_.bad(in_quotes(section) + " where a section should begin");
-      // A section's own line has nothing that is needed; its content follows.
+      // The line that begins a section has no needed content; the next lines have.
       more = lines_.next();
       while (more && lines_.word(0).front() != ':') {
         Status s;
@@ -42,7 +42,7 @@ class AsfReader {
       }
     }
     if (out_.root_order.empty()) return lines_.bad("there is no ':root' with an order");
-    // The axes are known once the units are.
+    // Angles can be converted only after all units were read.
     out_.bones[0].axis = euler(root_axis_, out_.root_angles);
     for (std::size_t b = 1; b < out_.bones.size(); ++b)
       out_.bones[b].axis = euler(axes_[b].first, axes_[b].second);

@@ -19,31 +19,31 @@ inline constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180.0;
 struct AsfBone {
   std::string name;
   Vec3d direction{};
-  double length = 0.0;     ///< in the file's units
-  Quatd axis{};            ///< C
-  std::vector<int> turns;  ///< axes of its rotations as they are listed: 0 x, 1 y, 2 z
+  double length = 0.0;     ///< In units of the file.
+  Quatd axis{};            ///< C, the rotation of the bone's own axes.
+  std::vector<int> turns;  ///< Axes of its rotations in the order listed: 0 x, 1 y, 2 z.
   std::vector<std::size_t> children;
 };
 
-/// An Acclaim skeleton as its file has it; bone 0 is the root.
+/// An Acclaim skeleton as in its file. Bone 0 is the root.
 struct AsfSkeleton {
   std::vector<AsfBone> bones{{"root", {}, 0.0, {}, {}, {}}};
-  std::vector<std::pair<bool, int>> root_order;  ///< (is a rotation, axis)
+  std::vector<std::pair<bool, int>> root_order;  ///< (is a rotation, axis).
   Vec3d root_position{}, root_angles{};
   double length_unit = 1.0, angle_unit = kRadiansPerDegree;
 
-  /// The bone called `name`, or bones.size().
+  /// Index of the bone called `name`, or bones.size().
   std::size_t find(std::string_view name) const;
 };
 
-/// A rotation about axis 0, 1 or 2, radians.
+/// The rotation by `angle` (radians) about axis 0, 1 or 2.
 Quatd about_axis(int axis, double angle);
 
-/// Reads an ASF file's text. Errors name the line: invalid_file; unsupported (a bone that moves
-/// otherwise than turning).
+/// Reads the text of an ASF file. Errors name the line: invalid_file; unsupported (a bone with a degree
+/// of freedom that is not a rotation).
 Result<AsfSkeleton> read_asf(std::string_view text, const std::string& source);
 
-/// A skeleton from the bones below the root, parents first; `joints[b]` is the joint of bone b.
+/// Makes a skeleton from the bones below the root, parents first. `joints[b]` is the joint of bone b.
 Status asf_joints(const AsfSkeleton& file, double scale, const std::string& source, Skeleton& out,
                   std::vector<std::size_t>& joints);
 

@@ -37,7 +37,7 @@ class BvhReader {
     return {Errc::invalid_file, name_ + ": line " + std::to_string(line_) + ": " + what};
   }
 
-  /// The next word, empty at the end.
+  /// The next word; empty at the end of the text.
   std::string_view next() {
     while (!text_.empty() && static_cast<unsigned char>(text_.front()) <= ' ') {
       line_ += text_.front() == '\n' ? 1u : 0u;
@@ -139,7 +139,7 @@ class BvhReader {
     if (Status s = number(frame_time_); !s) return s;
     if (!(frame_time_ > 0) || !std::isfinite(1.0 / frame_time_))
       return bad("the frame time is not positive");
-    // A value takes a digit and a blank at least; joints without channels must not fill the memory
+    // A value takes at least a digit and a blank. Joints without channels must not fill the memory
     // either.
     const double bytes = static_cast<double>(text_.size()),
                  joints = static_cast<double>(channels_.size());
@@ -157,7 +157,7 @@ class BvhReader {
     return rest.empty() ? Status() : bad(detail::in_quotes(rest) + " behind the last frame");
   }
 
-  /// Whether the positions of joint j, whose first value is at `at`, stand for its OFFSET.
+  /// Whether the positions of joint j, whose first value is at `at`, replace its OFFSET.
   bool replaces(std::size_t j, std::size_t at) const {
     Vec3d first = out_.skeleton.rest_local[j].translation, from_zero{};
     bool any = false;
@@ -183,7 +183,7 @@ class BvhReader {
       replace[j] = replaces(j, at);
       for (const Channel& c : channels_[j]) moving = moving || (j != 0 && !c.rotation);
     }
-    // A frame whose Z is up is turned as a whole: the root's rest place and rotation with it.
+    // If Z is up, turn each frame as a whole, the rest position and rotation of the root included.
     const Quatd up = options_.z_up ? axis_angle(Vec3d{1, 0, 0}, -90 * kRadians) : Quatd{};
     const Affine3<double> turn{rotation_matrix(up), {}};
     const Vec3d root_rest = turn * skeleton.rest_local[0].translation;

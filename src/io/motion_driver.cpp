@@ -11,7 +11,7 @@ namespace {
 
 using detail::NpzArrays;
 
-/// joint_mats_fps or fps; both must agree.
+/// Reads joint_mats_fps or fps. If both are present they must agree.
 Result<double> frame_rate(const NpzArrays& arrays) {
   double rate = 0;
   for (const char* key : {"joint_mats_fps", "fps"}) {
@@ -30,7 +30,7 @@ Result<double> frame_rate(const NpzArrays& arrays) {
   return rate;
 }
 
-/// A number that, where it is there, must be `want`.
+/// Checks that an optional number, if present, is `want`.
 Status check_number(const NpzArrays& arrays, const char* key, double want, Errc code) {
   if (!arrays.file().contains(key)) return {};
   const auto v = arrays.number(key);

@@ -13,9 +13,10 @@ namespace {
 
 using detail::NpzArrays;
 
-constexpr std::size_t kSmplh = 52, kSmplx = 55, kBody = 22, kHands = 25;  // SMPL-X's hands begin at 25
+// SMPL-X's hands begin at joint 25
+constexpr std::size_t kSmplh = 52, kSmplx = 55, kBody = 22, kHands = 25;
 
-/// Axis times angle, radians.
+/// The rotation by |v| radians about v.
 Quatd rotation_vector(const double* v) {
   const Vec3d axis{v[0], v[1], v[2]};
   const double angle = norm(axis);
@@ -23,7 +24,7 @@ Quatd rotation_vector(const double* v) {
   return axis_angle(axis * (1.0 / angle), angle);
 }
 
-/// Rest places of the joints, [J], of the body with the shape `betas`.
+/// Rest positions [J] of the joints, for a body with the shape `betas`.
 Result<std::vector<Vec3d>> rest_joints(const NpzArrays& model, const std::vector<double>& betas) {
   constexpr std::size_t any = NpzArrays::kAny;
   auto vertices = model.read("v_template", {any, 3});
@@ -57,7 +58,7 @@ Result<std::vector<Vec3d>> rest_joints(const NpzArrays& model, const std::vector
 Status check_tree(const NpzArrays& model, const BodyJoints& body) {
   const auto tree = model.read("kintree_table", {2, body.names.size()});
   if (!tree) return tree.status();
-  for (std::size_t j = 1; j < body.names.size(); ++j) {  // the root's parent is written in several ways
+  for (std::size_t j = 1; j < body.names.size(); ++j) {  // files write the root's parent in several ways
     if (tree->values[j] != static_cast<double>(body.parents[j])) {
       return {Errc::invalid_file, model.file().source() + ": kintree_table: joint " + std::to_string(j) +
                                       " has the parent " + std::to_string(tree->values[j])};
@@ -112,7 +113,7 @@ Result<LoadedMotion> read_motion(const NpzArrays& motion, const NpzArrays& model
     out.skeleton.rest_local.push_back({Mat3d::identity(), place});
     clip.translations.push_back(place);
   }
-  // Z up becomes Y up; the body model itself always has Y up.
+  // Turn Z up to Y up. The body model itself always has Y up.
   const Quatd up = options.z_up ? Quatd{std::sqrt(0.5), -std::sqrt(0.5), 0, 0} : Quatd{};
   clip.rotations.reserve(frames * joints);
   for (std::size_t t = 0; t < frames; ++t) {

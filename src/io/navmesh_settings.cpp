@@ -31,7 +31,7 @@ constexpr FlagKey kFlags[] = {
 };
 constexpr const char *kVertsPerPoly = "vertsPerPoly", *kTileSize = "tileSize", *kMaxCells = "maxCells";
 
-/// A whole number of [0, most], which Habitat writes as 6.0.
+/// Reads a whole number in [0, most]. Habitat writes 6 as 6.0.
 Result<std::int64_t> whole(const Json& value, const std::string& what, double most) {
   const double v = value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN();
   if (v >= 0 && v <= most && v == std::floor(v)) return static_cast<std::int64_t>(v);

@@ -14,7 +14,7 @@
 namespace gsnav::io::detail {
 namespace {
 
-/// Squared distances to a point's others, ascending; the first `size` count.
+/// Squared distances from a point to its nearest others, ascending. Only the first `size` are used.
 struct Nearest {
   std::uint32_t point = 0;
   std::array<double, kMostNeighbours> distances{};

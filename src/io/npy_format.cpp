@@ -15,7 +15,7 @@ namespace {
 constexpr std::string_view kMagic("\x93NUMPY", 6);
 constexpr std::size_t kAlignment = 64;
 
-/// Parser of the Python dictionary in front of the values.
+/// Parser of the Python dictionary at the start of the file.
 class NpyHeader {
  public:
   explicit NpyHeader(std::string_view text) : text_(text) {}
@@ -24,7 +24,7 @@ class NpyHeader {
   std::optional<bool> fortran;
   std::optional<std::vector<std::size_t>> shape;
 
-  /// Reads all three members, each once, in any order; false where the text is anything else.
+  /// Parses all three members, each once, in any order. Returns false for any other text.
   bool parse() {
     if (!take("{")) return false;
     while (!take("}")) {
@@ -92,7 +92,7 @@ struct Type {
   std::size_t size = 0;
 };
 
-/// Little-endian numbers only; '|' (no byte order) goes with one byte.
+/// The type of a NumPy type string: little-endian numbers only. '|' (no byte order) is for single bytes.
 std::optional<Type> type_of(std::string_view descr) {
   if (descr == "<f2" || descr == "<f4" || descr == "<f8") {
     return Type{Kind::real, static_cast<std::size_t>(descr[2] - '0')};
@@ -133,7 +133,7 @@ double value_at(const std::byte* p, Type type) {
   }
 }
 
-/// Calls f(position in C order, position in the file) for every value.
+/// Calls f(index in C order, index in the file) for every value.
 template <class F>
 void for_each_value(const std::vector<std::size_t>& shape, bool fortran, std::size_t count, F&& f) {
   if (!fortran || shape.size() < 2) {
@@ -169,7 +169,7 @@ Result<std::string> npy_header(std::string_view descr, std::span<const std::size
                                std::size_t count, const std::string& name) {
   std::string out = "{'descr': '" + std::string(descr) + "', 'fortran_order': False, 'shape': (";
   for (const std::size_t d : shape) out += std::to_string(d) + ", ";
-  // One dimension keeps its comma, more lose the last one.
+  // Python writes (3,) for one dimension, and no last comma for more.
   if (shape.size() > 1) out.resize(out.size() - 2);
   if (shape.size() == 1) out.pop_back();
   out += "), }";
@@ -234,7 +234,7 @@ Result<NpyArray> parse_npy(std::span<const std::byte> bytes, const std::string& 
     out.values[to] = value_at(values + type->size * from, *type);
   });
   if (type->size == 8 && type->kind != Kind::real) {
-    constexpr double kExact = 9007199254740992.0;  // 2^53, which 2^53 + 1 is rounded to
+    constexpr double kExact = 9007199254740992.0;  // 2^53, to which 2^53 + 1 is rounded
     for (std::size_t i = 0; i < *count; ++i) {
       if (std::fabs(out.values[i]) >= kExact) {
         return {Errc::unsupported, name + ": value " + std::to_string(i) +

@@ -13,26 +13,26 @@
 
 namespace gsnav::io::detail {
 
-/// What an .npy header says.
+/// The content of an .npy header.
 struct NpyLayout {
-  std::string descr;  ///< NumPy's type string, "<f4" say
+  std::string descr;  ///< NumPy's type string, such as "<f4".
   bool fortran = false;
   std::vector<std::size_t> shape;
-  std::size_t values_at = 0;  ///< offset of the values in the file
-  std::string dictionary;     ///< the header as text for messages
+  std::size_t values_at = 0;  ///< Offset of the values in the file.
+  std::string dictionary;     ///< The header's text, for messages.
 };
 
-/// Product of the dimensions, or nothing where eight bytes each would not fit memory's addresses.
+/// Product of the dimensions. Nothing if that number of 8-byte values would exceed the address space.
 std::optional<std::size_t> npy_count(std::span<const std::size_t> shape);
 
-/// Everything before the values of a version 1.0 file. `name` is for messages.
-/// Errors: invalid_argument where `count` values do not fill `shape`; unsupported.
+/// Everything before the values of a version 1.0 file. `name` is for messages. Errors: invalid_argument
+/// if `count` values do not fill `shape`; unsupported.
 Result<std::string> npy_header(std::string_view descr, std::span<const std::size_t> shape,
                                std::size_t count, const std::string& name);
 
 Result<NpyLayout> parse_npy_header(std::span<const std::byte> bytes, const std::string& name);
 
-/// What load_npy does, from memory. `name` is for messages.
+/// Does what load_npy does, from memory. `name` is for messages.
 Result<NpyArray> parse_npy(std::span<const std::byte> bytes, const std::string& name);
 
 }  // namespace gsnav::io::detail

@@ -11,18 +11,18 @@
 namespace gsnav::io {
 namespace {
 
-// Poses that never change and weights that are mostly zero shrink by more than the hundred times that
-// pictures and text do.
+// Constant poses and weights that are mostly zero compress by more than the factor of 100 that is enough
+// for images and text.
 constexpr std::uint64_t kSlack = std::uint64_t{256} << 20;
 constexpr std::string_view kSuffix = ".npy";
 
-/// Header and values of an entry as the bytes of an .npy file.
+/// An entry as the bytes of an .npy file.
 Result<std::string> npy_bytes(const NpzEntry& entry, const std::string& name) {
   return std::visit(
       [&](const auto& values) -> Result<std::string> {
         using Values = std::decay_t<decltype(values)>;
         if constexpr (std::is_same_v<Values, std::string>) {
-          // NumPy has no strings of length 0.
+          // NumPy has no strings of length 0
           const std::string text = values.empty() ? std::string(1, '\0') : values;
           auto header = detail::npy_header("|S" + std::to_string(text.size()), {}, 1, name);
           if (!header) return header;

@@ -6,7 +6,7 @@
 namespace gsnav::io::detail {
 namespace {
 
-/// Without the ones at the front and at the end.
+/// A shape without dimensions of 1 at its beginning and end.
 std::vector<std::size_t> core(std::vector<std::size_t> shape) {
   while (!shape.empty() && shape.back() == 1) shape.pop_back();
   while (!shape.empty() && shape.front() == 1) shape.erase(shape.begin());

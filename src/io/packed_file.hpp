@@ -9,8 +9,8 @@
 
 namespace gsnav::io::detail {
 
-/// load_packed_scene, which reads the SH bands of a PLY of `least_apart` rows or more apart from the
-/// rest: the same bits.
+/// Implements load_packed_scene. The SH bands of a PLY with at least `least_apart` rows are read
+/// separately from the rest, which gives the same bits.
 Result<LoadedPackedCloud> load_packed(const std::string& spec, const LoadSceneOptions& options,
                                       std::size_t least_apart);
 

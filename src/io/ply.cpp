@@ -29,7 +29,8 @@ using detail::PlyElement;
 using detail::PlyHeader;
 using detail::PlyProperty;
 
-/// Gives n rows, from `row` on, to the sink, and their time planes to `moving` where it is given.
+/// Adds n rows, the first of which is `row`, to the sink, and their time planes to `moving` if it is not
+/// null.
 void add_block(detail::CloudSink& sink, detail::TemporalRows* moving, const PlyColumns& columns,
                const double* block, std::size_t row, std::size_t n) {
   std::array<float, 45> rest;
@@ -60,7 +61,7 @@ void add_block(detail::CloudSink& sink, detail::TemporalRows* moving, const PlyC
   }
 }
 
-/// Gives n rows to the sink where all that is read of them is float32 in this machine's order.
+/// Adds n rows to the sink, if all their properties are float32 in this machine's byte order.
 void add_float_rows(detail::CloudSink& sink, const PlyColumns& columns, std::size_t stride,
                     const std::byte* rows, std::size_t n) {
   std::array<std::size_t, detail::kPlyFixed + 45> offsets{};
@@ -89,11 +90,11 @@ bool are_floats(const PlyHeader& header, const PlyColumns& columns) {
                      [](const PlyProperty* p) { return p->type == detail::PlyType::f32; });
 }
 
-/// What a header says about the Gaussians.
+/// The Gaussians that a header describes.
 struct Vertices {
   std::vector<PlyElement>::const_iterator element;
   PlyColumns columns;
-  bool points = false;  ///< with colours and nothing else
+  bool points = false;  ///< Whether there are only positions and colours.
 };
 
 Result<Vertices> find_vertices(const PlyHeader& header, const std::string& source) {
@@ -115,8 +116,8 @@ Result<Vertices> find_vertices(const PlyHeader& header, const std::string& sourc
   return v;
 }
 
-/// Fills a cloud from blocks of rows: `rows_at(first, n)` is where n of them lie, null where they are
-/// not there; `moving` as in detail::load_ply. Of text, `body` reads them.
+/// Fills a cloud from blocks of rows. `rows_at(first, n)` returns where n rows are, or null if they are
+/// missing. Text is read from `body`. `moving` is that of detail::load_ply.
 template <class RowsAt>
 Result<LoadedCloud> fill(const PlyHeader& header, const Vertices& v, const std::string& source,
                          TemporalCloud* moving, PlyBody* body, const RowsAt& rows_at,
@@ -203,14 +204,14 @@ Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& s
   return out;
 }
 
-/// Whether all rows lie where the header alone says.
+/// Whether the header alone determines where each row is.
 bool has_fixed_rows(const PlyHeader& header) {
   return header.format != detail::PlyFormat::ascii &&
          std::none_of(header.elements.begin(), header.elements.end(),
                       [](const PlyElement& e) { return e.has_list; });
 }
 
-/// Reads the rows piece by piece, so that there is never more in memory than the cloud.
+/// Reads the rows in pieces, so that memory holds no more than the cloud.
 Result<LoadedCloud> load_rows(const detail::RandomFile& file, const PlyHeader& header, const Vertices& v,
                               const std::string& source, TemporalCloud* moving,
                               detail::BandsApart* apart) {

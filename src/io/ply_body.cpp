@@ -57,7 +57,7 @@ std::uint64_t PlyBody::skip(const PlyElement& e) {
     at_ += static_cast<std::size_t>(rows) * e.stride;
     return rows;
   }
-  // A list takes a byte at least, so the file's size bounds this loop whatever the count says.
+  // A list takes at least one byte, so the file's size bounds this loop whatever the count is.
   for (std::uint64_t row = 0; row < e.count; ++row) {
     for (const PlyProperty& p : e.properties) {
       std::uint64_t items = 1;
@@ -77,7 +77,7 @@ std::uint64_t PlyBody::skip(const PlyElement& e) {
 }
 
 std::uint64_t PlyBody::available(const PlyElement& e) const noexcept {
-  // A number in text is a digit and a separator; the last may lack the separator.
+  // A number in text takes a digit and a separator; the last may lack the separator.
   const std::size_t row = format_ == PlyFormat::ascii ? 2 * e.properties.size() : e.stride;
   return (left() + (format_ == PlyFormat::ascii ? 1 : 0)) / row;
 }
@@ -112,7 +112,7 @@ bool PlyBody::read_list(const PlyElement& e, const PlyProperty& list, std::vecto
   for (const PlyProperty& p : e.properties) {
     double length = 1;
     if (p.is_list && !(next_value(p.count_type, length) && length >= 0)) return false;
-    // An item takes a byte at least, so the file's size bounds this loop whatever the length says.
+    // An item takes at least one byte, so the file's size bounds this loop whatever the length is.
     for (double k = 0; k < length; ++k) {
       double value = 0;
       if (!next_value(p.type, value)) return false;
@@ -135,7 +135,7 @@ bool PlyBody::next_number(double& value) {
   if (first != last && *first == '+') ++first;
   const auto [end, error] = std::from_chars(first, last, value);
   if (error == std::errc::result_out_of_range) {
-    // from_chars does not say on which side of the range.
+    // from_chars does not tell on which side of the range the value is.
     const bool tiny = std::string_view(first, last).find("e-") != std::string_view::npos ||
                       std::string_view(first, last).find("E-") != std::string_view::npos;
     value = tiny ? 0.0 : std::numeric_limits<double>::infinity();

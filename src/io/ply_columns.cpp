@@ -39,7 +39,7 @@ Result<PlyColumns> choose_ply_columns(const PlyElement& vertex, const std::strin
   }
   c.degree = std::min(kMaxShDegree, static_cast<int>(found - kCounts.begin()));
   c.rest = kCounts[static_cast<std::size_t>(c.degree)];
-  // Channel-major in the file; colour inner in the cloud.
+  // The file is channel-major; in the cloud, the channels of a coefficient are together.
   for (std::size_t k = 0; k < c.rest / 3; ++k) {
     for (std::size_t channel = 0; channel < 3; ++channel) {
       const std::string name = "f_rest_" + std::to_string(channel * (c.rest_in_file / 3) + k);

@@ -15,14 +15,14 @@ namespace {
 
 constexpr std::size_t kChunk = 256;  // Gaussians that share their bounds
 
-/// An element, all of whose rows are inside the file, and where the values of interest lie.
+/// An element whose rows are all inside the file, and the offsets of the values that are read.
 struct Rows {
   const PlyElement* element = nullptr;
   ByteSource bytes;
   std::vector<std::size_t> offsets;
 };
 
-/// Some consecutive rows of an element in memory.
+/// Consecutive rows of an element in memory.
 struct Block {
   const Rows* rows = nullptr;
   const std::byte* first = nullptr;
@@ -77,7 +77,7 @@ class CompressedPlyReader {
  private:
   Status fail(const std::string& what) const { return {Errc::invalid_file, source_ + ": " + what}; }
 
-  /// n rows from `row` on, of an element that may not be there.
+  /// Reads n rows from `row` on. The element may be missing.
   Status get(const Rows& rows, std::size_t row, std::size_t n, std::vector<std::byte>& room,
              Block& out) const {
     out.rows = &rows;
@@ -87,7 +87,7 @@ class CompressedPlyReader {
     return out.first != nullptr ? Status() : reading_failed(source_);
   }
 
-  /// Finds the three elements, each of which must be in the file as a whole.
+  /// Finds the three elements and checks that the file has all their rows.
   Status find_rows() {
     std::uint64_t at = header_.size;
     for (const PlyElement& e : header_.elements) {
@@ -115,7 +115,7 @@ class CompressedPlyReader {
     return {};
   }
 
-  /// Notes where a property lies, which must have that type.
+  /// Adds the offset of a property, which must have the given type.
   Status column(Rows& rows, const std::string& name, PlyType type, const char* type_name) {
     const PlyProperty* p = rows.element->find(name);
     if (p == nullptr) {
@@ -133,7 +133,7 @@ class CompressedPlyReader {
     for (const char* what : {"packed_position", "packed_rotation", "packed_scale", "packed_color"}) {
       if (Status s = column(vertex_, what, PlyType::u32, "uint"); !s) return s;
     }
-    // Older files have no ranges of colour: their bytes are fractions of [0, 1].
+    // Older files have no ranges of colours: their bytes are fractions of [0, 1].
     has_colours_ = chunk_.element->find("min_r") != nullptr;
     for (const char* end : {"min_", "max_"}) {
       for (std::size_t k = 0; k < bounds(); ++k) {
@@ -152,7 +152,7 @@ class CompressedPlyReader {
     }
     degree_ = std::min(kMaxShDegree, static_cast<int>(found - kCounts.begin()) + 1);
     const std::size_t coefficients = static_cast<std::size_t>(sh_coefficient_count(degree_) - 1);
-    // Channel-major in the file; colour inner in the cloud.
+    // The file is channel-major; in the cloud, the channels of a coefficient are together.
     for (std::size_t k = 0; k < coefficients; ++k) {
       for (std::size_t channel = 0; channel < 3; ++channel) {
         const std::string name = "f_rest_" + std::to_string(channel * (sh_in_file_ / 3) + k);
@@ -162,17 +162,17 @@ class CompressedPlyReader {
     return {};
   }
 
-  /// How many pairs of bounds a chunk has.
+  /// Number of bounds of each kind, low and high, of a chunk.
   std::size_t bounds() const noexcept { return has_colours_ ? 9 : 6; }
 
-  /// Where the `bits` from `shift` on lie between a chunk's bounds of value `which` (x y z, scales,
-  /// rgb).
+  /// Decodes the `bits` from `shift` on, as a fraction of a chunk's range of value `which` (x y z,
+  /// scales, rgb).
   double between(const Block& chunks, std::size_t chunk, std::size_t which, std::uint32_t packed,
                  int shift, int bits) const {
     const double low = static_cast<double>(chunks.at<float>(chunk, which)),
                  high = static_cast<double>(chunks.at<float>(chunk, bounds() + which)),
                  t = fraction(packed, shift, bits);
-    return (1 - t) * low + t * high;  // std::lerp may turn a NaN into a number
+    return (1 - t) * low + t * high;  // not std::lerp, which may turn a NaN into a number
   }
 
   static double fraction(std::uint32_t packed, int shift, int bits) noexcept {
@@ -180,7 +180,7 @@ class CompressedPlyReader {
     return static_cast<double>((packed >> shift) & most) / static_cast<double>(most);
   }
 
-  /// Row i of the blocks, which is of `chunk`.
+  /// Adds row i of the blocks, which belongs to `chunk`.
   void add(const Block& chunks, std::size_t chunk, const Block& vertex, const Block& sh, std::size_t i,
            CloudSink& sink) const {
     const std::uint32_t position = vertex.at<std::uint32_t>(i, 0),
@@ -202,7 +202,7 @@ class CompressedPlyReader {
     std::array<float, 45> rest;
     raw.shN = rest.data();
     for (std::size_t k = 0; k < sh_.offsets.size(); ++k) {
-      // 256 cells over [-4, 4], each read at its middle; the first and the last at their outer end.
+      // 256 cells over [-4, 4]. Each is read as its centre, the first and the last as their outer ends.
       const double byte = static_cast<double>(sh.at<std::uint8_t>(i, k));
       const double value = byte == 0 ? 0 : byte == 255 ? 1 : (byte + 0.5) / 256;
       rest[k] = static_cast<float>(8 * (value - 0.5));

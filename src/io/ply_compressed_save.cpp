@@ -27,7 +27,7 @@ Values values_of(const GaussianCloud& cloud, std::size_t i) {
     v[k] = mean[static_cast<int>(k)];
     const double log_scale = std::log(static_cast<double>(cloud.scales[k][i]));
     v[3 + k] = std::clamp(log_scale, -detail::kCompressedMostLogScale,
-                          detail::kCompressedMostLogScale);  // also minus infinity
+                          detail::kCompressedMostLogScale);  // also for minus infinity
     v[6 + k] = 0.5 + kSh0 * static_cast<double>(cloud.sh0[3 * i + k]);
   }
   return v;
@@ -36,15 +36,15 @@ Values values_of(const GaussianCloud& cloud, std::size_t i) {
 struct Bounds {
   std::array<float, 9> low, high;
 
-  /// Where a value lies between its bounds, as one of 2^bits steps.
+  /// Position of value k between its bounds, as one of 2^bits steps.
   std::uint32_t step(const Values& v, std::size_t k, int bits) const noexcept {
     const double a = static_cast<double>(low[k]), b = static_cast<double>(high[k]);
     return b > a ? detail::nearest_step((v[k] - a) / (b - a), bits) : 0;
   }
 };
 
-/// The float next to v that is not above it, or not below it where `up`: bounds hold what is far from
-/// zero too.
+/// The float nearest to v that is not above v, or with `up` not below it. Bounds made of it also contain
+/// values far from zero.
 float float_beyond(double v, bool up) noexcept {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   const float f = static_cast<float>(v);
@@ -134,7 +134,8 @@ Status save_compressed_ply(const std::filesystem::path& path, const GaussianClou
     std::vector<std::uint8_t> row(rest);
     for (std::size_t i = 0; rest != 0 && i < n; ++i) {
       for (std::size_t k = 0; k < rest; ++k) {
-        // 256 cells over [-4, 4]; channel-major in the file, colour inner in the cloud.
+        // 256 cells over [-4, 4]. The file is channel-major; in the cloud, the channels of a coefficient
+        // are together.
         const double cell =
             (static_cast<double>(cloud.shN[i * rest + k]) / (2 * detail::kCompressedBands) + 0.5) * 256;
         row[k % 3 * (rest / 3) + k / 3] =

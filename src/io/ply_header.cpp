@@ -22,7 +22,7 @@ std::optional<PlyType> type_of(std::string_view word) {
   return std::nullopt;
 }
 
-/// Takes the next word off the front of `line`; empty at its end.
+/// Removes the next word from the front of `line` and returns it; empty at the end.
 std::string_view take_word(std::string_view& line) {
   while (!line.empty() && (line.front() == ' ' || line.front() == '\t')) line.remove_prefix(1);
   std::size_t n = 0;
@@ -32,7 +32,7 @@ std::string_view take_word(std::string_view& line) {
   return word;
 }
 
-/// Trainers note in a comment that the asset wants the antialiased filter.
+/// Whether a comment, as trainers write it, asks for the antialiased filter.
 bool asks_for_mip(std::string_view comment) {
   std::string text;
   for (const char c : comment) {
@@ -158,7 +158,7 @@ class HeaderParser {
   std::string_view text_;
   const std::string& source_;
   PlyHeader header_;
-  std::set<std::string> names_;  // of the last element's properties
+  std::set<std::string> names_;  // names of the last element's properties
   std::size_t at_ = 0;
   std::size_t line_number_ = 0;
   bool has_format_ = false;

@@ -11,7 +11,8 @@
 
 namespace gsnav::io::detail {
 
-/// No writer comes near it; it keeps a file of property lines from becoming a search of hours.
+/// Largest header that is read, far above what writers make. It limits the time for a file of nothing
+/// but property lines.
 inline constexpr std::size_t kLargestPlyHeader = std::size_t{1} << 20;
 
 enum class PlyFormat { ascii, little, big };
@@ -27,14 +28,14 @@ struct PlyProperty {
   PlyType type = PlyType::f32;
   bool is_list = false;
   PlyType count_type = PlyType::u8;
-  std::size_t offset = 0;  ///< in a row; meaningful while no list comes before
+  std::size_t offset = 0;  ///< Offset in a row; valid unless a list comes before.
 };
 
 struct PlyElement {
   std::string name;
-  std::uint64_t count = 0;  ///< as the header says, which may be a lie
+  std::uint64_t count = 0;  ///< Number of rows according to the header, which may be wrong.
   std::vector<PlyProperty> properties;
-  std::size_t stride = 0;  ///< bytes a row, lists left out
+  std::size_t stride = 0;  ///< Bytes of a row without its lists.
   bool has_list = false;
 
   const PlyProperty* find(const std::string& property) const {
@@ -48,14 +49,14 @@ struct PlyElement {
 struct PlyHeader {
   PlyFormat format = PlyFormat::little;
   std::vector<PlyElement> elements;
-  bool mip = false;      ///< a comment asks for the antialiased filter
-  std::size_t size = 0;  ///< bytes up to the first row
+  bool mip = false;      ///< Whether a comment asks for the antialiased filter.
+  std::size_t size = 0;  ///< Bytes before the first row.
 };
 
-/// Parses the text up to end_header. Errors name `source`, the line's number and the word.
+/// Parses the text up to end_header. Errors name `source`, the line number and the word.
 Result<PlyHeader> parse_ply_header(std::span<const std::byte> bytes, const std::string& source);
 
-/// The error of an element of which only `present` rows are there.
+/// The error for an element of which only `present` rows exist.
 Status ply_rows_missing(const std::string& source, const PlyElement& e, std::uint64_t present);
 
 }  // namespace gsnav::io::detail

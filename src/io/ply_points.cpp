@@ -18,7 +18,7 @@ constexpr std::array<const char*, 6> kNames = {"x", "y", "z", "red", "green", "b
 constexpr std::size_t kNeighbours = 3;
 constexpr double kOpacity = 0.99, kMostMedians = 4, kLeastScale = 1e-7;
 
-/// Scales of points from their distances to their neighbours.
+/// Clamps the scales of points to [kLeastScale, kMostMedians times their median].
 void limit_scales(std::vector<double>& scales) {
   std::vector<double> sorted = scales;
   const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);

@@ -37,17 +37,16 @@ void put(std::vector<std::byte>& to, double value) {
   std::memcpy(to.data() + at, &v, sizeof v);
 }
 
-/// The logit that reads back as this opacity, always finite: trainers take derivatives of what they
-/// read. Of opacities between those of two floats it is the nearest.
+/// The logit that is read back as this opacity, or as the nearest opacity that a float32 logit has. It
+/// is always finite, because trainers differentiate what they read.
 float logit_of(float opacity) {
-  // exp(-18) is below half of float32's last place of 1, in float32 as in double; exp(110) is beyond
-  // float32.
+  // 1 + exp(-18) rounds to 1 in float32, and exp(110) is beyond float32.
   constexpr float kOpaque = 18, kClear = -110;
   if (opacity >= 1) return kOpaque;
   if (!(opacity > 0)) return kClear;
   const double p = opacity;
   float logit = static_cast<float>(std::log(p / (1.0 - p)));
-  // Rounding must not take a Gaussian below the threshold at which loaders drop it.
+  // Rounding must not move a Gaussian below the threshold at which loaders drop it.
   constexpr float kVisible = 1.0f / 255.0f;
   const auto back = [&logit] { return static_cast<float>(1.0 / (1.0 + std::exp(-double{logit}))); };
   while (opacity >= kVisible && back() < kVisible) logit = std::nextafter(logit, 0.0f);
@@ -56,7 +55,7 @@ float logit_of(float opacity) {
 
 using Quad = std::array<float, 4>;
 
-/// What load_ply makes of four stored components.
+/// What load_ply reads from four stored components.
 Quad normalised(const Quad& stored) {
   Quatd q{double{stored[0]}, double{stored[1]}, double{stored[2]}, double{stored[3]}};
   if (!normalize(q)) return stored;
@@ -64,12 +63,12 @@ Quad normalised(const Quad& stored) {
           static_cast<float>(q.z)};
 }
 
-/// Components that load_ply normalises to `unit` exactly, as a rounded unit quaternion is only in 99 of
-/// 100 cases.
+/// Components that load_ply normalises exactly to `unit`. Storing a rounded unit quaternion itself works
+/// in only 99 of 100 cases.
 Quad stored_quat(const Quad& unit) {
   if (normalised(unit) == unit) return unit;
-  // The unit length inside of what rounds to `unit`, all components moved by the same share of their
-  // half places.
+  // Find the quaternion of unit length within the rounding of `unit`: move all components by the same
+  // share of half their last place.
   Quad half;
   double square = 0, room = 0;
   for (std::size_t k = 0; k < 4; ++k) {
@@ -79,8 +78,8 @@ Quad stored_quat(const Quad& unit) {
     room += double{v} * double{half[k]};
   }
   const double share = 0.5 * (square - 1) / room;
-  // Its components are no floats: multiples of it are tried until one rounds to what is normalised to
-  // `unit`. Of a million random quaternions the worst takes 11,780.
+  // Its components are no floats. Try multiples of it until the rounded one is normalised to `unit`.
+  // Among a million random quaternions, the worst takes 11,780 tries.
   constexpr int kMostTries = 100000;
   constexpr double kGolden = 0.61803398874989485;  // visits [1, 2) evenly
   for (int t = 1; t <= kMostTries; ++t) {

@@ -13,9 +13,9 @@ namespace gsnav::io::detail {
 
 struct BandsApart;
 
-/// io::load_ply and io::parse_ply where `moving` is null. Else the time planes of a file that has any go
-/// there; its cloud is the result's. `apart`: where its bands may be read apart from the rest
-/// (BandsApart::degree says whether they were left out), or are read.
+/// Implements io::load_ply and io::parse_ply, for which `moving` is null. Otherwise `moving` gets the
+/// time planes of a file that has any; its cloud is in the result. `apart`: lets the bands be left out
+/// or be read separately (see BandsApart).
 Result<LoadedCloud> load_ply(const std::filesystem::path& path, TemporalCloud* moving,
                              BandsApart* apart = nullptr);
 Result<LoadedCloud> parse_ply(std::span<const std::byte> bytes, const std::string& source,

@@ -13,9 +13,10 @@
 namespace gsnav::io {
 namespace {
 
-constexpr std::uint64_t kDeflateRatio = 1032;  // no deflate stream grows more than this
+constexpr std::uint64_t kDeflateRatio = 1032;  // no deflate stream expands more than this
 
-// libpng leaves by longjmp, so what it may leave holds no object with a destructor.
+// libpng returns from errors by longjmp, so functions that it may leave hold no object with a
+// destructor.
 void on_error(png_structp png, png_const_charp) { png_longjmp(png, 1); }
 void on_warning(png_structp, png_const_charp) {}
 
@@ -75,7 +76,7 @@ void read_bytes(png_structp png, png_bytep to, std::size_t n) {
   source.left -= n;
 }
 
-/// Decoder with its own lifetime, so that allocation happens outside of setjmp's reach.
+/// A decoder as an object, so that memory is allocated outside the reach of setjmp.
 class Decoder {
  public:
   Decoder() = default;
@@ -127,7 +128,7 @@ Result<PngImage> detail::decode_png(std::span<const std::byte> bytes, const std:
     return too_large(name, decoder.width(), decoder.height(), most_side);
   }
   const std::size_t size = decoder.stride() * decoder.height();
-  // Expanding 1-bit palettes makes at most 32 bits of one.
+  // A 1-bit palette image expands to at most 32 times its bits.
   if (size / 32 > kDeflateRatio * bytes.size()) {
     return {Errc::invalid_file, name + ": " + std::to_string(decoder.width()) + " x " +
                                     std::to_string(decoder.height()) + " pixels cannot be in " +

@@ -10,8 +10,8 @@
 
 namespace gsnav::io::detail {
 
-/// Has memory that has not been written yet backed by pages: several threads do that faster than the one
-/// that writes first. Where the system cannot, nothing changes.
+/// Backs memory that was not written yet with pages. Several threads do this faster than the first
+/// writer alone. If the system cannot, nothing changes.
 inline void populate_pages([[maybe_unused]] void* p, [[maybe_unused]] std::size_t bytes) noexcept {
 #if defined(__linux__) && defined(MADV_POPULATE_WRITE)
   constexpr std::uintptr_t kPage = 4096;

@@ -11,23 +11,23 @@
 
 namespace gsnav::io::detail {
 
-/// The logit whose sigmoid is byte / 255; the ends are the infinities.
+/// The logit whose sigmoid is byte / 255; infinite at both ends.
 inline double opacity_logit(unsigned byte) noexcept {
   const double value = static_cast<double>(byte);
   return std::log(value / (255.0 - value));
 }
 
-/// The SH coefficient of degree 0 that is drawn as a colour in [0, 1].
+/// The SH coefficient of degree 0 for a drawn colour in [0, 1].
 inline float sh0_of_colour(double colour) noexcept { return static_cast<float>((colour - 0.5) / kSh0); }
 
-/// The nearest of the `bits`-bit steps over [0, 1]; what lies outside becomes the nearer end.
+/// Rounds t to one of the `bits`-bit steps over [0, 1]. Values outside are clamped.
 inline std::uint32_t nearest_step(double t, int bits) noexcept {
   const double most = static_cast<double>((std::uint32_t{1} << bits) - 1);
   return static_cast<std::uint32_t>(std::nearbyint(std::fmax(0.0, std::fmin(t, 1.0)) * most));
 }
 
-/// A unit quaternion as its three smaller components, the largest being positive: quat_without's
-/// other way. Returns which one is left out.
+/// Splits a unit quaternion into its three smaller components, after making the largest positive.
+/// Returns the index of the largest. Inverse of quat_without.
 inline std::size_t smallest_three(const double (&q)[4], double (&others)[3]) noexcept {
   std::size_t largest = 0;
   for (std::size_t k = 1; k < 4; ++k) {
@@ -40,8 +40,8 @@ inline std::size_t smallest_three(const double (&q)[4], double (&others)[3]) noe
   return largest;
 }
 
-/// Three components of a unit quaternion (w, x, y, z without the one at `largest`); the fourth, the
-/// largest, is what unit length leaves, and positive.
+/// The unit quaternion with three given components (w, x, y, z without the one at `largest`). The
+/// fourth, the largest, is positive and follows from unit length.
 inline Quatd quat_without(std::size_t largest, const double (&others)[3]) noexcept {
   double q[4], sum = 0;
   for (std::size_t k = 0, stored = 0; k < 4; ++k) {
@@ -53,7 +53,7 @@ inline Quatd quat_without(std::size_t largest, const double (&others)[3]) noexce
   return {q[0], q[1], q[2], q[3]};
 }
 
-/// The value of an IEEE 754 binary16.
+/// Converts an IEEE 754 binary16.
 inline double half_to_double(std::uint16_t bits) noexcept {
   const int exponent = (bits >> 10) & 31, mantissa = bits & 1023;
   double v = 0;

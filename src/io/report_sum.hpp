@@ -9,8 +9,8 @@
 
 namespace gsnav::io::detail {
 
-/// Appends a part to a scene: reports are summed, warnings carry the part's name. An error is the part's
-/// own, or that its filter or sort order does not fit.
+/// Appends a part to a scene and sums the reports; warnings get the part's name. Errors: those of the
+/// part, or that its filter or sort order does not fit.
 inline Status merge_loaded(LoadedCloud& scene, Result<LoadedCloud> part, const std::string& name) {
   if (!part) return part.status();
   LoadReport& sum = scene.report;

@@ -37,7 +37,7 @@ constexpr const char* kSupported =
     "folder "
     "with one of the two";
 
-/// The moment of a scene that moves.
+/// The moment `time` of a scene that moves.
 LoadedCloud moment_of(const TemporalCloud& scene, LoadReport report, double time) {
   LoadedCloud out{cloud_at(scene, time), std::move(report)};
   out.report.warnings.push_back("a moment of a moving scene: " + std::to_string(out.cloud.size()) +
@@ -46,7 +46,7 @@ LoadedCloud moment_of(const TemporalCloud& scene, LoadReport report, double time
   return out;
 }
 
-/// A PLY, at the time of the options where it moves.
+/// Reads a PLY, at the time of the options if it moves.
 Result<LoadedCloud> load_ply_at(const fs::path& path, const LoadSceneOptions& options,
                                 detail::BandsApart* apart) {
   TemporalCloud moving;
@@ -87,7 +87,7 @@ Result<LoadedCloud> load_one(const fs::path& path, const LoadSceneOptions& optio
   return {Errc::unsupported, name + ": not a scene that is read here; supported: " + kSupported};
 }
 
-/// `folder/a,b` as folder/a and folder/b.
+/// Splits `folder/a,b` into folder/a and folder/b.
 Result<std::vector<fs::path>> tiles_of(const std::string& spec) {
   std::vector<fs::path> out;
   for (std::size_t at = 0; at <= spec.size();) {
@@ -109,11 +109,11 @@ Result<std::vector<fs::path>> tiles_of(const std::string& spec) {
   return out;
 }
 
-/// What `spec` names, its rows as they were read. `apart`: as of detail::load_ply.
+/// Reads what `spec` names, with rows in file order. `apart` is that of detail::load_ply.
 Result<LoadedCloud> load_named(const std::string& spec, const LoadSceneOptions& options,
                                detail::BandsApart* apart) {
   std::error_code ignored;
-  // A file's own name may hold a comma.
+  // A file's own name may contain a comma.
   if (fs::exists(spec, ignored)) return load_one(spec, options, apart);
   const auto tiles = tiles_of(spec);
   if (!tiles) return tiles.status();
@@ -126,9 +126,9 @@ Result<LoadedCloud> load_named(const std::string& spec, const LoadSceneOptions& 
   return scene;
 }
 
-/// Keeps SH as the options say, and completes the report.
+/// Stores SH as the options say, and completes the report.
 void store(GaussianCloud& cloud, LoadReport& report, const LoadSceneOptions& options) {
-  const UpGuess up{report.up, report.up_seen};  // of each reader's own kind of file
+  const UpGuess up{report.up, report.up_seen};  // the reader's guess, which depends on the kind of file
   if (!options.keep_zero_bands)
     report.sh_bytes_let_go += limit_sh_degree(cloud, sh_degree_in_use(cloud));
   if (options.storage == Storage::compact) {
@@ -144,7 +144,7 @@ void store(GaussianCloud& cloud, LoadReport& report, const LoadSceneOptions& opt
   describe(cloud, report, norm(up.up) > 0 ? up.up : Vec3d{0, -1, 0});
 }
 
-/// Of each row of a file, where it stands in a cloud made of it.
+/// For each row of a file, its row in the cloud that was made from the file.
 std::vector<std::uint32_t> places_of(const GaussianCloud& cloud,
                                      const std::vector<std::uint32_t>& left_out) {
   const std::size_t n = cloud.size();
@@ -174,7 +174,7 @@ Result<LoadedCloud> load_sorted(const std::string& spec, const LoadSceneOptions&
       PoolBackend backend(threads_for(scene->cloud.size()) == 1 ? 1 : detail::io_threads());
       try {
         sort_spatially(backend, scene->cloud);
-      } catch (const Error& e) {  // no memory for a backend's arrays
+      } catch (const Error& e) {  // no memory for the backend's arrays
         return {e.code(), spec + ": " + e.what()};
       }
     }
@@ -183,8 +183,9 @@ Result<LoadedCloud> load_sorted(const std::string& spec, const LoadSceneOptions&
   });
 }
 
-/// Packs a cloud whose bands are read only now, a quarter each time, and packed at once: never more than
-/// a quarter of them is there as floats. Nothing where 8 bits are not enough for them.
+/// Packs a cloud whose bands were not read yet. They are read a quarter at a time and packed at once, so
+/// that never more than a quarter of them is in memory as floats. Returns nothing if 8 bits are not
+/// enough for them.
 Result<std::optional<LoadedPackedCloud>> pack_apart(const std::string& spec, LoadedCloud scene,
                                                     detail::BandsApart& apart,
                                                     const LoadSceneOptions& options) {

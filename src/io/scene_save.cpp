@@ -17,7 +17,7 @@
 namespace gsnav::io {
 namespace {
 
-/// A format that is written, with what it can hold.
+/// The writer of a format, and the range of values that the format can hold.
 struct SceneWriter {
   Status (*save)(const std::filesystem::path&, const GaussianCloud&);
   detail::FormatRange range;

@@ -22,12 +22,12 @@ using detail::Codebook;
 using detail::RgbaImage;
 using detail::SogMeta;
 
-// A constant plane of 16383 x 16383 pixels fits in some bytes of WebP. Real planes hold about one
-// Gaussian a byte of all files; what claims many times that is refused before memory is asked for.
+// A constant image of 16383 x 16383 pixels takes a few bytes of WebP. Real sets have about one Gaussian
+// for each byte of all files; refuse sets that claim many times more before allocating memory.
 constexpr std::size_t kMostGaussiansPerByte = 8;
 constexpr std::size_t kGaussianSlack = std::size_t{1} << 18;
 
-/// The files of a SOG, whether in a folder or in a bundle.
+/// The files of a SOG, in a folder or a bundle.
 class SogFiles {
  public:
   Status open(const std::filesystem::path& path) {
@@ -44,7 +44,7 @@ class SogFiles {
   }
 
   const std::string& meta() const noexcept { return meta_; }
-  /// How a file of the set is called in messages.
+  /// Name of a file of the set for messages.
   std::string label(const std::string& name) const {
     return zip_ ? bundle_name_ + ": " + name : (folder_ / name).string();
   }
@@ -56,7 +56,7 @@ class SogFiles {
     return std::vector<std::byte>(file->span().begin(), file->span().end());
   }
 
-  /// Lets go of a bundle's bytes: nothing is read afterwards.
+  /// Frees the bytes of a bundle. Nothing may be read afterwards.
   void close() noexcept {
     zip_.reset();
     bundle_ = {};
@@ -81,11 +81,11 @@ class SogFiles {
   std::optional<detail::ZipReader> zip_;
 };
 
-/// A plane: its size first, its pixels once all sizes have been checked. Its bytes are read each time,
-/// so that those of one plane alone are there.
+/// An image: first its size, and its pixels after all sizes were checked. The file is read each time, so
+/// that only one is in memory.
 struct Plane {
   std::string name, label;
-  std::size_t bytes = 0;  ///< of the file
+  std::size_t bytes = 0;  ///< Size of the file.
   detail::WebpSize size;
   RgbaImage image;
 
@@ -114,7 +114,7 @@ struct Plane {
   std::string dimensions() const {
     return std::to_string(size.width) + " x " + std::to_string(size.height);
   }
-  /// Error about pixel i of this plane.
+  /// An error about pixel i of this image.
   Status fail(std::size_t i, const std::string& what) const {
     return {Errc::invalid_file, label + ": pixel " + std::to_string(i) + ": " + what};
   }
@@ -124,7 +124,7 @@ class SogReader {
  public:
   SogReader(SogFiles& files, SogMeta meta) : files_(files), meta_(std::move(meta)) {}
 
-  /// All rows, or those of `ranges` where it is given.
+  /// Reads all rows, or those of `ranges` if it is not null.
   Result<LoadedCloud> run(const std::string& source, const std::vector<detail::RowRange>* ranges,
                           std::vector<std::uint8_t>* kept) {
     const std::vector<detail::RowRange> all = {{0, meta_.count}};
@@ -142,7 +142,8 @@ class SogReader {
     const std::size_t count = static_cast<std::size_t>(total);
     if (kept != nullptr) kept->assign(count, 0);
     GaussianCloud planes;
-    // The bands are most of the cloud: what they come of is gone before there is anything else.
+    // Bands are most of the cloud. Decode them first and free their images before anything else is
+    // allocated.
     if (Status s = look_up_bands(*ranges, count, planes.shN); !s) return s;
     for (Plane* plane : {&low_, &high_, &scales_, &quats_, &sh0_}) {
       if (Status s = plane->decode(files_); !s) return s;
@@ -164,7 +165,7 @@ class SogReader {
   }
 
  private:
-  /// f(row of the file, i) for those of the ranges' rows that i in [first, last) numbers.
+  /// Calls f(row of the file, i) for i in [first, last), where i counts the rows of all ranges.
   template <class F>
   static Status for_rows(const std::vector<detail::RowRange>& ranges, std::size_t first,
                          std::size_t last, const F& f) {
@@ -182,7 +183,7 @@ class SogReader {
     return {};
   }
 
-  /// The bands of all rows.
+  /// Looks up the bands of all rows.
   Status look_up_bands(const std::vector<detail::RowRange>& ranges, std::size_t count,
                        std::vector<float>& bands) {
     if (meta_.degree == 0) return {};
@@ -202,7 +203,8 @@ class SogReader {
     return s;
   }
 
-  /// Sizes of all planes, which must fit one another, the count and the bytes there are.
+  /// Reads the sizes of all images, and checks that they fit one another, the count and the number of
+  /// bytes.
   Status read_sizes() {
     const std::pair<Plane*, const std::string*> wanted[] = {
         {&low_, &meta_.means_low}, {&high_, &meta_.means_high}, {&scales_, &meta_.scales},
@@ -236,7 +238,7 @@ class SogReader {
     if (Status s = centroids_.read(files_, meta_.centroids); !s) return s;
     const std::size_t width = kEntriesPerRow * coefficients;
     const std::size_t rows = (meta_.palette + kEntriesPerRow - 1) / kEntriesPerRow;
-    // The palette has at most 65536 entries, so a larger image only wastes memory.
+    // The palette has at most 65536 entries, so a larger image would only waste memory.
     if (centroids_.size.width != width || centroids_.size.height < rows ||
         centroids_.size.height > kMostRows) {
       return {Errc::invalid_file, centroids_.label + ": " + centroids_.dimensions() +
@@ -273,7 +275,8 @@ class SogReader {
     return quaternion(i, raw.quat);
   }
 
-  /// Three components in [-1, 1] / sqrt(2); the fourth, the largest, is what unit length leaves.
+  /// Decodes a quaternion: three components in [-1, 1] / sqrt(2); the fourth, the largest, follows from
+  /// unit length.
   Status quaternion(std::size_t i, Quatd& quat) const {
     const std::uint8_t* p = quats_.image.pixel(i);
     if (p[3] < kFirstMode) {

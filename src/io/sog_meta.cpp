@@ -15,7 +15,7 @@ constexpr std::int64_t kMostGaussians = std::int64_t{16383} * 16383;  // WebP's 
 constexpr std::size_t kBytes = 256;
 constexpr std::int64_t kLargestPalette = 65536;  // labels have two bytes
 
-/// Parses with the first error kept, so that a field is one line below.
+/// A parser that keeps the first error, so that reading a field takes one line.
 class MetaParser {
  public:
   MetaParser(const Json& json, const std::string& source) : json_(json), source_(source) {}
@@ -123,7 +123,7 @@ class MetaParser {
     files("shN", *rest, {&meta_.centroids, &meta_.labels});
   }
 
-  /// Version 1 has a range for each channel instead of codebooks, and opacity as a logit.
+  /// Reads version 1, which has a range for each channel instead of codebooks, and opacity as a logit.
   void version1(const Json& means, const Json& scales, const Json& sh0) {
     if (member(json_, "shN") != nullptr) {
       status_ = {Errc::unsupported, source_ +

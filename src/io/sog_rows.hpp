@@ -10,15 +10,15 @@
 
 namespace gsnav::io::detail {
 
-/// Rows [first, first + count) of a file.
+/// The rows [first, first + count) of a file.
 struct RowRange {
   std::uint64_t first = 0, count = 0;
   bool operator==(const RowRange&) const = default;
 };
 
-/// load_sog for some rows, in the order of the ranges. `kept`: gets 1 for each row of the ranges that is
-/// in the cloud, else 0. Error beside load_sog's: invalid_file (a range that ends behind the file's
-/// count).
+/// Reads some rows of a SOG, in the order of the ranges. If `kept` is not null, it gets 1 for each row
+/// of the ranges that is in the cloud, else 0. Errors: those of load_sog; invalid_file (a range that
+/// ends beyond the file's count).
 Result<LoadedCloud> load_sog_rows(const std::filesystem::path& path, const std::vector<RowRange>& ranges,
                                   std::vector<std::uint8_t>* kept = nullptr);
 

@@ -35,7 +35,7 @@ using detail::RgbaImage;
 constexpr std::size_t kLargestPalette = 65536, kSmallPalette = 1024;  // labels have two bytes
 constexpr std::size_t kEntriesPerRow = 64;
 constexpr std::size_t kMostSide = 16383;  // of a WebP
-/// What the images of a SOG are called, without their ending.
+/// Names of the images of a SOG, without their endings.
 constexpr const char* kStems[] = {"means_l", "means_u",       "scales",    "quats",
                                   "sh0",     "shN_centroids", "shN_labels"};
 
@@ -44,7 +44,7 @@ using Files = std::vector<std::pair<std::string, std::string>>;
 
 class SogWriter {
  public:
-  /// `ending`: of the images' names, ".webp" or, beside another scene's, ".1.webp".
+  /// `ending` is that of the images' names: ".webp", or next to another scene for example ".1.webp".
   SogWriter(const GaussianCloud& cloud, const std::string& target, std::string ending = ".webp")
       : cloud_(cloud), target_(target), ending_(std::move(ending)) {}
 
@@ -61,8 +61,8 @@ class SogWriter {
     }
     meta_ = {{"version", 2}, {"asset", {{"generator", "gsnav"}}}, {"count", n}};
     meta_["antialias"] = cloud_.filter == Filter::mip;
-    // What takes longest comes first. Each part is made by one thread, so that any number of them makes
-    // the same bytes.
+    // Begin with the part that takes longest. One thread makes each part, so the bytes do not depend on
+    // the number of threads.
     Status (SogWriter::*const make[])(Part&)
         const = {&SogWriter::bands, &SogWriter::means, &SogWriter::scales, &SogWriter::colours,
                  &SogWriter::quats};
@@ -75,7 +75,7 @@ class SogWriter {
     if (made.code() == Errc::out_of_memory) throw std::bad_alloc();
     if (!made) return made;
     Files files;
-    constexpr std::size_t kInFile[] = {1, 2, 4, 3, 0};  // the order that readers have always seen
+    constexpr std::size_t kInFile[] = {1, 2, 4, 3, 0};  // the order that readers are used to
     for (const std::size_t k : kInFile) {
       if (!parts[k].meta.is_null()) meta_[parts[k].name] = std::move(parts[k].meta);
       for (auto& file : parts[k].files) files.push_back(std::move(file));
@@ -85,7 +85,7 @@ class SogWriter {
   }
 
  private:
-  /// One member of the description and the files that it names.
+  /// One member of meta.json and the files that it names.
   struct Part {
     std::string name;
     Json meta;
@@ -96,7 +96,7 @@ class SogWriter {
     return {width_, height_, std::vector<std::uint8_t>(4 * width_ * height_, 255)};
   }
 
-  /// Adds an image to a part and its name to the part's description.
+  /// Adds an image to a part, and its name to the part's metadata.
   Status add(Part& part, const char* stem, const RgbaImage& image) const {
     const std::string name = stem + ending_;
     auto bytes = detail::encode_webp(image, target_ + ": " + name);
@@ -106,7 +106,7 @@ class SogWriter {
     return {};
   }
 
-  /// sign(v) log(1 + |v|), so that far things take fewer of the steps.
+  /// sign(v) log(1 + |v|), so that distant values take fewer of the steps.
   static double squeezed(double v) { return std::copysign(std::log1p(std::fabs(v)), v); }
 
   Status means(Part& part) const {
@@ -213,12 +213,12 @@ class SogWriter {
   const GaussianCloud& cloud_;
   const std::string& target_;
   std::string ending_;
-  std::vector<std::uint32_t> rows_;  ///< of the cloud, in the file's order
+  std::vector<std::uint32_t> rows_;  ///< rows of the cloud, in the file's order
   std::size_t width_ = 0, height_ = 0;
   Json meta_;
 };
 
-/// Whether a file is an image of a SOG by its name: "means_l.webp", "means_l.3.webp".
+/// Whether a file name is that of a SOG's image: "means_l.webp", "means_l.3.webp".
 bool is_sog_image(const std::string& name) {
   return std::any_of(std::begin(kStems), std::end(kStems), [&](const std::string stem) {
     if (!name.starts_with(stem) || !name.ends_with(".webp") || name.size() < stem.size() + 5)
@@ -229,7 +229,7 @@ bool is_sog_image(const std::string& name) {
   });
 }
 
-/// What has such a name in a folder, be it a file or not.
+/// Names in a folder that are those of a SOG's images, whether files or not.
 std::vector<std::string> sog_images_in(const std::filesystem::path& folder) {
   std::vector<std::string> names;
   std::error_code error;
@@ -241,8 +241,8 @@ std::vector<std::string> sog_images_in(const std::filesystem::path& folder) {
   return names;
 }
 
-/// An ending that no image in the folder has: the scene that lies there stays whole until meta.json
-/// names the new one.
+/// An ending that no image in the folder has. The scene in the folder then stays complete until
+/// meta.json names the new images.
 std::string free_ending(const std::vector<std::string>& images) {
   std::string ending = ".webp";
   for (int n = 1;; ++n) {
@@ -255,8 +255,8 @@ std::string free_ending(const std::vector<std::string>& images) {
   }
 }
 
-/// Writes the images, then meta.json, which makes them the folder's scene, and takes away those of the
-/// scene before.
+/// Writes the images, then meta.json, which makes them the folder's scene, then removes the images of
+/// the previous scene.
 Status write_folder(const std::filesystem::path& folder, const Files& files,
                     const std::vector<std::string>& before) {
   std::error_code ignored;
@@ -295,7 +295,7 @@ Status save_sog(const std::filesystem::path& path, const GaussianCloud& cloud) {
     if (!files) return files.status();
     detail::ZipWriter zip(target);
     for (const auto& [name, content] : *files) {
-      if (Status s = zip.add(name, content, false); !s) return s;  // WebP is packed already
+      if (Status s = zip.add(name, content, false); !s) return s;  // WebP is compressed already
     }
     return replace_file(path, zip.entries() + zip.finish());
   });

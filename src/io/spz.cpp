@@ -43,7 +43,7 @@ class SpzDecoder {
       for (std::size_t k = 0; k < 3; ++k) others[k] = std::to_integer<int>(p[k]) / 127.5 - 1;
       return detail::quat_without(0, others);
     }
-    // Three signs and magnitudes, the last in the lowest bits, of x, y, z, w without the largest.
+    // x, y, z, w without the largest, each as sign and magnitude, the last one in the lowest bits.
     const std::uint32_t packed = load_le<std::uint32_t>(p);
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t bits = packed >> (20 - 10 * k);

@@ -64,7 +64,7 @@ class PlanesReader {
         take(k, rows.data(), row, n);
       }
     }
-    // What follows is read no further than it takes to see the checksum.
+    // Read the rest of the stream only as far as needed to verify the checksum.
     std::array<std::byte, 4096> rest;
     std::size_t stray = 0;
     for (std::size_t piece = 0; piece < 64 && !gzip.at_end(); ++piece) {
@@ -79,7 +79,7 @@ class PlanesReader {
     return {};
   }
 
-  /// Header, extensions, sizes of the streams, the streams: one for each plane that has bytes.
+  /// Reads version 4: header, extensions, table of sizes, and a stream for each plane that has bytes.
   Status read_zstd() {
     if (bytes_.size() < kPlainHeader) {
       return fail(std::to_string(bytes_.size()) + " bytes, the header alone has 32");
@@ -107,7 +107,7 @@ class PlanesReader {
     return unpack_all(packed);
   }
 
-  /// Where each stream lies, from the table at byte `toc`: one behind the other.
+  /// Finds the streams, which follow one another, from the table at byte `toc`.
   Status find_streams(std::size_t toc, std::size_t streams, std::array<ByteSource, kPlanes>& packed) {
     const std::byte* const table = bytes_.get(toc, streams * kTocEntry, room_);
     if (table == nullptr) return reading_failed(source_);
@@ -131,13 +131,14 @@ class PlanesReader {
     return {};
   }
 
-  /// Unpacks the streams, one at a time, into planes that are not in use yet, and takes their rows from
+  /// Unpacks the streams one at a time into planes that are not in use yet, and decodes the rows from
   /// there.
   Status unpack_all(const std::array<ByteSource, kPlanes>& packed) {
     GaussianCloud& cloud = planes_.cloud;
     const std::size_t count = planes_.header.count, width = planes_.header.widths()[kBands];
     make_bands();
-    if (width != 0) {  // first: the largest stream beside the largest plane alone
+    if (width != 0) {  // Bands come first: only then the largest stream and the largest plane are in
+                       // memory with nothing else.
       if (Status s = unpack(kBands, packed[kBands], packed_rows(cloud.shN, width * count)); !s) return s;
       widen_rows<kMostWidth>(cloud.shN, count, width,
                              [this](const std::byte* in, float* out) { bands(in, out); });
@@ -152,7 +153,7 @@ class PlanesReader {
                                                                       : cloud.quats[1]);
       const std::span<std::byte> to = plane.first(planes_.header.widths()[k] * count);
       if (Status s = unpack(k, packed[k], to); !s) return s;
-      if (k == kQuaternions) continue;  // they are where they belong
+      if (k == kQuaternions) continue;  // they need no decoding
       for_pieces(count, pieces_of(count),
                  [&](std::size_t, std::size_t first, std::size_t last) -> Status {
                    take(k, to.data() + first * planes_.header.widths()[k], first, last - first);
@@ -180,7 +181,7 @@ class PlanesReader {
     return {};
   }
 
-  /// Records of type, length and content, of which none is understood.
+  /// Skips extensions: records of type, length and content, none of which is understood.
   Status read_extensions(ByteSource records) {
     if ((planes_.header.flags & kSpzExtensions) == 0) return {};
     planes_.warnings.push_back("extensions in the file are not read");
@@ -201,7 +202,7 @@ class PlanesReader {
     return {};
   }
 
-  /// The first 15 bytes, which all versions share.
+  /// Parses the first 15 bytes, which all versions share.
   Status parse_header(const std::byte* p, std::uint32_t first, std::uint32_t last, const char* read) {
     SpzHeader& h = planes_.header;
     h.version = load_le<std::uint32_t>(p + 4);
@@ -222,7 +223,8 @@ class PlanesReader {
     return {};
   }
 
-  /// Whether so many bytes may be asked for; `total`: those of all planes, unpacked.
+  /// Checks that the unpacked size of all planes is plausible for the size of the file. `total` gets
+  /// that size.
   Status believe(std::uint64_t& total) const {
     for (const std::size_t width : planes_.header.widths())
       total += std::uint64_t{planes_.header.count} * width;
@@ -230,7 +232,7 @@ class PlanesReader {
     return fail(gaussians() + " from " + std::to_string(bytes_.size()) + " bytes are not believed");
   }
 
-  /// Floats of shN a row.
+  /// Floats of shN in each row.
   std::size_t rest_in_cloud() const noexcept {
     return 3 * std::min<std::size_t>(15, planes_.header.coefficients());
   }
@@ -241,7 +243,7 @@ class PlanesReader {
     resize_planes(planes_.cloud, planes_.header.count);
   }
 
-  /// Takes n rows of plane k, from row `first` on.
+  /// Decodes n rows of plane k, the first of which is `first`.
   void take(std::size_t k, const std::byte* rows, std::size_t first, std::size_t n) {
     GaussianCloud& cloud = planes_.cloud;
     const std::size_t width = planes_.header.widths()[k], rest = rest_in_cloud();
@@ -259,7 +261,7 @@ class PlanesReader {
     }
   }
 
-  /// Of binary16, or 24 bits of which a power of two is one: a float has it as it is.
+  /// A coordinate from binary16, or from 24 bits in steps of a power of two. A float holds it exactly.
   double position(const std::byte* row, std::size_t axis) const {
     const double turned = turn_ && axis > 0 ? -1 : 1;
     if (planes_.header.version == 1)
@@ -292,7 +294,7 @@ class PlanesReader {
   const std::string& source_;
   const bool turn_;
   SpzPlanes planes_;
-  std::vector<std::byte> room_;  ///< what of a file is looked at
+  std::vector<std::byte> room_;  ///< scratch for parts of a file
 };
 
 }  // namespace

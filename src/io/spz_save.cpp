@@ -21,7 +21,7 @@
 namespace gsnav::io {
 namespace {
 
-constexpr int kLevel = 12;  // of zstd: beyond it the files hardly shrink
+constexpr int kLevel = 12;  // of zstd; higher levels hardly make files smaller
 constexpr int kJob = 1 << 20;
 constexpr std::uint32_t kTocOffset = 32;
 
@@ -72,13 +72,13 @@ class SpzWriter {
  private:
   Status fail(const std::string& what) const { return {Errc::invalid_argument, target_ + ": " + what}; }
 
-  /// Compresses by zstd's own threads where it has them; the bytes do not depend on their number.
+  /// Compresses a plane by zstd's own threads if it has them. The bytes do not depend on their number.
   Status pack(const ByteColumn& plane, ByteColumn& packed) const {
     const std::unique_ptr<ZSTD_CCtx, std::size_t (*)(ZSTD_CCtx*)> context(ZSTD_createCCtx(),
                                                                           ZSTD_freeCCtx);
     if (!context) return {Errc::out_of_memory, target_ + ": not enough memory"};
     ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, kLevel);
-    // An error where it has none.
+    // Returns an error in a zstd without threads; ignore it.
     ZSTD_CCtx_setParameter(context.get(), ZSTD_c_nbWorkers, static_cast<int>(detail::io_threads()));
     ZSTD_CCtx_setParameter(context.get(), ZSTD_c_jobSize, kJob);
     packed.resize(ZSTD_compressBound(plane.size()));
@@ -120,7 +120,7 @@ class SpzWriter {
     return {};
   }
 
-  /// Makes record i of the cloud's `row`.
+  /// Makes record i from the cloud's `row`.
   void add(std::size_t i, std::size_t row, std::size_t coefficients) {
     const Vec3d m = cloud_.mean(row);
     const double place[] = {m.x, turn_ * m.y, turn_ * m.z};
@@ -162,7 +162,7 @@ class SpzWriter {
     }
   }
 
-  /// The nearest of the 2^bits steps over [-1, 1), of which the middle one is zero.
+  /// Rounds v to one of 2^bits steps over [-1, 1), the middle one of which is zero.
   static std::uint8_t sh_byte(double v, int bits) {
     const double step = std::exp2(8 - bits);
     const double most = 256 - step;
@@ -175,7 +175,7 @@ class SpzWriter {
   const GaussianCloud& cloud_;
   const SaveSpzOptions& options_;
   const std::string& target_;
-  double turn_;  ///< of y and z
+  double turn_;  ///< sign of y and z
   detail::SpzHeader header_;
   std::array<ByteColumn, 6> planes_;
 };

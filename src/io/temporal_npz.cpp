@@ -18,7 +18,7 @@
 namespace gsnav::io::detail {
 namespace {
 
-/// One network's Gaussians. What is not in the file is empty.
+/// The Gaussians of one network. Arrays that are missing in the file are empty.
 struct Part {
   std::string prefix;
   bool moves = true;
@@ -81,7 +81,7 @@ class TemporalNpz {
     return {Errc::invalid_file, file_.source() + ": " + what};
   }
 
-  /// A number that need not be there.
+  /// Reads an optional number.
   Status number(const std::string& name, double& to) const {
     if (!file_.contains(name)) return {};
     const auto value = NpzArrays(file_).number(name);
@@ -90,7 +90,8 @@ class TemporalNpz {
     return {};
   }
 
-  /// [N][width] (kAny: any), with or without a 1 between; one that need not be there stays empty.
+  /// Reads an array [N][width] (kAny: any), with or without a dimension of 1 in between. An optional
+  /// array that is missing stays empty.
   Status array(const Part& part, const char* name, std::size_t width, bool needed, NpyArray& to) const {
     const std::string key = part.prefix + name;
     if (!needed && !file_.contains(key)) return {};

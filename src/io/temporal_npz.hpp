@@ -7,7 +7,7 @@
 
 namespace gsnav::io::detail {
 
-/// load_temporal of an `.npz`.
+/// Implements load_temporal for an `.npz`.
 Result<LoadedTemporalCloud> load_temporal_npz(const std::filesystem::path& path);
 
 }  // namespace gsnav::io::detail

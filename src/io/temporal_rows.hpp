@@ -14,32 +14,32 @@
 
 namespace gsnav::io::detail {
 
-/// Time and motion of one Gaussian as files store them. What a file leaves out is zero.
+/// Time and motion of one Gaussian, as stored in files. Values that a file leaves out are zero.
 struct RawTemporal {
-  double time = 0;       ///< seconds
-  double log_sigma = 0;  ///< natural logarithm, seconds; infinity: always there
+  double time = 0;       ///< Seconds.
+  double log_sigma = 0;  ///< Natural logarithm, seconds; infinity: always present.
   std::array<double, kMotionPlanes> motion{};
 };
 
-/// Takes the time planes of a file's rows beside the CloudSink that takes their Gaussians, from any
-/// number of threads.
+/// Collects the time planes of a file's rows, while a CloudSink collects their Gaussians. Any number of
+/// threads may add rows.
 class TemporalRows {
  public:
-  /// For `count` rows of `motion_planes` planes of motion: 0, 3, 6 or 9.
+  /// For `count` rows with `motion_planes` planes of motion: 0, 3, 6 or 9.
   TemporalRows(std::size_t count, std::size_t motion_planes) {
     planes_.times.resize(count);
     planes_.sigmas.resize(count);
     for (std::size_t k = 0; k < motion_planes; ++k) planes_.motion[k].resize(count);
   }
 
-  /// Gives row `row` to the sink and keeps its planes. A row whose planes are not finite is not finite
-  /// as a whole.
+  /// Adds row `row` to the sink and stores its planes. A row whose planes are not finite counts as not
+  /// finite.
   void add(std::size_t row, const RawTemporal& t, RawGaussian raw, CloudSink& sink) noexcept {
     constexpr double kLimit = 20;
     constexpr float kDropped = std::numeric_limits<float>::quiet_NaN();
     const bool always = std::isinf(t.log_sigma) && t.log_sigma > 0;
     const double log_sigma = always ? t.log_sigma : clamp(t.log_sigma, -kLimit, kLimit);
-    // Finite as the floats that they become.
+    // Check the floats that are stored.
     bool finite = !std::isnan(t.log_sigma) && is_finite(static_cast<float>(t.time));
     for (const double m : t.motion) finite = finite && is_finite(static_cast<float>(m));
     if (!finite) raw.mean.x = std::numeric_limits<double>::quiet_NaN();
@@ -52,8 +52,7 @@ class TemporalRows {
     }
   }
 
-  /// Moves the planes of the rows that were kept to `out`, whose cloud has these, and tells the report
-  /// what there is.
+  /// Moves the planes of the kept rows to `out`, whose cloud has these rows, and fills in the report.
   void give(TemporalCloud& out, LoadReport& report) {
     std::size_t to = 0;
     float first = std::numeric_limits<float>::infinity(), last = -first;
@@ -91,7 +90,7 @@ class TemporalRows {
   }
 
  private:
-  TemporalCloud planes_;  // without its cloud; the time of a row that was dropped is NaN
+  TemporalCloud planes_;  // without its cloud; a dropped row has time NaN
   std::atomic<std::uint64_t> clamped_{0};
 };
 

@@ -13,13 +13,13 @@
 
 namespace gsnav::io::detail {
 
-/// Goes through a text line by line and word by word; blank lines and what follows a '#' are passed
-/// over. Messages name the source and the line.
+/// Iterates over the lines of a text and their words. Blank lines and text after a '#' are skipped.
+/// Messages name the source and the line.
 class TextLines {
  public:
   TextLines(std::string_view text, const std::string& source) : text_(text), source_(source) {}
 
-  /// Goes to the next line that has words; false at the end.
+  /// Goes to the next line with words. Returns false at the end.
   bool next() {
     while (at_ < text_.size()) {
       ++line_;
@@ -32,7 +32,7 @@ class TextLines {
     return false;
   }
   const std::vector<std::string_view>& words() const noexcept { return words_; }
-  /// Word k of the line, empty where there is none.
+  /// Word k of the line; empty if there is none.
   std::string_view word(std::size_t k) const noexcept {
     return k < words_.size() ? words_[k] : std::string_view{};
   }
@@ -40,15 +40,15 @@ class TextLines {
   Status bad(const std::string& what) const {
     return {Errc::invalid_file, source_ + ": line " + std::to_string(line_) + ": " + what};
   }
-  /// Word k as a finite number.
+  /// Reads word k as a finite number.
   Status number(std::size_t k, double& out) const {
     return parse(word(k), out) ? Status() : bad(in_quotes(word(k)) + " is no number");
   }
-  /// All of `word` as a finite number.
+  /// Parses the whole of `word` as a finite number.
   static bool parse(std::string_view word, double& out) {
     if (!word.empty() && word.front() == '+') word.remove_prefix(1);
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), out);
-    // What is too small for a double is zero.
+    // A value too small for a double becomes zero.
     if (error == std::errc::result_out_of_range && end == word.data() + word.size()) {
       out = 0.0;
       return word.find("e-") != word.npos || word.find("E-") != word.npos;

@@ -14,20 +14,20 @@ namespace {
 namespace fs = std::filesystem;
 using detail::invalid_file;
 
-/// Grows with every change of what build_visible_sets makes of a cloud.
+/// Version of the result of build_visible_sets: increase it with every change.
 constexpr std::uint32_t kVersion = 2;
 
-/// What stands at the front; keys, ends and bits follow.
+/// Start of the file. Keys, ends and bits follow.
 struct Header {
   detail::CacheFront front;
   double cell, focal, near_plane, near_sigma, min_weight;
-  std::uint64_t viewpoints, cells, chunks;  ///< chunks of the cloud
-  std::uint64_t words;                      ///< of all cells' bits
-  std::uint64_t checksum;                   ///< of the numbers above and of the arrays
+  std::uint64_t viewpoints, cells, chunks;  ///< chunks: those of the cloud.
+  std::uint64_t words;                      ///< Number of words of all cells.
+  std::uint64_t checksum;                   ///< Checksum of the numbers above and of the arrays.
 };
 static_assert(sizeof(Header) == 112);
 
-/// Of the cloud but for its colours, and of the version.
+/// Hash of the cloud without its colours, and of the version.
 Hasher hash_of(const GaussianCloud& cloud) {
   Hasher h;
   h.value(kVersion);
@@ -49,7 +49,8 @@ std::uint64_t checksum(const VisibleSets& v) {
   return h.low();
 }
 
-/// What is wrong with the words of a cell of a cloud of so many Gaussians, or null.
+/// Checks the words of a cell, for a cloud of `cloud_rows` Gaussians. Returns a description of the flaw,
+/// or null.
 const char* flaw_of(const VisibleSets& v, std::size_t cell, std::size_t cloud_rows) {
   const View<const std::uint32_t> seen = v.seen_from(cell);
   const std::size_t words = v.words();
@@ -73,7 +74,7 @@ const char* flaw_of(const VisibleSets& v, std::size_t cell, std::size_t cloud_ro
   return nullptr;
 }
 
-/// What lookups and kernels rely on.
+/// Checks the values that lookups and kernels rely on.
 Status check(const fs::path& path, const VisibleSets& v, std::size_t cloud_rows) {
   if (!(v.cell > 0 && std::isfinite(v.cell)))
     return invalid_file(path, "cell = " + std::to_string(v.cell));
@@ -131,7 +132,7 @@ Result<VisibleSets> load_visible_sets(const fs::path& path, const GaussianCloud&
     detail::RandomFile file;
     Header header{};
     if (Status s = open_cache(path, front_of(cloud), "file of visible sets", file, header); !s) return s;
-    // Nothing is allocated that the file does not have.
+    // Allocate no more than the size of the file.
     VisibleSets v;
     v.cloud_chunks = cloud.view().chunk_count();
     constexpr std::uint64_t kCell = sizeof(VisibleSets::Key) + sizeof(std::uint64_t);

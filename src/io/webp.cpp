@@ -24,7 +24,8 @@ Result<WebpSize> webp_size(std::span<const std::byte> bytes, const std::string& 
              height = static_cast<std::size_t>(features.height);
   if (use == WebpUse::picture) {
     if (features.has_animation != 0) return {Errc::unsupported, what + ": an animated WebP"};
-    // Sets of planes are checked against their counts; a picture of one colour takes next to no bytes.
+    // SOG images are checked against their counts. A texture of one colour takes almost no bytes, so
+    // allow small ones.
     constexpr std::size_t kBelieved = std::size_t{1} << 22;
     if (width * height > kBelieved && width * height / 512 > bytes.size()) {
       return {Errc::invalid_file, what + ": " + std::to_string(width) + " x " + std::to_string(height) +
@@ -55,8 +56,8 @@ Result<RgbaImage> decode_webp(std::span<const std::byte> bytes, const std::strin
 }
 
 Result<std::string> encode_webp(const RgbaImage& image, const std::string& what) {
-  // Of 9. Planes look like noise: 4 takes less than 1% more off, in half as much time again to three
-  // times as much.
+  // Level 1 of 9. SOG images look like noise: level 4 makes them less than 1% smaller and takes 1.5 to 3
+  // times as long.
   constexpr int kLevel = 1;
   WebPConfig config;
   WebPPicture picture;

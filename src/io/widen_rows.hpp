@@ -11,14 +11,14 @@
 
 namespace gsnav::io::detail {
 
-/// Where `bytes` bytes lie that widen_rows makes floats of: at the end of the array.
+/// The last `bytes` bytes of the array, where the input of widen_rows is.
 inline std::span<std::byte> packed_rows(std::vector<float>& rows, std::size_t bytes) noexcept {
   return std::as_writable_bytes(std::span(rows)).last(bytes);
 }
 
-/// Makes rows of floats of `count` rows of `width` bytes at the end of the same array, in place and in
-/// parallel: `row(in, out)` makes row i of `width` bytes, a copy. A row of floats must be as large as
-/// its bytes at least. No second array is there at any time.
+/// Expands `count` rows of `width` bytes at the end of an array to rows of floats in the same array, in
+/// place and in parallel. `row(in, out)` makes a row of floats from a copy of its bytes. A row of floats
+/// must be at least as large as its bytes. No second array is allocated.
 template <std::size_t kMostWidth, class Row>
 void widen_rows(std::vector<float>& rows, std::size_t count, std::size_t width, const Row& row) {
   if (count == 0 || width == 0) return;
@@ -32,8 +32,8 @@ void widen_rows(std::vector<float>& rows, std::size_t count, std::size_t width, 
     }
   };
   for (std::size_t done = 0; done < count;) {
-    // Rows that end in front of the first byte not yet read do not depend on one another; of the last
-    // few each does.
+    // Rows of floats that end before the first unread byte are independent and can be made in parallel.
+    // The last few must be made one by one.
     const std::size_t free = ((size - width) * count + width * done) / size;
     const std::size_t next = std::clamp(free, done + 1, count);
     for_pieces(next - done, pieces_of(next - done),

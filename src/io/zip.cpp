@@ -19,7 +19,7 @@ constexpr std::size_t kEnd64Size = 56, kLocator64Size = 20;
 constexpr std::uint32_t kIn64 = 0xffffffff;  // the value is in a zip64 field
 constexpr std::uint16_t kStored = 0, kDeflated = 8, kEncrypted = 1;
 
-/// Offset of the record that ends an archive; a comment of unknown length may follow it.
+/// Offset of the record that ends an archive. A comment of unknown length may follow it.
 std::optional<std::size_t> find_end(std::span<const std::byte> bytes) {
   if (bytes.size() < kEndSize) return std::nullopt;
   const std::size_t last = bytes.size() - kEndSize;
@@ -37,7 +37,7 @@ Status inflate_raw(std::span<const std::byte> packed, std::span<std::byte> out,
                    const std::string& what) {
   z_stream z{};
   if (inflateInit2(&z, -MAX_WBITS) != Z_OK) return {Errc::out_of_memory, what + ": zlib has no memory"};
-  // zlib's counters are 32-bit; what is longer is handed over in parts.
+  // zlib's counters are 32-bit, so longer data are passed in parts.
   constexpr std::size_t kPart = std::size_t{1} << 30;
   std::size_t read = 0, written = 0;
   int code = Z_OK;
@@ -51,7 +51,7 @@ Status inflate_raw(std::span<const std::byte> packed, std::span<std::byte> out,
     code = inflate(&z, Z_NO_FLUSH);
     read += in - z.avail_in;
     written += room - z.avail_out;
-    if (z.avail_in == in && z.avail_out == room) break;  // nothing more can come
+    if (z.avail_in == in && z.avail_out == room) break;  // no more progress is possible
   }
   const bool whole = code == Z_STREAM_END && written == out.size() && read == packed.size();
   inflateEnd(&z);
@@ -64,7 +64,7 @@ struct Directory {
   bool several_volumes = false;
 };
 
-/// The place of the directory, from the record at `at` or from the zip64 record it stands for.
+/// Position of the directory, from the record at `at` or from the zip64 record that replaces it.
 std::optional<Directory> find_directory(std::span<const std::byte> bytes, std::size_t at) {
   const std::byte* end = bytes.data() + at;
   Directory d{load_le<std::uint16_t>(end + 10), load_le<std::uint32_t>(end + 12),
@@ -91,7 +91,8 @@ std::optional<Directory> find_directory(std::span<const std::byte> bytes, std::s
   return d;
 }
 
-/// Replaces the values that stand in the zip64 extra field, in this order; false where it lacks one.
+/// Replaces those of the three values that are stored in the zip64 extra field. Returns false if the
+/// field lacks one.
 bool take_zip64(std::span<const std::byte> extra, std::uint64_t& size, std::uint64_t& packed,
                 std::uint64_t& offset) {
   if (size != kIn64 && packed != kIn64 && offset != kIn64) return true;
@@ -206,14 +207,14 @@ Result<std::vector<std::byte>> ZipReader::read(const std::string& name, std::uin
     return {Errc::invalid_file, what + ": no local header at offset " + std::to_string(e.local_offset)};
   }
   const std::byte* local = bytes_.data() + e.local_offset;
-  // The local header's own copies of the sizes may be zero (streamed archives); the directory's count.
+  // The sizes in the local header may be zero (streamed archives), so use those of the directory.
   const std::size_t data = e.local_offset + kLocalSize + load_le<std::uint16_t>(local + 26) +
                            std::size_t{load_le<std::uint16_t>(local + 28)};
   if (data > bytes_.size() || e.packed > bytes_.size() - data) {
     return {Errc::invalid_file, what + ": " + std::to_string(e.packed) + " bytes at offset " +
                                     std::to_string(data) + " are not inside the file"};
   }
-  // Dividing, so that no product overflows.
+  // Divide instead of multiplying, which could overflow.
   if (e.method == kStored ? e.size != e.packed
                           : e.size > slack && (e.size - slack) / kMostInflation > e.packed) {
     return {Errc::invalid_file, what + ": a size of " + std::to_string(e.size) + " bytes from " +

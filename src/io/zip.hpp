@@ -12,14 +12,14 @@
 
 namespace gsnav::io::detail {
 
-/// A decompressed entry may be this many times its compressed size, and a constant part on top: far
-/// more than WebP and JSON reach, far less than what deflate can blow up (1032 times).
+/// Limit on the size of a decompressed entry: this many times its compressed size, plus a constant. It
+/// is far more than WebP and JSON reach, and far less than deflate's maximum of 1032 times.
 inline constexpr std::uint64_t kMostInflation = 100;
 inline constexpr std::uint64_t kInflationSlack = std::uint64_t{1} << 16;
 
-/// Reads a zip archive in memory: stored and deflated entries, zip64, one volume, no encryption.
-/// Every offset and size is checked against the bytes there are; names that leave the archive's folder
-/// and names that come twice are refused. Checksums are verified.
+/// Reads a zip archive in memory: stored and deflated entries, zip64, one volume, no encryption. Every
+/// offset and size is checked against the data. Names that leave the archive's folder or occur twice are
+/// refused. Checksums are verified.
 class ZipReader {
  public:
   /// Reads the central directory. The bytes must outlive the reader; `source` names them in messages.
@@ -28,7 +28,7 @@ class ZipReader {
   bool contains(const std::string& name) const { return entries_.count(name) != 0; }
   /// Names of all entries that are files, sorted.
   std::vector<std::string> names() const;
-  /// Decompresses an entry. `slack`: bytes that are believed however small the entry is.
+  /// Decompresses an entry. `slack`: size that is accepted however small the compressed entry is.
   /// Errors: file_not_found, invalid_file, unsupported.
   Result<std::vector<std::byte>> read(const std::string& name,
                                       std::uint64_t slack = kInflationSlack) const;
@@ -47,7 +47,7 @@ class ZipReader {
   std::map<std::string, Entry> entries_;
 };
 
-/// Whether a file name read from an archive or a meta file stays inside its folder.
+/// Whether a file name from an archive or a meta file stays inside its folder.
 bool is_safe_name(const std::string& name);
 
 }  // namespace gsnav::io::detail

@@ -11,7 +11,7 @@ namespace gsnav::io::detail {
 namespace {
 
 constexpr std::uint64_t kMost = 0xffffffff;       // from here on zip64 would be needed
-constexpr std::uint32_t kFirstDate = 0x00210000;  // 1 January 1980, the earliest there is
+constexpr std::uint32_t kFirstDate = 0x00210000;  // 1 January 1980, the earliest date of the format
 
 template <class T>
 void put(std::string& out, T value) {

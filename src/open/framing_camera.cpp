@@ -18,7 +18,8 @@ namespace {
 
 constexpr double kEyeHeight = 1.5;
 
-/// A place on the largest island from which one can walk straight the farthest, and where that leads.
+/// The point, among random ones on the largest island, with the longest straight walk, and the end of
+/// that walk.
 std::pair<Vec3d, Vec3d> longest_view(const NavMesh& mesh) {
   constexpr std::size_t kPlaces = 48;
   Rng rng(1);
@@ -36,7 +37,7 @@ std::pair<Vec3d, Vec3d> longest_view(const NavMesh& mesh) {
   return {places[0], places[0] + Vec3d{0, 0, -1}};
 }
 
-/// Box around the meshes of a scene, in the world.
+/// Box of a scene's meshes in the world.
 Aabb<double> box_of(const std::vector<SceneMesh>& meshes) {
   Aabb<double> box;
   for (const SceneMesh& mesh : meshes) {
@@ -77,7 +78,7 @@ Result<std::vector<Camera>> views_around(const OpenedScene& scene, int count, in
     out = asset.cloud != nullptr ? views_around(*asset.cloud, up_in_file, count, width, height)
                                  : views_around(scene.report.bounds, up_in_file, count, width, height);
     for (Camera& camera : out) {
-      if (scene.up == "keep") break;  // they stand so already
+      if (scene.up == "keep") break;  // they are in the world's frame already
       const Affine3<double> stands = rigid_inverse(camera.viewmat);
       const Vec3d ahead = stands.translation + stands.linear.column(2);
       camera = Camera::look_at(asset.world_from_asset * stands.translation,

@@ -14,10 +14,10 @@
 namespace gsnav::detail {
 namespace {
 
-/// What was read and made so far.
+/// The Gaussians as read or made so far.
 struct Gaussians {
   GaussianCloud cloud;
-  std::optional<PackedCloud> packed;  ///< in place of `cloud`
+  std::optional<PackedCloud> packed;  ///< used instead of `cloud`
   std::optional<LodTree> tree;
 };
 
@@ -52,7 +52,7 @@ Result<Gaussians> read_file(OpeningScene& s) {
   return made;
 }
 
-/// The flat has its own frame, and triangles.
+/// Makes the embedded flat, with its triangles.
 Result<Gaussians> make_flat(OpeningScene& s) {
   auto flat = make_default_scene(s.options.density);
   if (!flat) return flat.status();
@@ -64,7 +64,7 @@ Result<Gaussians> make_flat(OpeningScene& s) {
   return Gaussians{std::move(flat->cloud), {}, {}};
 }
 
-/// Decides which way is up.
+/// Decides which axis is up.
 Status place(OpeningScene& s) {
   const std::string& asked = s.options.up;
   OpenedScene& out = s.out;
@@ -73,7 +73,7 @@ Status place(OpeningScene& s) {
     return {};
   }
   if (asked == "auto") {
-    // The flat's frame is known, and Habitat's data stands as it is stored.
+    // The flat's frame is known, and Habitat's data stays as it is stored.
     out.up = s.source.embedded || s.source.has_frame || s.source.gaussians.empty()
                  ? "y"
                  : axis_name(out.report.up);
@@ -95,7 +95,7 @@ Status place(OpeningScene& s) {
   return {};
 }
 
-/// Levels of detail of a scene that has none of its own: those beside its file, or built and kept there.
+/// Levels of detail of a scene that ships none: read from next to its file, or built and stored there.
 Status build_levels(OpeningScene& s, Gaussians& made) {
   if (s.options.levels == SceneLevels::none) return {};
   char text[96];
@@ -128,7 +128,7 @@ Status build_levels(OpeningScene& s, Gaussians& made) {
   return {};
 }
 
-/// Lets go of the SH bands that are not to be kept.
+/// Drops SH bands as OpenOptions::unseen_color says.
 SceneBands fit_bands(OpeningScene& s, Gaussians& made) {
   const auto fit = [&](auto& cloud) {
     SceneBands bands = scene_bands(cloud, s.options.unseen_color);

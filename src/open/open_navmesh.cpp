@@ -17,10 +17,10 @@
 namespace gsnav::detail {
 namespace {
 
-/// Where a NavMesh comes from.
+/// Source of a NavMesh.
 struct NavMeshChoice {
-  std::string file;        ///< read it; else:
-  bool triangles = false;  ///< build it of triangles alone; else of Gaussians, and triangles
+  std::string file;        ///< Read this file. Empty: build it.
+  bool triangles = false;  ///< Build from triangles only, instead of from Gaussians and triangles.
 };
 
 bool names_file(const std::string& navmesh) {
@@ -28,7 +28,7 @@ bool names_file(const std::string& navmesh) {
   return name.ends_with(".navmesh") || name.ends_with(".bin");
 }
 
-/// None: there is none, or none is wanted.
+/// Chooses the source of the NavMesh. Empty if there is none or none is wanted.
 Result<std::optional<NavMeshChoice>> choose(const OpeningScene& s) {
   const std::string& asked = s.options.navmesh;
   using Choice = std::optional<NavMeshChoice>;
@@ -47,7 +47,7 @@ Result<std::optional<NavMeshChoice>> choose(const OpeningScene& s) {
   }
   if (asked == "gaussians" || asked == "auto") {
     if (asked == "gaussians" && !gaussians) return bad(s.source.name + " has no Gaussians; use mesh");
-    // A stage's own triangles are the whole of it; those of OpenOptions::meshes stand among Gaussians.
+    // The triangles of a stage are the whole scene. Those of OpenOptions::meshes stand among Gaussians.
     const bool whole =
         s.source.embedded || !s.source.stage_mesh.empty() || !s.source.collision_mesh.empty();
     if (asked == "auto" && (whole || !gaussians)) return Choice({"", true});
@@ -58,7 +58,7 @@ Result<std::optional<NavMeshChoice>> choose(const OpeningScene& s) {
   return bad("use auto, none, mesh, gaussians, or a file that ends in .navmesh or .bin");
 }
 
-/// Builds a NavMesh for a body of this size; `what` is named in progress.
+/// Builds a NavMesh for a body of this size. `what` names it in progress.
 Result<NavMesh> build(OpeningScene& s, const NavMeshChoice& choice, double radius, double height,
                       const std::string& what) {
   const OpenOptions& o = s.options;
@@ -78,7 +78,7 @@ Result<NavMesh> build(OpeningScene& s, const NavMeshChoice& choice, double radiu
   if (s.source.embedded) how.solid_alpha = 0.2;  // the flat's surfaces are as thin as paper
   const SceneAsset& asset = s.scene.assets.front();
   const GaussianSet set = asset.cloud->set(asset.world_from_asset);
-  const bool beside = !s.source.embedded;  // the flat's triangles are the same surfaces
+  const bool beside = !s.source.embedded;  // the flat's triangles are the same surfaces as its Gaussians
   auto built =
       build_navmesh(settings, std::span(&set, 1),
                     beside ? std::span<const Vec3d>(s.triangles.vertices) : std::span<const Vec3d>(),
@@ -89,7 +89,7 @@ Result<NavMesh> build(OpeningScene& s, const NavMeshChoice& choice, double radiu
   return std::move(built->mesh);
 }
 
-/// The people that were asked for, or else those that belong to the scene.
+/// Adds the people that were asked for, or else those that belong to the scene.
 Status add_people(OpeningScene& s, const std::optional<NavMeshChoice>& choice) {
   const OpenOptions& o = s.options;
   if (o.people == 0) {
@@ -105,7 +105,7 @@ Status add_people(OpeningScene& s, const std::optional<NavMeshChoice>& choice) {
                                         ": they walk on a NavMesh, and there is none; "
                                         "OpenOptions.navmesh = auto builds it"};
   }
-  // People are wider than the agent: they keep their shoulders clear of the furniture.
+  // Use a body wider than that of the agent, so that people keep their shoulders clear of furniture.
   std::optional<NavMesh> wide;
   if (choice->file.empty()) {
     if (auto made = build(s, *choice, 0.3, 1.8, "NavMesh of people")) wide = std::move(*made);
@@ -185,7 +185,7 @@ Status open_visible_sets(OpeningScene& s) {
     made = io::cached_visible_sets(s.source.gaussians, *asset.cloud, *viewpoints, settings,
                                    asset.world_from_asset, find);
   }
-  if (made.code() == Errc::unsupported) {  // too much is seen from everywhere
+  if (made.code() == Errc::unsupported) {  // nearly everything is seen from everywhere
     s.warn(made.message() + ": drawn without them");
     return {};
   }

@@ -15,7 +15,7 @@
 namespace gsnav {
 namespace {
 
-/// Names the field that cannot be, or ok.
+/// Returns invalid_argument naming the field that is out of range, or ok.
 Status validate(const OpenOptions& o) {
   const auto bad = [](const char* field, double value, const char* rule) {
     char text[128];

@@ -9,7 +9,7 @@
 namespace gsnav::detail {
 namespace {
 
-/// Adds triangles to those that a NavMesh may be built of.
+/// Adds triangles to those from which a NavMesh may be built.
 Status add_obstacles(OpeningScene& s, const TriangleMesh& mesh, const Similarity& placed) {
   std::vector<Vec3d> vertices;
   vertices.reserve(mesh.vertices.size());
@@ -30,7 +30,7 @@ Status add_drawn(OpeningScene& s, const std::string& file, const Similarity& pla
   std::size_t triangles = 0;
   for (TexturedPart& part : surface->parts) {
     triangles += part.geometry.triangles.size();
-    // What says nothing of its looks is grey.
+    // Formats without materials are drawn grey.
     if (kind == ".obj" || kind == ".ply") part.material = {{0.5, 0.5, 0.5}, 0, -1, true, false};
   }
   if (s.wants_navmesh()) {

@@ -19,21 +19,21 @@ struct OpeningScene {
   SceneSource source;
   OpenedScene out;
   SimulatorScene scene;
-  Similarity world_from_file{};  ///< by the axis that is up
-  NavMeshTriangles triangles;    ///< world; what a NavMesh may be built of
+  Similarity world_from_file{};  ///< From the up axis.
+  NavMeshTriangles triangles;    ///< World frame. A NavMesh may be built from them.
 
   void note(std::string text) { out.notes.push_back(std::move(text)); }
   void warn(std::string text) { out.warnings.push_back(std::move(text)); }
   bool wants_navmesh() const { return !options.navmesh.empty() && options.navmesh != "none"; }
 };
 
-/// Reads or makes the Gaussians, decides which way is up, reads or builds levels of detail.
+/// Reads or makes the Gaussians, decides which axis is up, reads or builds levels of detail.
 Status open_gaussians(OpeningScene& s);
-/// Reads the triangles that are drawn, and those that a NavMesh may be built of.
+/// Reads the triangles that are drawn, and those from which a NavMesh may be built.
 Status open_triangles(OpeningScene& s);
-/// Reads or builds the NavMesh; adds the people who walk on it.
+/// Reads or builds the NavMesh, and adds the people who walk on it.
 Status open_navmesh(OpeningScene& s);
-/// Reads or finds what is seen from where.
+/// Reads or computes the visible sets.
 Status open_visible_sets(OpeningScene& s);
 
 }  // namespace gsnav::detail

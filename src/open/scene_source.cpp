@@ -16,8 +16,8 @@ namespace fs = std::filesystem;
 constexpr const char* kDataset = ".scene_dataset_config.json";
 constexpr const char* kStage = ".stage_config.json";
 
-/// The NavMesh beside a scene's file or folder: `flat.navmesh` for `flat.ply`, `flat.compressed.ply` and
-/// the folder `flat`. Of tiles there is none.
+/// The NavMesh next to a scene's file or folder: `flat.navmesh` for `flat.ply`, `flat.compressed.ply`
+/// and the folder `flat`. Empty for several tiles.
 std::string navmesh_beside(const std::string& name) {
   fs::path path = name;
   if (!path.has_filename()) path = path.parent_path();

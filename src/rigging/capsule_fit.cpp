@@ -42,7 +42,7 @@ Vec3d main_axis(const std::vector<Vec3d>& points, const Vec3d& mean) {
   return normalized(v);
 }
 
-/// The capsule about `axis` with the least volume that holds `share` of the points.
+/// The capsule with direction `axis` and least volume that contains `share` of the points.
 Capsule<double> capsule_about(const std::vector<Vec3d>& points, const Vec3d& axis, double share) {
   const Vec3d u = detail::any_perpendicular(axis), v = cross(axis, u);
   std::vector<double> a, b, t;
@@ -65,7 +65,7 @@ Capsule<double> capsule_about(const std::vector<Vec3d>& points, const Vec3d& axi
     const double r = tight * grow;
     for (std::size_t i = 0; i < points.size(); ++i) {
       reach[i] = abs(t[i] - t0) - std::sqrt(max(0.0, r * r - across[i] * across[i]));
-      // A point that is too far from the axis is held by no length.
+      // No length is enough for a point that is further from the axis than the radius.
       if (across[i] > r) reach[i] = std::numeric_limits<double>::max();
     }
     sorted = reach;
@@ -76,7 +76,7 @@ Capsule<double> capsule_about(const std::vector<Vec3d>& points, const Vec3d& axi
       least = volume;
       const Vec3d center = u * a0 + v * b0 + axis * t0;
       best = {center - axis * length, center + axis * length,
-              r * (1 + 1e-9)};  // what touches it is in it
+              r * (1 + 1e-9)};  // include points that touch it
     }
   }
   return best;
@@ -86,9 +86,9 @@ double capsule_volume(const Capsule<double>& c) noexcept {
   return 3.14159265358979323846 * c.radius * c.radius * (norm(c.p1 - c.p0) + 4.0 / 3 * c.radius);
 }
 
-/// Appends one capsule that holds `share` of the points, or those of the halves to both sides of their
-/// middle where that takes a quarter less of the volume: a trunk is wide, and a belt of points has
-/// nothing inside.
+/// Appends one capsule that contains `share` of the points. If that takes a quarter less volume, splits
+/// the points at their middle and appends the capsules of both halves: a trunk is wide, and a belt of
+/// points is hollow.
 double capsules_of(const std::vector<Vec3d>& points, double share, int splits, std::size_t least,
                    std::vector<Capsule<double>>& out) {
   Vec3d mean{};
@@ -126,8 +126,8 @@ double capsules_distance(const std::vector<Capsule<double>>& capsules, const Vec
   return best;
 }
 
-/// Which joint's capsule each joint's Gaussians belong to: its own, or that of the nearest joint above
-/// whose Gaussians reach at least `shortest` or have no parent.
+/// Joint whose capsules cover the Gaussians of each joint: itself, or the nearest ancestor whose
+/// Gaussians extend over at least `shortest` or that has no parent.
 std::vector<std::size_t> capsule_owners(const AvatarAsset& asset, const CapsuleFitOptions& options) {
   const std::size_t joints = asset.skeleton.size(), row = static_cast<std::size_t>(asset.influences);
   std::vector<Vec3d> low(joints, Vec3d{1e9, 1e9, 1e9}), high(joints, Vec3d{-1e9, -1e9, -1e9});
@@ -200,8 +200,8 @@ CapsuleReport measure_capsules(const AvatarAsset& asset, const std::vector<Proxy
       report.over_volume += volume.over / body * part;
     }
     if (&pose != &poses.front()) continue;
-    // Over-cover, in the first pose: points of each capsule that lie in no other, against the nearest
-    // centres.
+    // Over-cover, in the first pose: distance from points on each capsule that no other covers to the
+    // nearest centre.
     for (const Capsule<double>& c : placed) {
       const Vec3d axis = norm(c.p1 - c.p0) > 0 ? normalized(c.p1 - c.p0) : Vec3d{0, 1, 0};
       const Vec3d u = detail::any_perpendicular(axis), v = cross(axis, u);
@@ -251,7 +251,7 @@ Result<CapsuleReport> fit_body_capsules(AvatarAsset& asset,
   const std::vector<std::size_t> owner = capsule_owners(asset, options);
   const std::vector<Affine3<double>> inverse = asset.skeleton.bind_inverses();
   std::vector<std::vector<Vec3d>> local(asset.skeleton.size());
-  // Enough of them for a percentile; every Gaussian has its turn in some pose.
+  // A percentile does not need all centres: use each Gaussian in some of the poses only.
   const std::size_t stride = max<std::size_t>(1, asset.size() * poses.size() / 2000000);
   for (std::size_t s = 0; s < poses.size(); ++s) {
     std::vector<Affine3<double>> joints(poses[s].size());

@@ -13,7 +13,7 @@
 namespace gsnav {
 namespace {
 
-/// A box of cubic cells.
+/// A grid of cubic cells.
 struct CellBox {
   using Place = std::array<std::size_t, 3>;
   Vec3d low{};
@@ -34,7 +34,7 @@ struct CellBox {
   }
 };
 
-/// Cells that hold the surface and the capsules, with a layer of empty cells around them.
+/// A grid that contains the surface and the capsules, with a layer of empty cells around them.
 CellBox cells_around(const std::vector<Vec3d>& surface, const std::vector<Capsule<double>>& capsules) {
   Aabb<double> box;
   for (const Vec3d& p : surface) box.add(p);
@@ -56,7 +56,7 @@ CellBox cells_around(const std::vector<Vec3d>& surface, const std::vector<Capsul
   return out;
 }
 
-/// The points of each cell: `order` from first[cell] to first[cell + 1].
+/// The points by cell: those of a cell are `order` from first[cell] to first[cell + 1].
 struct PointsOfCells {
   std::vector<std::uint32_t> first, order;
 
@@ -74,7 +74,8 @@ struct PointsOfCells {
 
 enum class CellKind : std::uint8_t { inside, surface, outside };
 
-/// Cells with points are on the surface. Those that the corner cell reaches past them are outside.
+/// Cells with points are the surface. Those that can be reached from the corner cell without crossing it
+/// are outside.
 std::vector<CellKind> kinds_of(const CellBox& cells, const PointsOfCells& points) {
   std::vector<CellKind> kinds(cells.count(), CellKind::inside);
   for (std::size_t i = 0; i < kinds.size(); ++i) {
@@ -107,7 +108,7 @@ bool contains(const Capsule<double>& c, const Vec3d& p) {
   return dot(off, off) <= c.radius * c.radius;
 }
 
-/// What lies in a capsule: the centres of cells, and points of the surface.
+/// Centres of cells and points of the surface that the capsules cover.
 struct Covered {
   std::vector<std::uint8_t> cells, points;
 

@@ -36,7 +36,7 @@ double median(std::vector<double> v) {
   return v[v.size() / 2];
 }
 
-/// Means of the values of a round, over `reach` values to each side.
+/// Moving means of cyclic values, over `reach` values to each side.
 std::vector<double> smoothed(const std::vector<double>& v, std::size_t reach) {
   const std::size_t n = v.size();
   std::vector<double> out(n, 0.0);
@@ -47,7 +47,7 @@ std::vector<double> smoothed(const std::vector<double>& v, std::size_t reach) {
   return out;
 }
 
-/// Where the points of both soles are at each key of a cycle.
+/// Positions of the points of both soles in each frame of a cycle.
 class SolePaths {
  public:
   SolePaths(const Skeleton& skeleton, const std::vector<Foot>& feet,
@@ -66,10 +66,11 @@ class SolePaths {
     }
   }
 
-  /// The key at which the feet are closest together.
+  /// The frame in which the feet are closest together.
   std::size_t closest() const { return closest_; }
 
-  /// Height of the lower sole at each key, without the tips of the toes, whose place is a guess.
+  /// Height of the lower sole in each frame. Tips of toes are left out, because their position is a
+  /// guess.
   std::vector<double> heights() const {
     std::vector<double> out;
     for (const std::vector<Vec3d>& at : at_) {
@@ -87,7 +88,7 @@ class SolePaths {
     }
   }
 
-  /// Where the toes point, along the ground; any length.
+  /// Direction along the ground in which the toes point; any length.
   Vec3d toes() const {
     Vec3d out{};
     for (const std::vector<Vec3d>& at : at_) {
@@ -97,8 +98,8 @@ class SolePaths {
     return out;
   }
 
-  /// How far the body moves from each key to the next, along the ground: as far as the foot that is down
-  /// stays behind. That foot is low, and moves back against the unit vector `ahead`.
+  /// Movement of the body along the ground from each frame to the next: the foot that is down stays
+  /// behind by the same distance. That foot is low and moves against the unit vector `ahead`.
   std::vector<Vec3d> steps(const Vec3d& ahead) const {
     std::vector<double> lowest(at_[0].size(), std::numeric_limits<double>::max());
     for (const std::vector<Vec3d>& at : at_) {
@@ -123,12 +124,12 @@ class SolePaths {
   }
 
  private:
-  std::vector<std::vector<Vec3d>> at_;  ///< [key][point]: heel, ball and tip of each foot
+  std::vector<std::vector<Vec3d>> at_;  ///< [frame][point]: heel, ball and tip of each foot.
   std::size_t closest_ = 0;
 };
 
-/// Turns the roots of all poses, and puts the first joint above the middle of the feet as it stood on
-/// average.
+/// Rotates the roots of all poses. The first joint keeps its mean position relative to the middle of the
+/// feet.
 void turn_roots(const Skeleton& skeleton, const Quatd& turn, std::vector<LocalPose>& cycle) {
   const Affine3<double> turned{rotation_matrix(turn), {}};
   Vec3d mean{};
@@ -207,7 +208,7 @@ void ClipWalk::find_cycle(const MotionClip& clip, std::size_t& first, std::size_
   const std::size_t n = clip.frames();
   first = 0;
   keys = n - 1;
-  // Poses are "the same" relative to the greatest difference within the clip.
+  // Poses count as equal relative to the greatest difference within the clip.
   double most = 0.0;
   for (std::size_t k = 0; k < n; k += max<std::size_t>(1, n / 50))
     most = max(most, difference(clip, 0, k));
@@ -227,11 +228,11 @@ void ClipWalk::find_cycle(const MotionClip& clip, std::size_t& first, std::size_
     for (std::size_t b = a + max<std::size_t>(4, span(0.7)); b + tenth < n && b <= a + span(1.8); ++b) {
       if (path && (speed(b) < 0.8 || norm(clip.root_translation[b] - clip.root_translation[a]) < 0.8))
         continue;
-      // Compare the poses, those before and those after.
+      // Compare the poses, and also those before and after, so that velocities match.
       double d = difference(clip, a, b) + difference(clip, a - tenth, b - tenth) +
                  difference(clip, a + tenth, b + tenth);
-      // Of parts that close equally well, prefer the one that leads further: two short steps are no
-      // cycle.
+      // Divide by the distance, since two short steps are not a cycle: of parts that close equally well,
+      // prefer the longer way.
       const double way = path ? norm(clip.root_translation[b] - clip.root_translation[a]) : 1.0;
       d /= way;
       if (d < best) best = d, first = a, keys = b - a;
@@ -265,14 +266,14 @@ void ClipWalk::close(const MotionClip& clip, std::size_t first, std::size_t keys
 Status ClipWalk::lead(const Skeleton& skeleton, Vec3d ahead) {
   const std::size_t n = cycle_.size();
   SolePaths soles(skeleton, feet_, cycle_);
-  // One foot is on the floor at nearly every key.
+  // In a walk one foot is on the floor in nearly every frame.
   const std::vector<double> heights = soles.heights();
   const std::vector<double> sunk =
       options_.grounded ? smoothed(heights, n / 24) : std::vector(n, median(heights));
   soles.lower(sunk);
   for (std::size_t k = 0; k < n; ++k) cycle_[k].root.y -= sunk[k];
 
-  // The feet's own direction replaces the first guess.
+  // Use the first guess of the direction once, then the direction found from the feet.
   Vec3d total = norm(ahead) > 0 ? ahead : soles.toes();
   std::vector<Vec3d> steps;
   for (int pass = 0; pass < 2; ++pass) {
@@ -291,7 +292,7 @@ Status ClipWalk::lead(const Skeleton& skeleton, Vec3d ahead) {
   std::vector<double> sides{0.0};
   for (const Vec3d& step : steps) {
     const Vec3d d = turned * step;
-    // Never back, also where one foot takes over from the other.
+    // Never move back, also where one foot takes over from the other.
     way_.push_back(way_.back() + max(-d.z, 0.05 * stride / static_cast<double>(n)));
     sides.push_back(sides.back() + d.x);
   }

@@ -67,7 +67,8 @@ MeshSample NearestTriangle::find(const Vec3d& p, double& distance) const {
   MeshSample best;
   distance = std::numeric_limits<double>::max();
   const auto c = cell_of(p);
-  // Rings of cells outwards, one more than the first that has a vertex: a longer edge may come nearer.
+  // Search rings of cells outwards, and one ring beyond the first with a vertex, because the triangle of
+  // a farther vertex may be nearer.
   for (std::int64_t ring = 0, last = kRings; ring <= last; ++ring) {
     for (std::int64_t z = -ring; z <= ring; ++z) {
       for (std::int64_t y = -ring; y <= ring; ++y) {
@@ -83,7 +84,7 @@ MeshSample NearestTriangle::find(const Vec3d& p, double& distance) const {
       }
     }
   }
-  if (distance == std::numeric_limits<double>::max()) {  // far away from everything
+  if (distance == std::numeric_limits<double>::max()) {  // far away from the mesh
     for (std::size_t t = 0; t < mesh_.triangles.size(); ++t)
       look(static_cast<std::uint32_t>(t), p, best, distance);
   }

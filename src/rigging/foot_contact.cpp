@@ -36,7 +36,7 @@ std::vector<Foot> find_feet(const Skeleton& skeleton, double floor) {
     }
   }
   for (Foot& foot : feet) {
-    // The toes' joint nearest to the ankle, if there are any.
+    // Use the joint of the toes nearest to the ankle, if there are any.
     const std::size_t ankle = foot.joints[0];
     std::size_t ball = ankle;
     Vec3d ahead{0, 0, -0.08 * (high - low)};

@@ -14,15 +14,15 @@ namespace gsnav {
 
 namespace {
 
-/// The turn that takes direction a to b the shortest way.
+/// The smallest rotation that takes direction a to direction b.
 Quatd turn_between(const Vec3d& a, const Vec3d& b) noexcept {
   const Vec3d u = normalized(a), v = normalized(b), axis = cross(u, v);
   Quatd q{1 + dot(u, v), axis.x, axis.y, axis.z};
   return normalize(q) ? q : Quatd{};
 }
 
-/// Moves the ankle by `offset`, the foot keeping its heading, by turning thigh and shin in the leg's own
-/// plane. Returns by how much the leg was too short.
+/// Moves the ankle by `offset` by rotating thigh and shin in the plane of the leg. The foot keeps its
+/// orientation. Returns the distance by which the leg was too short.
 double reach(const Leg& leg, const Vec3d& offset, std::vector<Affine3<double>>& joints) {
   const Vec3d hip = joints[leg.hip].translation, knee = joints[leg.knee].translation,
               ankle = joints[leg.ankle].translation;
@@ -32,7 +32,7 @@ double reach(const Leg& leg, const Vec3d& offset, std::vector<Affine3<double>>& 
   const double distance =
       clamp(wanted, abs(thigh - shin) * 1.001 + 1e-6, max(longest, norm(ankle - hip)));
   goal = hip + (goal - hip) * (distance / max(wanted, 1e-9));
-  // The knee stays on its side of the line from hip to ankle.
+  // Keep the knee on its side of the line from hip to ankle.
   const Quatd swing = turn_between(ankle - hip, goal - hip);
   const Vec3d line = normalized(goal - hip);
   Vec3d side = rotate(swing, knee - hip);
@@ -60,7 +60,7 @@ Result<std::vector<Leg>> find_legs(const Skeleton& skeleton, const std::vector<F
   const BadArgument bad{"find_legs: "};
   if (feet.size() != 2) return bad(std::to_string(feet.size()) + " feet, must be 2");
   const auto rest = skeleton.rest_globals();
-  const auto above = [&](std::size_t j) {  // itself first
+  const auto above = [&](std::size_t j) {  // j first, then its ancestors
     std::vector<std::size_t> out{j};
     while (skeleton.parents[out.back()] >= 0)
       out.push_back(static_cast<std::size_t>(skeleton.parents[out.back()]));
@@ -72,12 +72,12 @@ Result<std::vector<Leg>> find_legs(const Skeleton& skeleton, const std::vector<F
                                    other = above(feet[1 - f].joints[0]);
     Leg leg;
     leg.ankle = chain[0];
-    std::size_t top = 0;  // the highest joint that does not carry the other foot as well
+    std::size_t top = 0;  // the highest joint that does not carry the other foot too
     while (top + 1 < chain.size() &&
            std::find(other.begin(), other.end(), chain[top + 1]) == other.end())
       ++top;
     leg.hip = chain[top];
-    // The knee is halfway along the leg.
+    // Take the joint nearest to half of the leg's length as the knee.
     double length = 0.0;
     std::vector<double> at{0.0};
     for (std::size_t k = 1; k <= top; ++k) {
@@ -118,7 +118,7 @@ Result<FootLockReport> lock_feet(const Skeleton& skeleton, const std::vector<Foo
   const auto least = static_cast<std::size_t>(max(1.0, options.shortest * frame_rate));
   for (std::size_t f = 0; f < feet.size(); ++f) {
     const std::vector<FootMove> moves = foot_moves(feet[f], frames, bodies, options.clearance);
-    // Spans of frames in which the foot is down; short gaps and short spans are noise.
+    // Spans of frames in which the foot is down. Short gaps and short spans are noise.
     std::vector<std::pair<std::size_t, std::size_t>> spans;
     for (std::size_t t = 0; t + 1 < count; ++t) {
       if (!moves[t].down) continue;
@@ -135,7 +135,7 @@ Result<FootLockReport> lock_feet(const Skeleton& skeleton, const std::vector<Foo
       for (std::size_t t = first; t < last; ++t) {
         offsets[t + 1] = offsets[t] - moves[t].way;
       }
-      // As far one way as the other.
+      // Centre the offsets, so that the foot moves equally far to both sides.
       Vec3d low = offsets[first], high = low;
       for (std::size_t t = first; t <= last; ++t) {
         for (int k = 0; k < 3; ++k)

@@ -15,7 +15,8 @@ namespace gsnav {
 
 namespace {
 
-/// Lower case, without "mixamorig:" or "DEF-" before it and Sketchfab's "_012" behind it.
+/// A joint's name in lower case, without the prefix "mixamorig:" or "DEF-" and without Sketchfab's
+/// suffix "_012".
 std::string plain_joint_name(std::string_view name) {
   for (const std::string_view prefix : {"mixamorig:", "DEF-"}) {
     if (name.substr(0, prefix.size()) == prefix) name.remove_prefix(prefix.size());
@@ -90,7 +91,7 @@ Result<double> rest_heading(const Skeleton& skeleton) {
                      rest[static_cast<std::size_t>(joints[10])].translation;
   if (!(std::hypot(left.x, left.z) > 1e-6))
     return {Errc::invalid_argument, "rest_heading: both hips are in one place"};
-  return std::atan2(left.z, -left.x);  // left is -X for who faces -Z
+  return std::atan2(left.z, -left.x);  // left is -X for a body that faces -Z
 }
 
 Result<RetargetOptions> match_joints(const Skeleton& source, const Skeleton& target) {

@@ -116,7 +116,7 @@ Result<MeshAvatar> make_mesh_avatar(const SkinnedMesh& mesh, const MeshAvatarOpt
   out.area = sampler.area();
   if (!(out.area > 0) || !is_finite(out.area))
     return {Errc::invalid_argument, "make_mesh_avatar: the surface has no area"};
-  // Measured: with thirty darts a point, 0.62 points a square of the spacing are kept.
+  // Measured: thirty darts for each point keep 0.62 points per square of the spacing.
   out.spacing = std::sqrt(0.62 * out.area / static_cast<double>(options.gaussians));
 
   const MeshColors colors(mesh);
@@ -137,7 +137,7 @@ Result<MeshAvatar> make_mesh_avatar(const SkinnedMesh& mesh, const MeshAvatarOpt
     const detail::MeshSample p = sampler.sample(rng);
     const SurfaceColor color = colors.color(p.triangle, p.at);
     if (color.hole) continue;
-    // The other side of a hand is not in the way of this one.
+    // Let both sides of a thin part, such as a hand, have their own points.
     if (!grid.add(p.position, out.spacing, [&](std::size_t i) { return dot(normals[i], p.normal) > 0; }))
       continue;
     normals.push_back(p.normal);

@@ -10,17 +10,18 @@
 
 namespace gsnav::detail {
 
-/// Points no nearer to each other than their spacing (dart throwing), looked up by hashed cells.
+/// Points that keep a least distance from each other (dart throwing), in a hash of cells.
 class PointGrid {
  public:
-  /// `cell` is at least the greatest spacing; about `expected` points are kept.
+  /// `cell` must be at least the greatest spacing; about `expected` points will be kept.
   PointGrid(double cell, std::size_t expected) : cell_(cell) {
     std::size_t buckets = 64;
     while (buckets < 2 * expected) buckets *= 2;
     heads_.assign(buckets, -1);
   }
 
-  /// Keeps p unless a kept point for which `counts(its number)` holds lies nearer than `spacing`.
+  /// Keeps p, unless a kept point with `counts(index)` true is nearer than `spacing`. Returns whether it
+  /// was kept.
   template <class Counts>
   bool add(const Vec3d& p, double spacing, const Counts& counts) {
     std::int64_t c[3];
@@ -29,7 +30,7 @@ class PointGrid {
     for (std::int64_t z = -1; z <= 1; ++z) {
       for (std::int64_t y = -1; y <= 1; ++y) {
         for (std::int64_t x = -1; x <= 1; ++x) {
-          // Cells that share a bucket cost a distance, no more.
+          // Cells may share a bucket; that only costs some more distances.
           for (int i = heads_[bucket(c[0] + x, c[1] + y, c[2] + z)]; i >= 0;
                i = next_[static_cast<std::size_t>(i)]) {
             const Vec3d d = points_[static_cast<std::size_t>(i)] - p;

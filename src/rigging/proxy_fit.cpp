@@ -51,7 +51,8 @@ void fit_capsules(AvatarAsset& asset, const std::vector<std::vector<Affine3<doub
     std::size_t to = 0;
     for (std::size_t c = 0; c < capsules.size(); ++c) {
       const Affine3<double>& g = rest[capsules[c].joint];
-      // Within a capsule's given radius counts as on its axis' side: wide parts keep what is theirs.
+      // Subtract the radius, so that wide parts keep their points: distances count from the capsule's
+      // given surface.
       const double d =
           sqrt(segment_distance2(g * capsules[c].p0, g * capsules[c].p1, p)) - capsules[c].radius;
       if (d < best) {
@@ -83,7 +84,7 @@ void fit_capsules(AvatarAsset& asset, const std::vector<std::vector<Affine3<doub
     };
     const Vec3d axis = normalized(capsule.p1 - capsule.p0), middle = (capsule.p0 + capsule.p1) * 0.5;
     if (dot(axis, axis) > 0) {
-      // Across first, from the middle half, where the round ends do not count.
+      // First across the axis, using the middle half only, where the round ends have no effect.
       std::vector<double> along, across;
       const double half = 0.5 * norm(capsule.p1 - capsule.p0);
       Vec3d offset{};

@@ -21,7 +21,7 @@ Status retarget_error(const std::string& what) { return {Errc::invalid_argument,
 Mat3d rotation_between(const Vec3d& a, const Vec3d& b) {
   const Vec3d u = normalized(a), v = normalized(b);
   Quatd q{1.0 + dot(u, v), cross(u, v).x, cross(u, v).y, cross(u, v).z};
-  if (q.w < 1e-9) {  // opposite: half a turn about anything across
+  if (q.w < 1e-9) {  // opposite: half a turn about any perpendicular axis
     const Vec3d side = normalized(abs(u.x) < 0.9 ? cross(u, Vec3d{1, 0, 0}) : cross(u, Vec3d{0, 1, 0}));
     q = {0.0, side.x, side.y, side.z};
   }
@@ -36,7 +36,7 @@ double height_of(const std::vector<Affine3<double>>& rest, std::size_t joint) {
   return rest[joint].translation.y - lowest;
 }
 
-/// The pose of a clip's key.
+/// The pose of one frame of a clip.
 LocalPose key_pose(const MotionClip& clip, std::size_t key) {
   LocalPose out;
   const auto n = static_cast<std::ptrdiff_t>(clip.joints), at = static_cast<std::ptrdiff_t>(key) * n;
@@ -82,7 +82,7 @@ class Retargeter {
       forward_kinematics(source_, key_pose(clip, t), globals);
       turn_joints(globals, pose);
       out.rotations.insert(out.rotations.end(), pose.rotations.begin(), pose.rotations.end());
-      if (several_roots) {  // which move against each other
+      if (several_roots) {  // roots that move against each other
         out.translations.insert(out.translations.end(), pose.translations.begin(),
                                 pose.translations.end());
       }
@@ -117,7 +117,7 @@ class Retargeter {
     return retarget_error("root_scale or yaw is not finite");
   }
 
-  /// The paired joint next above each joint.
+  /// The nearest paired ancestor of each joint.
   std::vector<std::size_t> paired_above() const {
     std::vector<std::size_t> above(target_.size(), kUnpaired);
     for (std::size_t j = 0; j < above.size(); ++j) {
@@ -129,8 +129,9 @@ class Retargeter {
     return above;
   }
 
-  /// Finds what turns the target's rest pose into the source's, for each paired joint: what turns the
-  /// limb to the only paired joint next below it; without one below, the same as for the joint above.
+  /// Finds for each paired joint the rotation from the rest pose of the target to that of the source. It
+  /// aligns the limb towards the only paired joint next below it. Without such a joint it is that of the
+  /// joint above.
   void align_rest_poses() {
     const std::vector<std::size_t> above = paired_above();
     for (std::size_t j = 0; j < align_.size(); ++j) {
@@ -152,7 +153,8 @@ class Retargeter {
     }
   }
 
-  /// The target's pose for joints of the source. `pose` has the translations of the rest pose.
+  /// Rotates the joints of the target to match those of the source. `pose` has the translations of the
+  /// rest pose.
   void turn_joints(const std::vector<Affine3<double>>& globals, LocalPose& pose) const {
     const Mat3d back = transpose(turn_);
     std::vector<Mat3d> turned(target_.size());
@@ -182,7 +184,7 @@ class Retargeter {
   std::vector<Affine3<double>> source_rest_, target_rest_;
   Mat3d turn_;
   double scale_ = 1.0;
-  std::vector<std::size_t> from_;  ///< the source's joint of each, kUnpaired without a pair
+  std::vector<std::size_t> from_;  ///< source joint of each target joint, or kUnpaired
   std::vector<Mat3d> align_;
 };
 

@@ -13,51 +13,62 @@
 
 namespace gsnav {
 
-/// A capsule that moves with one joint: what navigation sees of a body.
+/// A capsule that moves with one joint. Navigation sees a body as its capsules.
 struct ProxyCapsule {
+  /// Index of the joint in the skeleton.
   std::uint16_t joint = 0;
-  Vec3d p0{}, p1{};     ///< in the joint's bind frame, metres
+  Vec3d p0{}, p1{};     ///< Ends of the segment, in the joint's bind frame, metres.
   double radius = 0.0;  ///< metres
 };
 
-/// How a body's Gaussians follow its joints. A captured avatar relies on what it was trained with, which
-/// mostly is `linear`.
+/// How a body's Gaussians follow its joints. Choose what a captured avatar was trained with, which is
+/// mostly `linear`.
 enum class Skinning : std::uint8_t {
-  linear,            ///< linear blend skinning; shapes are turned by the polar factor
-  linear_stretched,  ///< the same places; shapes are stretched as the skin is, by
-                     ///< AvatarAsset::weight_gradients
-  dual_quaternion,   ///< dual quaternion blending: twisted limbs keep their width
+  linear,            ///< Linear blend skinning. Shapes turn by the polar factor of the blended matrix.
+  linear_stretched,  ///< Positions are those of `linear`; shapes are stretched like the skin, by
+                     ///< AvatarAsset::weight_gradients.
+  dual_quaternion,   ///< Dual quaternion blending: twisted limbs keep their width.
 };
 
-/// A body: what all actors that look alike share. Immutable once built.
+/// A body: Gaussians, skeleton, weights and capsules, shared by all actors that look alike. Immutable
+/// once built.
 struct AvatarAsset {
+  /// Name, for messages.
   std::string name;
+  /// The joints.
   Skeleton skeleton;
-  GaussianCloud cloud;                       ///< canonical pose, root frame (Y up, facing -Z), metres
-  int influences = kInfluences4;             ///< K: joints that move one Gaussian, 4 or 8
-  std::vector<std::uint16_t> joint_indices;  ///< [N][K], the greatest weight first
+  GaussianCloud cloud;                       ///< The Gaussians in the bind pose, root frame (Y up,
+                                             ///< facing -Z), metres.
+  int influences = kInfluences4;             ///< K: joints that move one Gaussian, 4 or 8.
+  std::vector<std::uint16_t> joint_indices;  ///< [N][K], by falling weight.
   std::vector<std::uint16_t>
-      skinning_weights;  ///< [N][K] parts of kWeightParts, which is the sum of each row
+      skinning_weights;  ///< [N][K], in parts of kWeightParts. Each row sums to kWeightParts.
+  /// How Gaussians follow the joints.
   Skinning skinning = Skinning::linear;
-  /// For linear_stretched (bake_weight_gradients): [N][K-1][3] of the second to last weight of each row,
-  /// 1/metres.
+  /// Needed by linear_stretched only (bake_weight_gradients): gradients of the second to last weight of
+  /// each row, [N][K-1][3], 1/metres.
   std::vector<float> weight_gradients;
+  /// The body's shape for navigation.
   std::vector<ProxyCapsule> capsules;
-  LocalPose idle;  ///< how it stands without a motion; empty: the rest pose
+  LocalPose idle;  ///< Pose of an actor without a motion. Empty: the rest pose.
 
+  /// Number of Gaussians.
   std::size_t size() const noexcept { return cloud.size(); }
 
-  /// Takes any k weights a Gaussian ([N][k], joint indices alongside; k = J with all joints for dense
-  /// weights): keeps the `keep` greatest (4 or 8), sorts them, and rounds them to parts that make 1
-  /// exactly (round_weights), so that a body far from the root does not drift. Returns the greatest mass
-  /// that was left out of a row; gradients of the weights before are dropped. Errors: invalid_argument
-  /// (sizes, a joint that does not exist, a weight that is negative or not finite, a Gaussian without
-  /// weight), naming the Gaussian.
+  /// Sets the skinning weights from any number k of weights for each Gaussian. Keeps the `keep`
+  /// greatest, sorts them, and rounds them to parts that sum to 1 exactly (round_weights), so that a
+  /// body far from the root does not drift. Drops weight_gradients.
+  /// @param indices,weights [N][k] joints and their weights. For dense weights k = J, with all joints in
+  /// each row.
+  /// @param keep 4 or 8.
+  /// @return the greatest sum of weights that was left out of a row; or invalid_argument naming the
+  /// Gaussian: sizes, a joint that does not exist, a weight that is negative or not finite, a Gaussian
+  /// without weight.
   Result<double> set_weights(std::size_t k, const std::vector<std::uint16_t>& indices,
                              const std::vector<float>& weights, int keep = kInfluences4);
 
-  /// invalid_argument naming the array, Gaussian, joint or capsule; unsupported for a canonical cloud
-  /// further than 32 m from its root.
+  /// Checks the arrays. Errors: invalid_argument naming the array, Gaussian, joint or capsule;
+  /// unsupported for a canonical cloud that reaches further than 32 m from its root.
   Status validate() const;
 };
 

@@ -21,11 +21,12 @@
 
 namespace gsnav {
 
-/// What all actors of an asset share, in the memory of a backend. On host backends it is the asset's
-/// own; others get a copy. The backend must outlive it.
+/// The arrays of an asset in a backend's memory, shared by all its actors. On host backends they are the
+/// asset's own; other backends get a copy. The backend must outlive this object.
 template <Backend B>
 class AvatarArrays {
  public:
+  /// Uploads the asset's arrays where the backend has a memory of its own.
   AvatarArrays(B& backend, std::shared_ptr<const AvatarAsset> asset) : asset_(std::move(asset)) {
     set_ = asset_->cloud.set();
     GaussianRows& v = set_.gaussians;
@@ -51,12 +52,15 @@ class AvatarArrays {
     for (std::size_t k = 0; k < 4; ++k) args_.quats[k] = v.shape.quats[k];
   }
 
+  /// The asset.
   const std::shared_ptr<const AvatarAsset>& asset() const noexcept { return asset_; }
-  /// The canonical Gaussians; valid while this lives.
+  /// The canonical Gaussians. Valid while this object lives.
   const GaussianSet& set() const& noexcept { return set_; }
+  /// Deleted: the reference would point into a temporary.
   const GaussianSet& set() const&& = delete;
-  /// Without joints and outputs.
+  /// Arguments of skin_gaussians, without joints and outputs. Valid while this object lives.
   const SkinningArgs<float>& skinning() const& noexcept { return args_; }
+  /// Deleted: the reference would point into a temporary.
   const SkinningArgs<float>& skinning() const&& = delete;
 
  private:
@@ -67,10 +71,11 @@ class AvatarArrays {
   std::vector<Buffer<float, B>> floats_;
 };
 
-/// The Gaussians of one actor, posed on a backend and ready to be rendered in one list with the scene.
-/// Only means and orientations (for SH of degree >= 1 also the rotations that colours are turned back
-/// by, with stretch the shapes) are written per frame, into buffers that are used again; all else is the
-/// asset's own memory, which on other than host backends is uploaded once. The backend must outlive it.
+/// The Gaussians of one actor, posed on a backend, to be rendered together with the scene. Only means
+/// and orientations are written in each frame, into buffers that are reused. SH of degree 1 and more
+/// also needs the rotations that turn view directions back, and stretched skinning the shapes. All else
+/// stays in the asset's arrays, which other backends than host backends upload once. The backend must
+/// outlive this object.
 ///
 ///     SkinnedGaussians skin(backend, actor.asset());
 ///     skin.pose(actor, t).throw_if_error();
@@ -78,8 +83,10 @@ class AvatarArrays {
 template <Backend B>
 class SkinnedGaussians {
  public:
+  /// Allocates the buffers for `asset` and uploads its arrays.
   SkinnedGaussians(B& backend, std::shared_ptr<const AvatarAsset> asset)
       : SkinnedGaussians(backend, std::make_shared<const AvatarArrays<B>>(backend, std::move(asset))) {}
+  /// Allocates the buffers for an asset whose arrays are shared with other actors.
   SkinnedGaussians(B& backend, std::shared_ptr<const AvatarArrays<B>> arrays)
       : backend_(&backend),
         arrays_(std::move(arrays)),
@@ -100,24 +107,25 @@ class SkinnedGaussians {
     }
   }
 
-  /// Poses the Gaussians as `actor` is at time t (seconds). An actor that is not in the scene then
-  /// leaves an empty set. The Gaussians are there after `backend.synchronize()`, which rendering does.
-  /// Errors: invalid_argument for an actor with another asset.
+  /// Poses the Gaussians for time t (seconds on the scene's clock). If the actor is not in the scene
+  /// then, the set is empty. The Gaussians are complete after `backend.synchronize()`, which rendering
+  /// calls. Error: invalid_argument for an actor of another asset.
   Status pose(const AvatarActor& actor, double t) {
     if (Status s = place(actor, t); !s || !visible_) return s;
     actor.joint_matrices(t, matrices_);
     return skin();
   }
 
-  /// The same for what these cameras see by `config`: an actor that none of them can see leaves an empty
-  /// set and costs its forward kinematics, no more. No pixel of theirs changes by it.
+  /// Poses the Gaussians for rendering with `config` from these cameras. If none of them can see the
+  /// actor, the set is empty, which costs only its forward kinematics and changes no pixel. Errors: as
+  /// above.
   Status pose(const AvatarActor& actor, double t, std::span<const Camera> cameras,
               const RenderConfig& config) {
     if (Status s = prepare(actor, t, cameras, config); !s) return s;
     return skin_prepared();
   }
-  /// That in two steps. The first is the host's alone: several threads may take it, each for another
-  /// object.
+  /// First of the two steps of `pose`: forward kinematics and culling, on the host. Several threads may
+  /// prepare different objects at once.
   Status prepare(const AvatarActor& actor, double t, std::span<const Camera> cameras,
                  const RenderConfig& config) {
     if (Status s = place(actor, t); !s || !visible_) return s;
@@ -132,24 +140,27 @@ class SkinnedGaussians {
     if (visible_) actor.to_joint_matrices(matrices_);
     return {};
   }
+  /// Second step of `pose`: skins the Gaussians, unless no camera sees them.
   Status skin_prepared() { return visible_ ? skin() : Status(); }
 
-  /// The posed Gaussians where the actor stands; empty before the first `pose`. Valid until the next,
-  /// while this lives.
+  /// The posed Gaussians, placed in the world. Empty before the first `pose`. Valid until the next one
+  /// and while this object lives.
   GaussianSet set() const& noexcept {
     GaussianSet s = set_;
     if (!visible_) s.gaussians = {};
     return s;
   }
+  /// Deleted: the set would point into a temporary.
   GaussianSet set() const&& = delete;
 
+  /// The asset.
   const std::shared_ptr<const AvatarAsset>& asset() const noexcept { return arrays_->asset(); }
 
  private:
   template <Backend>
   friend class SkinnedCrowd;
 
-  /// Where the actor is, and whether it is in the scene.
+  /// Sets the placement, and whether the actor is in the scene at time t.
   Status place(const AvatarActor& actor, double t) {
     if (actor.asset() != asset()) {
       return {Errc::invalid_argument,
@@ -170,7 +181,7 @@ class SkinnedGaussians {
     args_.joints = std::as_const(joints_).view();
     return skin_gaussians<float>(*backend_, args_);
   }
-  /// The joint matrices as dual quaternions, to the backend.
+  /// Uploads the joint matrices as dual quaternions.
   void set_dual_joints(const std::vector<Affine3<double>>& matrices) {
     host_duals_.clear();
     for (const auto& m : matrices) host_duals_.push_back(dual_quat_cast<float>(dual_quat(m)));
@@ -188,8 +199,8 @@ class SkinnedGaussians {
   SkinningArgs<float> args_;
   GaussianSet set_;
   Buffer<Affine3<float>, B> joints_;
-  Buffer<DualQuat<float>, B> dual_joints_;  // of these two the one that the asset's skinning reads
-  std::vector<Buffer<float, B>> floats_;    // a Buffer's memory stays where it is when the vector grows
+  Buffer<DualQuat<float>, B> dual_joints_;  // whichever of these two the asset's skinning reads
+  std::vector<Buffer<float, B>> floats_;    // a Buffer's memory does not move when the vector grows
   std::vector<Affine3<double>> matrices_;
   std::vector<Affine3<float>> host_joints_;
   std::vector<DualQuat<float>> host_duals_;

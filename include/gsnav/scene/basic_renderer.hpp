@@ -21,52 +21,64 @@
 
 namespace gsnav {
 
-/// The renderer over a scalar and a backend of your choice; Renderer takes a Device. Keeps its scratch
-/// between calls: a steady frame allocates nothing but what its caller's vectors need. `S` is the scalar
-/// of all arithmetic; sort keys are float32 for every S. The backend must outlive it. One that was moved
-/// from has its settings, no meshes and no scratch, and may render on. Floating point must round to
-/// nearest (fegetround() == FE_TONEAREST, as a program starts): in other modes images have other bits.
-/// Flushing denormals to zero changes none.
+/// Renders Gaussians and meshes with a scalar type and a backend that you choose at compile time.
+/// `Renderer` is the same for a Device that is chosen at run time.
 ///
 ///     gsnav::SerialBackend backend;
 ///     gsnav::BasicRenderer renderer(backend);   // BasicRenderer<float, gsnav::SerialBackend>
 ///     auto frames = renderer.render(cloud.set(), camera).value();   // frames.rgb, ...
 ///
-/// It keeps a pointer to the backend and views of the meshes; sets and cameras are read during a call
-/// only (docs/ownership.md).
+/// All arithmetic is done in `S`; sort keys are float32 for every `S`. Scratch memory is kept between
+/// calls, so that a second frame of the same size allocates only what the caller's vectors need.
+///
+/// The backend must outlive the renderer. So must the arrays of the meshes that are set; sets and
+/// cameras are read during a call only (docs/ownership.md). A moved-from renderer keeps its settings,
+/// has no meshes and no scratch, and may render again.
+///
+/// Floating-point arithmetic must round to nearest (`fegetround() == FE_TONEAREST`, the default of a
+/// program); other modes give other bits. Flushing denormals to zero changes none.
 template <class S, Backend B>
 class BasicRenderer {
  public:
+  /// Keeps a pointer to `backend`, which must outlive the renderer.
   explicit BasicRenderer(B& backend, const RenderConfig& config = {})
       : backend_(&backend), config_(config), workspace_(backend), device_images_(backend) {}
 
+  /// Settings of the coming frames.
   const RenderConfig& config() const noexcept { return config_; }
+  /// Replaces the settings. They are checked when a frame is rendered.
   void set_config(const RenderConfig& config) { config_ = config; }
 
-  /// Meshes that the frames from now on show among the Gaussians (docs/composition.md); none: an empty
-  /// span. Their arrays are in the backend's memory, and must stay there. To move one, set them again:
-  /// nothing is copied but views.
+  /// Sets the meshes that the coming frames draw among the Gaussians (docs/composition.md), and their
+  /// light. An empty span removes them. Only views are copied: the arrays must be in the backend's
+  /// memory and stay valid while frames use them. To move a mesh, set all of them again.
   void set_meshes(std::span<const MeshInstance> meshes, const MeshLight& light = {}) {
     meshes_.assign(meshes.begin(), meshes.end());
     light_ = light;
   }
 
-  /// Renders all sets, as one sorted list, from each camera; all cameras have one size. `sets` hold
-  /// arrays in the backend's memory. Errors: invalid_argument (names the field; no camera; cameras of
-  /// several sizes); unsupported (2^32 Gaussians or triangles in a frame; meshes on a backend that knows
-  /// none, or with MeshAlpha::blend under Composite::hard_depth); backend_failure; out_of_memory, with
-  /// the frames, their size and their Gaussians, where images or scratch cannot be allocated, and before
-  /// trying where images are larger than the machine's memory. Throws nothing.
+  /// Renders all sets, sorted together, once from each camera. All cameras have one size; the arrays of
+  /// `sets` are in the backend's memory. Throws nothing.
+  /// @return the frames, or an error:
+  /// - invalid_argument: a field is out of range (the message names it), there is no camera, or cameras
+  ///   differ in size.
+  /// - unsupported: a frame has 2^32 Gaussians or triangles or more; or there are meshes and the backend
+  ///   cannot draw them, or MeshAlpha::blend together with Composite::hard_depth.
+  /// - backend_failure: the backend reports an error.
+  /// - out_of_memory: images or scratch cannot be allocated. The message has the number and size of the
+  ///   frames and their Gaussians. Images larger than the machine's memory are refused before anything
+  ///   is allocated.
   Result<Frames<S>> render(std::span<const GaussianSet> sets, std::span<const Camera> cameras) {
     Frames<S> frames;
     if (Status s = render(sets, cameras, frames); !s) return s;
     return frames;
   }
+  /// Renders one set from one camera. Errors: as above.
   Result<Frames<S>> render(const GaussianSet& set, const Camera& camera) {
     return render(std::span(&set, 1), std::span(&camera, 1));
   }
 
-  /// The same into images that are used again.
+  /// Renders into `out`, whose vectors are resized and reused. Errors: as above.
   Status render(std::span<const GaussianSet> sets, std::span<const Camera> cameras, Frames<S>& out) {
     if (Status s = size_frames(cameras, config_.outputs, out); !s) return s;
     const auto job_of = [&](std::size_t c) {
@@ -75,9 +87,11 @@ class BasicRenderer {
     return render_jobs(cameras.size(), job_of, out.stats);
   }
 
-  /// Renders frames that share nothing: each sees its own sets and goes to images in host memory, of its
-  /// camera's size, that its caller has (a null pointer: not made). The same bits as one at a time.
-  /// `stats` [jobs]. Errors: as of render above, of the first job that fails.
+  /// Renders independent frames. Each job has its own sets and camera, and images in host memory of its
+  /// camera's size; an image with a null pointer is not made. The bits are those of rendering one job at
+  /// a time.
+  /// @param stats one element for each job, at least jobs.size().
+  /// @return the error of the first job that fails; errors are those of render above.
   Status render(std::span<const FrameJob<S>> jobs, std::span<RenderStats> stats) {
     if (stats.size() < jobs.size()) {
       return {Errc::invalid_argument, "stats has room for " + std::to_string(stats.size()) + " of " +
@@ -90,15 +104,15 @@ class BasicRenderer {
       if (job.camera == nullptr || job.config == nullptr) {
         return {Errc::invalid_argument, "FrameJob: camera and config must not be null"};
       }
-      if (Status s = validate(*job.camera); !s) return s;  // scratch is sized by it
+      if (Status s = validate(*job.camera); !s) return s;  // scratch is sized by the camera
     }
     return render_jobs(
         jobs.size(), [&](std::size_t c) { return jobs[c]; }, stats);
   }
 
-  /// One frame into images in the backend's memory, which are there once the backend has been
-  /// synchronised. Errors: as of render above; what fails on a device after the call is for
-  /// `synchronize()` to report.
+  /// Starts one frame with images in the backend's memory. They are complete once the backend has been
+  /// synchronised. Errors: those of render above; `synchronize()` reports failures on the device after
+  /// this call.
   Status render_on_backend(const FrameJob<S>& job, RenderStats& stats) {
     if (job.camera == nullptr || job.config == nullptr) {
       return {Errc::invalid_argument, "FrameJob: camera and config must not be null"};
@@ -106,7 +120,8 @@ class BasicRenderer {
     return with_sizes(1, job, [&] { return draw(job, stats); });
   }
 
-  /// Makes room in `out` for the images `outputs` of these cameras. Errors: as of render above.
+  /// Sizes `out` for the images `outputs` (a bitmask of kRgb, ...) of these cameras. Errors: those of
+  /// render above.
   static Status size_frames(std::span<const Camera> cameras, unsigned outputs, Frames<S>& out) {
     if (cameras.empty()) return {Errc::invalid_argument, "no camera to render from"};
     if (cameras.data() == nullptr)
@@ -122,7 +137,7 @@ class BasicRenderer {
     out.height = static_cast<std::size_t>(cameras[0].height);
     return size_images(out, outputs);
   }
-  /// Where the images of camera c lie in `out`.
+  /// Pointers to the images of camera `c` in `out`.
   static FrameImages<S> images_of(Frames<S>& out, std::size_t c) noexcept {
     FrameImages<S> images;
     const std::size_t pixels = out.width * out.height;
@@ -135,7 +150,7 @@ class BasicRenderer {
     return images;
   }
 
-  /// Bytes of scratch held.
+  /// Bytes of scratch memory that the renderer holds.
   std::size_t scratch_bytes() const noexcept {
     std::size_t sum = workspace_.bytes();
     if constexpr (ThreadFramesBackend<B>) sum += thread_frames_.bytes();
@@ -153,7 +168,7 @@ class BasicRenderer {
     using type = ThreadFrames<S, T>;
   };
 
-  /// Makes `out`'s images as large as its size says.
+  /// Resizes the images of `out` to its cameras, width and height.
   static Status size_images(Frames<S>& out, unsigned outputs) {
     const std::size_t cameras = out.cameras, pixels = out.width * out.height;
     std::size_t channels = 0;
@@ -191,7 +206,8 @@ class BasicRenderer {
                          job.images, &stats);
   }
 
-  /// Runs what may throw; where memory was missing the error says for what.
+  /// Calls `run`, which may throw. To an out_of_memory error it adds the size of the frames and their
+  /// number of Gaussians.
   template <class Run>
   static Status with_sizes(std::size_t frames, const FrameJob<S>& first, const Run& run) {
     if (first.sets.data() == nullptr && !first.sets.empty()) {
@@ -245,7 +261,7 @@ class BasicRenderer {
   }
   MeshFrame mesh_frame() const noexcept { return {meshes_, light_}; }
 
-  /// Room in the backend's memory for the images that `host` has.
+  /// Images in the backend's memory, for those outputs that `host` has.
   FrameImages<S> device_images(const FrameImages<S>& host, std::size_t pixels) {
     device_images_.resize_discard(channel_count(host) * pixels);
     return images_in(device_images_.data(), host, pixels);
@@ -260,6 +276,7 @@ class BasicRenderer {
   [[no_unique_address]] typename ThreadFramesOf<B>::type thread_frames_;
 };
 
+/// Deduces float arithmetic.
 template <Backend B>
 explicit BasicRenderer(B&, const RenderConfig& = {}) -> BasicRenderer<float, B>;
 

@@ -20,42 +20,45 @@
 
 namespace gsnav {
 
-/// One Gaussian as files store it: raw, before any activation.
+/// One Gaussian as files store it, before any activation.
 struct RawGaussian {
-  Vec3d mean{};              ///< metres, asset frame
-  Quatd quat{};              ///< w, x, y, z, any length
-  Vec3d log_scales{};        ///< natural logarithm of the standard deviations
-  double opacity_logit = 0;  ///< opacity = 1 / (1 + exp(-logit)); infinities are legal
-  std::array<float, 3> sh0{};
-  const float* shN = nullptr;  ///< [(degree+1)^2 - 1][3], colour inner; null for degree 0
+  Vec3d mean{};                ///< Metres, asset frame.
+  Quatd quat{};                ///< w, x, y, z, of any length.
+  Vec3d log_scales{};          ///< Natural logarithms of the standard deviations.
+  double opacity_logit = 0;    ///< opacity = 1 / (1 + exp(-logit)); infinities are allowed.
+  std::array<float, 3> sh0{};  ///< SH coefficients of degree 0, RGB.
+  const float* shN = nullptr;  ///< [(degree+1)^2 - 1][3], colour inner; null for degree 0.
 };
 
 /// N Gaussians in host memory, ready for kernels: linear scales, opacities after the sigmoid, unit
 /// quaternions. Positions are float32 offsets from origins on a 64 m lattice.
 struct GaussianCloud {
-  std::array<std::vector<float>, 3> means;   ///< x, y, z offsets from the origin, metres, [N] each
-  std::array<std::vector<float>, 4> quats;   ///< w, x, y, z, [N] each
-  std::array<std::vector<float>, 3> scales;  ///< standard deviations, metres, [N] each
-  std::vector<float> opacities;              ///< in [0, 1], [N]
-  std::vector<float> sh0;                    ///< [N][3]
-  std::vector<float> shN;                 ///< [N][(degree+1)^2 - 1][3], or empty where shN_half has them
-  std::vector<std::uint16_t> shN_half;    ///< the same as binary16 (compact_sh), or empty
-  int sh_degree = 0;                      ///< 0 to 3
-  std::vector<std::uint32_t> origin_ids;  ///< [N], or empty while every origin is zero
-  std::vector<Vec3d> origins;             ///< lattice points in use; empty with origin_ids
-  // Filled by sort_spatially (detail/scene/spatial_order.hpp); whoever moves, adds or scales rows clears
-  // them.
-  std::vector<std::uint32_t> row_ids;     ///< place of each row as it was read, [N], or empty
-  std::vector<ChunkBounds> chunk_bounds;  ///< [ceil(N / kProjectChunk)], or empty
-  std::vector<ChunkBounds> part_bounds;   ///< [ceil(N / kChunkPart)], or empty; bound_chunks makes both
+  std::array<std::vector<float>, 3> means;   ///< [N] each: x, y, z offsets from the origin, metres.
+  std::array<std::vector<float>, 4> quats;   ///< [N] each: w, x, y, z of unit quaternions.
+  std::array<std::vector<float>, 3> scales;  ///< [N] each: standard deviations, metres.
+  std::vector<float> opacities;              ///< [N] in [0, 1].
+  std::vector<float> sh0;                    ///< [N][3] SH coefficients of degree 0.
+  std::vector<float> shN;                 ///< [N][(degree+1)^2 - 1][3] higher SH coefficients; empty if
+                                          ///< shN_half has them.
+  std::vector<std::uint16_t> shN_half;    ///< The same as binary16 (compact_sh), or empty.
+  int sh_degree = 0;                      ///< 0 to 3.
+  std::vector<std::uint32_t> origin_ids;  ///< [N] index of each origin. Empty while every origin is
+                                          ///< zero.
+  std::vector<Vec3d> origins;             ///< Lattice points in use. Empty if origin_ids is empty.
+  // Filled by sort_spatially (detail/scene/spatial_order.hpp). Clear chunk_bounds and part_bounds after
+  // moving, adding or scaling rows.
+  std::vector<std::uint32_t> row_ids;     ///< [N] place of each row in the order of reading, or empty.
+  std::vector<ChunkBounds> chunk_bounds;  ///< [ceil(N / kProjectChunk)], or empty.
+  std::vector<ChunkBounds> part_bounds;   ///< [ceil(N / kChunkPart)], or empty. bound_chunks computes
+                                          ///< both.
 
-  // How the asset was trained; copied into each GaussianSet made of the cloud.
-  Filter filter = Filter::classic;
-  float eps2d = 0.3f;
-  SortOrder sort_order = SortOrder::z_depth;
-  ColorSpace color_space = ColorSpace::display;
+  // How the asset was trained. Copied into each GaussianSet that is made of the cloud.
+  Filter filter = Filter::classic;               ///< Filter on the image.
+  float eps2d = 0.3f;                            ///< Term on the diagonal of the 2D covariance, px^2.
+  SortOrder sort_order = SortOrder::z_depth;     ///< Order in which Gaussians are blended.
+  ColorSpace color_space = ColorSpace::display;  ///< Space in which colours are blended.
 
-  std::size_t size() const noexcept { return opacities.size(); }
+  std::size_t size() const noexcept { return opacities.size(); }  ///< Number of Gaussians, N.
 
   /// Mean of Gaussian i in the asset's frame, metres.
   Vec3d mean(std::size_t i) const noexcept {
@@ -63,7 +66,7 @@ struct GaussianCloud {
     return o + Vec3d{means[0][i], means[1][i], means[2][i]};
   }
 
-  /// Bytes held by the arrays.
+  /// Bytes of the arrays.
   std::size_t bytes() const noexcept {
     return sizeof(float) * (11 * size() + sh0.size() + shN.size()) +
            sizeof(std::uint16_t) * shN_half.size() +
@@ -72,7 +75,7 @@ struct GaussianCloud {
            sizeof(ChunkBounds) * (chunk_bounds.size() + part_bounds.size());
   }
 
-  /// What kernels read; valid while the cloud lives and does not grow. A temporary has no view.
+  /// Views of the arrays for kernels. Valid while the cloud lives and does not grow.
   GaussianRows view() const& noexcept {
     GaussianRows v;
     v.shape.size = size();
@@ -92,31 +95,37 @@ struct GaussianCloud {
     return v;
   }
 
+  /// Deleted: the view would point into a temporary.
   GaussianRows view() const&& = delete;
 
-  /// The cloud placed in the world. It views the cloud's arrays, as view().
+  /// The cloud placed in the world, with views of its arrays. Valid while the cloud lives and does not
+  /// grow.
   GaussianSet set(const Similarity& world_from_asset = {}) const& noexcept {
     return {view(), world_from_asset, filter, eps2d, color_space};
   }
+  /// Deleted: the set would point into a temporary.
   GaussianSet set(const Similarity& world_from_asset = {}) const&& = delete;
 };
 
-/// Spacing of the lattice that positions are stored relative to, metres.
+/// Spacing of the lattice of origins, metres.
 inline constexpr double kOriginLattice = 64.0;
 
-/// A raw Gaussian after the activations.
+/// A Gaussian after the activations.
 struct ActiveGaussian {
-  Vec3d mean{};
-  std::array<float, 4> quat{};    ///< w, x, y, z, unit
-  std::array<float, 3> scales{};  ///< linear
-  float opacity = 0;
-  bool clamped = false;  ///< a log-scale was outside of [-20, 20]
+  Vec3d mean{};                   ///< Metres, asset frame.
+  std::array<float, 4> quat{};    ///< w, x, y, z, unit.
+  std::array<float, 3> scales{};  ///< Standard deviations, metres.
+  float opacity = 0;              ///< In [0, 1].
+  bool clamped = false;           ///< Whether a log-scale was outside [-20, 20].
 };
 
-/// Activates a raw Gaussian with `rest` numbers in shN by the contract's rules: quaternions are
-/// normalised (largest component first; zero or non-finite: dropped), log-scales are clamped to
-/// [-20, 20] (minus infinity is a legal flat axis), opacities go through the sigmoid, rows with NaN
-/// anywhere are dropped whole, and Gaussians that can never reach 1/255 are left out.
+/// Activates a raw Gaussian with `rest` numbers in shN, by the rules of the contract. The result says
+/// whether the row is kept, or why it is dropped:
+///
+/// - A row with NaN anywhere, or an infinite position or SH coefficient, is dropped.
+/// - Quaternions are normalised (largest component first); a zero or non-finite one drops the row.
+/// - Opacities go through the sigmoid; a row below 1/255, which is never drawn, is dropped.
+/// - Log-scales are clamped to [-20, 20], except minus infinity, which stands for a flat axis.
 inline RowFate activate(const RawGaussian& raw, std::size_t rest, ActiveGaussian& out) noexcept {
   bool finite = is_finite(raw.mean) && !std::isnan(raw.opacity_logit);
   for (int k = 0; k < 3; ++k) {
@@ -141,23 +150,25 @@ inline RowFate activate(const RawGaussian& raw, std::size_t rest, ActiveGaussian
   return RowFate::kept;
 }
 
-/// Numbers the lattice points that means lie nearest to, in the order in which they come; 0 is the
-/// origin itself.
+/// Assigns ids to the lattice points nearest to means, in the order in which they occur. Id 0 is the
+/// point zero.
 class OriginLattice {
  public:
+  /// Id of the lattice point nearest to `mean`.
   std::uint32_t id_of(const Vec3d& mean) {
     Vec3d origin;
     for (int k = 0; k < 3; ++k) origin[k] = kOriginLattice * std::nearbyint(mean[k] / kOriginLattice);
     if (origin == origins_[last_]) return last_;
     return last_ = id_of_point(origin);
   }
+  /// Id of a lattice point.
   std::uint32_t id_of_point(const Vec3d& origin) {
     const auto [it, added] = index_.emplace(std::make_tuple(origin.x, origin.y, origin.z),
                                             static_cast<std::uint32_t>(origins_.size()));
     if (added) origins_.push_back(origin);
     return it->second;
   }
-  /// [ids in use].
+  /// [ids in use] the lattice points.
   const std::vector<Vec3d>& origins() const noexcept { return origins_; }
 
  private:
@@ -166,9 +177,10 @@ class OriginLattice {
   std::uint32_t last_ = 0;
 };
 
-/// Puts means into a cloud, from the first row to the last.
+/// Appends means to the planes of a cloud, splitting them into origins and offsets.
 class MeanWriter {
  public:
+  /// Appends `mean` (metres, asset frame) to means, origin_ids and origins of the cloud.
   void push(GaussianCloud& cloud, const Vec3d& mean) {
     const std::uint32_t id = lattice_.id_of(mean);
     if (id != 0 && cloud.origins.empty()) {  // the first Gaussian away from zero
@@ -189,16 +201,19 @@ class MeanWriter {
   OriginLattice lattice_;
 };
 
-/// Fills a GaussianCloud from raw Gaussians by activate()'s rules, counting every repair and drop.
+/// Builds a GaussianCloud from raw Gaussians by the rules of activate(), and counts every repaired and
+/// dropped row.
 class GaussianCloudBuilder {
  public:
-  /// `sh_degree` in [0, 3] is what every added Gaussian carries.
+  /// @param sh_degree degree of every added Gaussian, in [0, 3].
+  /// @param source for the report and messages.
   explicit GaussianCloudBuilder(int sh_degree, std::string source = {}) {
     cloud_.sh_degree = report_.sh_degree = sh_degree;
     report_.source = std::move(source);
     rest_ = 3 * static_cast<std::size_t>(sh_coefficient_count(sh_degree) - 1);
   }
 
+  /// Reserves memory for n Gaussians.
   void reserve(std::size_t n) {
     for (auto& p : cloud_.means) p.reserve(n);
     for (auto& p : cloud_.quats) p.reserve(n);
@@ -208,7 +223,7 @@ class GaussianCloudBuilder {
     cloud_.shN.reserve(rest_ * n);
   }
 
-  /// Adds one Gaussian or counts why not. Returns whether it was kept.
+  /// Adds one Gaussian, or counts why it was dropped. Returns whether it was kept.
   bool add(const RawGaussian& raw) {
     ActiveGaussian g;
     const RowFate fate = activate(raw, rest_, g);
@@ -224,8 +239,8 @@ class GaussianCloudBuilder {
     return true;
   }
 
-  LoadReport& report() noexcept { return report_; }
-  GaussianCloud& cloud() noexcept { return cloud_; }
+  LoadReport& report() noexcept { return report_; }   ///< The report of all rows so far.
+  GaussianCloud& cloud() noexcept { return cloud_; }  ///< The cloud so far.
 
  private:
   GaussianCloud cloud_;
@@ -234,14 +249,14 @@ class GaussianCloudBuilder {
   MeanWriter means_;
 };
 
-/// The largest difference of a coefficient between shN and the same as binary16.
+/// The largest change of a coefficient by storing shN as binary16.
 inline double half_sh_error(const GaussianCloud& cloud) noexcept {
   float error = 0;
   for (const float v : cloud.shN) error = max(error, abs(half_to_float(half_of_float(v)) - v));
   return static_cast<double>(error);
 }
 
-/// Keeps shN as binary16, which renders in half of the memory. Returns half_sh_error.
+/// Stores shN as binary16, which halves its memory; such a cloud can be rendered. Returns half_sh_error.
 inline double compact_sh(GaussianCloud& cloud) {
   const double error = half_sh_error(cloud);
   if (cloud.shN.empty()) return error;
@@ -250,23 +265,23 @@ inline double compact_sh(GaussianCloud& cloud) {
   return error;
 }
 
-/// Undoes compact_sh but for the rounding.
+/// Undoes compact_sh, except for the rounding.
 inline void expand_sh(GaussianCloud& cloud) {
   if (cloud.shN_half.empty()) return;
   cloud.shN = moved_through<float>(cloud.shN_half, cloud.shN_half.size(),
                                    [](std::uint16_t v) { return half_to_float(v); });
 }
 
-/// A cloud with the report of how it was read.
+/// A cloud and the report of how it was read.
 struct LoadedCloud {
-  GaussianCloud cloud;
-  LoadReport report;
+  GaussianCloud cloud;  ///< The cloud.
+  LoadReport report;    ///< What reading found, changed and left out.
 };
 
-/// Appends `b` to `a`; the SH degree becomes the larger (missing bands are zero). Used to merge the
-/// tiles of one scene. Chunks lose their bounds: sort again. An empty `a` becomes `b`.
-/// Errors, with `a` as it was: invalid_argument where filters, sort orders or colour spaces differ, or
-/// one is compact (expand_sh).
+/// Appends `b` to `a`, for example to merge the tiles of a scene. The SH degree becomes the larger of
+/// the two, with zeros for missing bands. Chunk bounds are dropped, so sort again. If `a` is empty it
+/// becomes `b`. On an error `a` is unchanged: invalid_argument if filters, sort orders or colour spaces
+/// differ, or if one cloud is compact (expand_sh).
 inline Status append(GaussianCloud& a, const GaussianCloud& b) {
   if (!a.shN_half.empty() || !b.shN_half.empty()) {
     return {Errc::invalid_argument, "compact clouds cannot be merged: expand_sh first"};

@@ -15,19 +15,22 @@
 
 namespace gsnav {
 
-/// How LodCut chooses.
+/// Settings of LodCut: how large an error may be before a finer node is drawn.
 struct LodChoice {
-  double pixels = 1;  ///< a node is fine enough where its error is at most so many pixels ...
-  /// ... and times its grain at most pixels times this, in square pixels: the larger Gaussians are, the
-  /// nearer direct rendering is to the photo, and the less may be merged.
+  double pixels = 1;  ///< Largest error of a node, in pixels. A node whose error is larger is refined.
+  /// Largest product of a node's error and its grain, as a multiple of `pixels`, in square pixels. The
+  /// larger the Gaussians of the cloud are on the image, the closer direct rendering is to the photo,
+  /// and the less may be merged.
   double grain = 0.5;
-  double hysteresis =
-      0.1;  ///< a node that is drawn stays until its error is beyond (1 + this) of that; one that is
-            ///< refined, until it is below (1 - this): levels do not flicker where a camera rests
-  int photo = 4;  ///< the images to come near to: at so many times the resolution, averaged (O_photo)
+  /// Hysteresis, in [0, 1), against flicker where a camera rests. A node that is drawn is refined once
+  /// its error exceeds (1 + hysteresis) times the limit; a refined one is drawn again below (1 -
+  /// hysteresis) times the limit.
+  double hysteresis = 0.1;
+  /// The reference image, O_photo(k): the mean of k x k samples in each pixel. k is in [1, 16].
+  int photo = 4;
 };
 
-/// Names the field that cannot be, or ok.
+/// Returns invalid_argument naming the field that is out of range, or ok.
 inline Status validate(const LodChoice& c) {
   const BadArgument bad{"LodChoice."};
   if (!(c.pixels > 0 && is_finite(c.pixels))) return bad("pixels", c.pixels, "must be positive");
@@ -38,18 +41,18 @@ inline Status validate(const LodChoice& c) {
   return {};
 }
 
-/// What a cut draws, in Gaussians of the cloud where nothing else is said.
+/// Counts of a cut. They are Gaussians of the cloud unless said otherwise.
 struct LodStats {
-  std::uint64_t shown = 0;   ///< in chunks that may be in view
-  std::uint64_t merged = 0;  ///< of these, those that merged ones stand for
-  std::uint64_t drawn = 0;   ///< rows drawn for them, merged ones and others
-  double error_px = 0;       ///< the largest error of a node that is drawn (LodNode::error), pixels
+  std::uint64_t shown = 0;   ///< Gaussians in chunks that may be in view.
+  std::uint64_t merged = 0;  ///< Number of those that merged Gaussians stand for.
+  std::uint64_t drawn = 0;   ///< Rows that are drawn for them, merged ones included.
+  double error_px = 0;       ///< Largest LodNode::error of a node that is drawn, pixels.
 };
 
-/// The rules of the profile `lod`: those of `fast`; and where at least half of what a cut shows is
-/// merged, a pixel ends where less than 1/1000 of the light comes through. (Where little is merged
-/// Gaussians are large and direct rendering is 60 dB and more from the photo: an earlier end would be
-/// what is seen of the error.)
+/// Returns `config` with the settings of the profile `lod`: the fast exponential, and if at least half
+/// of the shown Gaussians are merged, pixels that close at a transmittance of 0.001 or more. With fewer
+/// merged Gaussians, direct rendering reaches a PSNR of at least 60 dB against the photo, and closing
+/// pixels that early would dominate its error.
 inline RenderConfig lod_config(RenderConfig config, const LodStats& stats = {}) noexcept {
   config.quality.exponential = Exponential::fast;
   if (stats.shown > 0 && 2 * stats.merged >= stats.shown) {
@@ -59,21 +62,27 @@ inline RenderConfig lod_config(RenderConfig config, const LodStats& stats = {}) 
   return config;
 }
 
-/// A cut through a level-of-detail tree, for one sensor: which chunks are drawn. It remembers what it
-/// chose, for hysteresis, and else depends on the camera only: the same calls give the same cuts.
+/// Chooses for one sensor which nodes of a level-of-detail tree are drawn. A cut remembers its last
+/// choice, for hysteresis; otherwise it depends on the camera only. The same sequence of calls gives the
+/// same cuts.
 class LodCut {
  public:
-  /// The tree, and the cloud that it was built of, must outlive this.
+  /// `tree` and the cloud from which it was built must outlive the cut.
   LodCut(const LodTree& tree, const GaussianCloud& cloud)
       : tree_(&tree), cloud_(&cloud), refined_(tree.nodes.size()) {}
+  /// Deleted: a temporary tree would not outlive the cut.
   LodCut(const LodTree&& tree, const GaussianCloud& cloud) = delete;
+  /// Deleted: a temporary cloud would not outlive the cut.
   LodCut(const LodTree& tree, const GaussianCloud&& cloud) = delete;
+  /// Deleted: temporaries would not outlive the cut.
   LodCut(const LodTree&& tree, const GaussianCloud&& cloud) = delete;
 
-  /// Chooses for a camera; the cloud stands in the world by `world_from_asset`. What to draw then:
-  /// chunks of the cloud, and merged ones, as the pixels of O_photo(choice.photo) see them. Valid until
-  /// the next call. `seen`: what of the cloud may be seen (VisibleSets::seen_from, here): what shows
-  /// none of its chunks is left out, and of chunks of the cloud its rows; empty: all may be.
+  /// Chooses the nodes for a camera and returns what to draw: chunks of the cloud and merged Gaussians,
+  /// filtered for the pixels of O_photo(choice.photo). Valid until the next call.
+  /// @param world_from_asset placement of the cloud in the world.
+  /// @param seen chunks and rows that may be seen from the camera's cell (VisibleSets::seen_from, in
+  /// host memory). Nodes without a seen chunk are left out, and so are unseen rows of the cloud's
+  /// chunks. Empty: everything may be seen.
   std::span<const GaussianSet> select(const Camera& camera, const LodChoice& choice = {},
                                       const Similarity& world_from_asset = {},
                                       View<const std::uint32_t> seen = {}) {
@@ -99,28 +108,33 @@ class LodCut {
     add(tree_->merged, merged_chunks_, choice, world_from_asset);
     return sets_;
   }
-  /// Forgets what was chosen before.
+  /// Forgets the last choice, and with it the hysteresis.
   void reset() { std::fill(refined_.begin(), refined_.end(), std::uint8_t{0}); }
 
-  /// What the last select() chose.
+  /// Numbers of the last select().
   const LodStats& stats() const noexcept { return stats_; }
+  /// The sets of the last select().
   std::span<const GaussianSet> sets() const noexcept { return sets_; }
+  /// Chunks of the cloud that the last select() chose.
   const std::vector<std::uint32_t>& leaf_chunks() const noexcept { return leaf_chunks_; }
+  /// Chunks of LodTree::merged that the last select() chose.
   const std::vector<std::uint32_t>& merged_chunks() const noexcept { return merged_chunks_; }
 
-  /// A cloud as the pixels of O_photo(k) see it: averaged over k x k samples, each blurred as the
-  /// cloud's filter says; opacities make up for what a pixel blurs more than a sample.
+  /// The set of a cloud, filtered for the pixels of O_photo(k): the mean of k x k samples, each blurred
+  /// by the cloud's own filter. Opacities compensate for the part of a pixel's blur that a sample does
+  /// not have.
   static GaussianSet photo_set(const GaussianCloud& cloud, const LodChoice& choice,
                                const Similarity& world_from_asset = {}) {
     GaussianSet s = cloud.set(world_from_asset);
     const double k2 = static_cast<double>(choice.photo) * choice.photo;
     const double sample = static_cast<double>(cloud.eps2d) / k2;
-    // k points side by side over a pixel have the variance (1 - 1 / k^2) / 12.
+    // k points spaced evenly over a pixel have the variance (1 - 1 / k^2) / 12.
     s.eps2d = static_cast<float>(sample + (1 - 1 / k2) / 12);
     s.base_eps2d = cloud.filter == Filter::mip ? 0.0f : static_cast<float>(sample);
     s.filter = Filter::mip;
     return s;
   }
+  /// Deleted: the set would point into a temporary cloud.
   static GaussianSet photo_set(const GaussianCloud&& cloud, const LodChoice& choice,
                                const Similarity& world_from_asset = {}) = delete;
 
@@ -131,31 +145,31 @@ class LodCut {
     sets_.push_back(photo_set(cloud, choice, world_from_asset));
     sets_.back().selection = {{chunks.data(), chunks.size()}, seen};
   }
-  /// Whether one of the chunks [first, end), some of which may be beyond the cloud's, is among those
-  /// that are seen.
+  /// Whether any of the chunks [first, end) is seen. The range may extend beyond the cloud's chunks.
   bool any_seen(std::uint64_t first, std::uint64_t end) const noexcept {
     end = std::min<std::uint64_t>(end, 32 * std::uint64_t{seen_.size});
     for (std::uint64_t c = first; c < end;) {
       const std::uint64_t in_word =
-          std::min<std::uint64_t>(end - c / 32 * 32, 32);  // where the range ends in it
+          std::min<std::uint64_t>(end - c / 32 * 32, 32);  // where the range ends in this word
       const std::uint32_t below = in_word == 32 ? ~0u : (1u << in_word) - 1u;
       if ((seen_[c / 32] & below) >> (c % 32) != 0) return true;
       c = c / 32 * 32 + 32;
     }
     return false;
   }
-  /// The same of what a box of a forest shows: its finest node has the cloud's chunks.
+  /// Whether any chunk below a box of a forest is seen. The finest node of the box has the chunks of the
+  /// cloud.
   bool shows_seen(std::uint32_t node) const noexcept {
     while (tree_->boxes[node].finer != LodBox::kNone) node = tree_->boxes[node].finer;
     const LodBox& box = tree_->boxes[node];
     return any_seen(box.first_chunk, std::uint64_t{box.first_chunk} + box.chunks);
   }
-  /// What a metre is at the node's nearest depth, in choice.pixels.
+  /// Size of a metre at the node's nearest depth, in units of choice.pixels.
   static double scale_of(const LodNode& n, const ProjectionCamera<double>& camera,
                          double per_metre) noexcept {
     return per_metre / detail::ChunkInView(camera, n.reach).z_min();
   }
-  /// Whether what is finer than a node is needed.
+  /// Whether the node is too coarse, so that its children are drawn instead.
   bool refine(std::size_t node, double scale, const LodChoice& choice) {
     const LodNode& n = tree_->nodes[node];
     const double grain = static_cast<double>(n.grain) * scale * choice.pixels / choice.grain;
@@ -167,7 +181,7 @@ class LodCut {
   void note_error(const LodNode& n, double scale, const LodChoice& choice) noexcept {
     stats_.error_px = std::max(stats_.error_px, static_cast<double>(n.error) * scale * choice.pixels);
   }
-  /// The level of one box of a forest.
+  /// Chooses the level of one box of a forest, from its coarsest node down.
   void descend(std::uint32_t node, const ProjectionCamera<double>& camera, double per_metre,
                const LodChoice& choice) {
     for (;;) {

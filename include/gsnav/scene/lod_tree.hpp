@@ -11,54 +11,62 @@
 
 namespace gsnav {
 
-/// One node of a level-of-detail tree: a chunk of Gaussians.
+/// One node of a level-of-detail tree: a chunk of Gaussians and how far it is from the cloud.
 struct LodNode {
-  /// How far what the node merged lies from where it shows it: root mean square over its mass, metres; 0
-  /// for a leaf. A parent's is not below its children's.
+  /// Distance between the merged Gaussians and those of the cloud that they stand for, metres (root mean
+  /// square over mass). 0 for a leaf. A parent's error is at least that of its children.
   float error = 0;
-  /// How large the cloud's own Gaussians below it are: root of the area (lod_area), geometric mean over
-  /// their mass, metres; 0 where nothing has mass.
+  /// Size of the cloud's own Gaussians below the node: square root of their area (lod_area), geometric
+  /// mean over their mass, metres. 0 where no Gaussian has mass.
   float grain = 0;
-  ChunkBounds reach;  ///< of its own Gaussians and of all below it
+  ChunkBounds reach;  ///< Bounds of the node's own Gaussians and of all below it.
 };
 
-/// A box of a set that ships its levels, at one of them (detail/scene/lod_levels.hpp).
+/// One box of a streamed set, at one of its levels (detail/scene/lod_levels.hpp).
 struct LodBox {
+  /// Value of `finer` where there is no finer node.
   static constexpr std::uint32_t kNone = 0xffffffffu;
-  std::uint32_t first_chunk = 0, chunks = 0;  ///< of the cloud where nothing is finer, else of `merged`
-  std::uint32_t finer = kNone;                ///< the node that shows the same in more Gaussians
-  std::uint32_t rows = 0;   ///< Gaussians in its chunks, less those that fill the last one
-  std::uint32_t shown = 0;  ///< Gaussians of the cloud that it stands for
+  std::uint32_t first_chunk = 0, chunks = 0;  ///< First chunk and number of chunks. In the cloud where
+                                              ///< `finer` is kNone, otherwise in LodTree::merged.
+  std::uint32_t finer = kNone;                ///< Node that shows the same box at the next finer level,
+                                              ///< or kNone.
+  std::uint32_t rows = 0;   ///< Gaussians in the chunks, without the transparent ones that fill the last
+                            ///< chunk.
+  std::uint32_t shown = 0;  ///< Gaussians of the cloud that the node stands for.
 };
 
-/// A cloud at every level of detail (docs/lod.md): a binary tree over the chunks of a cloud in spatial
-/// order. Leaves are those chunks, as they are; a node above shows what its two children show in half as
-/// many Gaussians, at most kProjectChunk. Any cut through the tree shows each Gaussian of the cloud
-/// once.
+/// A cloud at every level of detail (docs/lod.md). There are two forms.
 ///
-/// Or a forest of the levels that a set ships: `boxes` and `roots` are not empty then. Nodes are boxes
-/// of the set, each at one level, and have as many chunks as they need; a cut takes one level of each
-/// box.
+/// A tree: a binary tree over the chunks of a cloud in spatial order. Leaves are the chunks of the
+/// cloud. A node above them shows what its two children show with half the Gaussians, at most
+/// kProjectChunk. Any cut through the tree shows each Gaussian of the cloud once.
+///
+/// A forest, of the levels that a streamed set ships: `boxes` and `roots` are not empty. A node is a box
+/// of the set at one level and has any number of chunks. A cut takes one level of each box.
 struct LodTree {
-  GaussianCloud merged;  ///< Gaussians of the nodes above leaves: kProjectChunk rows a node, the last
-                         ///< ones transparent where it has fewer
-  std::vector<LodNode> nodes;  ///< leaves (chunk c is node c), then level by level to the root
+  /// Gaussians of the nodes above the leaves. In a tree each node has kProjectChunk rows, the last ones
+  /// transparent where it has fewer Gaussians.
+  GaussianCloud merged;
+  std::vector<LodNode> nodes;  ///< Leaves first (node c is chunk c of the cloud in a tree), then level
+                               ///< by level up to the root.
   std::vector<std::uint32_t>
-      level_begin;  ///< first node of each level, and behind them the number of nodes
+      level_begin;  ///< First node of each level, followed by the number of nodes.
 
-  std::vector<LodBox> boxes;         ///< of a forest, one a node
-  std::vector<std::uint32_t> roots;  ///< of a forest: the coarsest node of each box
+  std::vector<LodBox> boxes;         ///< In a forest, the box of each node. Otherwise empty.
+  std::vector<std::uint32_t> roots;  ///< In a forest, the coarsest node of each box.
 
+  /// Number of levels, leaves included; 0 for an empty tree.
   std::size_t levels() const noexcept { return level_begin.empty() ? 0 : level_begin.size() - 1; }
+  /// Number of leaves.
   std::size_t leaves() const noexcept { return levels() == 0 ? 0 : level_begin[1]; }
-  /// Chunks of the cloud that it was made of.
+  /// Number of chunks of the cloud from which the tree was made.
   std::size_t cloud_chunks() const noexcept {
     if (boxes.empty()) return leaves();
     std::size_t sum = 0;
     for (std::size_t i = 0; i < leaves(); ++i) sum += boxes[i].chunks;
     return sum;
   }
-  /// Bytes beside those of the cloud.
+  /// Bytes of the tree, without the cloud.
   std::size_t bytes() const noexcept {
     return merged.bytes() + nodes.size() * sizeof(LodNode) + boxes.size() * sizeof(LodBox);
   }
@@ -66,7 +74,7 @@ struct LodTree {
 
 namespace detail {
 
-/// Bounds of both.
+/// Bounds of the union of two chunks.
 inline ChunkBounds both(const ChunkBounds& a, const ChunkBounds& b) noexcept {
   ChunkBounds out;
   for (int k = 0; k < 3; ++k) {
@@ -80,11 +88,14 @@ inline ChunkBounds both(const ChunkBounds& a, const ChunkBounds& b) noexcept {
 
 }  // namespace detail
 
-/// How build_lod works.
+/// Settings of build_lod.
 struct LodSettings {
-  int sh_degree = kMaxShDegree;  ///< of merged Gaussians, at most the cloud's
-  int neighbours = 8;            ///< nearest ones that a Gaussian is tried with, in [1, 16]
-  /// Told the share of the work that is done, in [0, 1], some hundred times, by the calling thread.
+  int sh_degree = kMaxShDegree;  ///< SH degree of merged Gaussians; the degree of the cloud is an upper
+                                 ///< limit.
+  int neighbours = 8;            ///< Nearest neighbours that each Gaussian is tried with for a merge, in
+                                 ///< [1, 16].
+  /// Called some hundred times with the share of the work that is done, in [0, 1], by the calling
+  /// thread.
   std::function<void(double)> progress;
 };
 

@@ -20,17 +20,18 @@
 
 namespace gsnav {
 
-/// The linear value of an sRGB-encoded byte.
+/// Linear value, in [0, 1], of an sRGB-encoded byte.
 inline float srgb_decoded(std::uint8_t byte) noexcept {
   const double v = byte / 255.0;
   return static_cast<float>(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
 }
 
-/// A base-colour texture with its mip chain: each level the mean, in linear light, of what it covers of
-/// the finer.
+/// A base-colour texture with its mip chain. Each texel of a level is the mean, in linear light, of the
+/// texels that it covers in the finer level.
 class MeshTexture {
  public:
-  /// `rgba`: [height][width][4], sRGB-encoded, top row first. Error: invalid_argument (sizes).
+  /// Builds a texture and its mip chain from `rgba`, [height][width][4] bytes, RGB sRGB-encoded, top row
+  /// first. Sides are in [1, 32768]. Error: invalid_argument where the sizes do not fit.
   static Result<MeshTexture> make(std::size_t width, std::size_t height,
                                   std::vector<std::uint8_t> rgba) {
     constexpr std::size_t kLargest = 32768;
@@ -56,15 +57,16 @@ class MeshTexture {
     }
     return t;
   }
-  /// Valid while the texture lives.
+  /// View of all levels. Valid while the texture lives.
   TextureView view() const& noexcept {
     return {view_of(texels_), {decode_.data(), decode_.size()}, width_, height_, levels_};
   }
+  /// Deleted: the view would point into a temporary.
   TextureView view() const&& = delete;
 
  private:
-  /// Appends the level below one of w x h pixels at `from`. Of an odd side the last two or three share a
-  /// pixel.
+  /// Appends the next coarser level to a level of w x h texels whose first texel is at `from`. If a side
+  /// is odd, the last texel averages three texels instead of two.
   void reduce(std::size_t from, int w, int h) {
     const int half_w = std::max(w / 2, 1), half_h = std::max(h / 2, 1);
     for (int y = 0; y < half_h; ++y) {
@@ -96,29 +98,33 @@ class MeshTexture {
   int width_ = 0, height_ = 0, levels_ = 1;
 };
 
-/// A mesh and what its surface looks like. What it does not have stays empty, and costs nothing.
+/// A mesh with its material. Vectors that are not needed stay empty and take no memory.
 struct SurfaceMesh {
+  /// Vertices and triangles.
   TriangleMesh geometry;
-  std::vector<Vec3f> normals;    ///< one a vertex, unit; empty: the faces'
-  std::vector<Vec3f> colors;     ///< one a vertex, linear RGB; empty: white
-  std::vector<Vec2<float>> uvs;  ///< one a vertex, (0, 0) the texture's top left; empty: no texture
-  std::shared_ptr<const MeshTexture> texture;  ///< null: white
-  Vec3f base_color{1, 1, 1};                   ///< linear RGB
+  std::vector<Vec3f> normals;    ///< One for each vertex, unit. Empty: the normals of the faces.
+  std::vector<Vec3f> colors;     ///< One for each vertex, linear RGB. Empty: white.
+  std::vector<Vec2<float>> uvs;  ///< One for each vertex; (0, 0) is the top left of the texture. Empty:
+                                 ///< no texture.
+  std::shared_ptr<const MeshTexture> texture;  ///< Base-colour texture; null: white.
+  Vec3f base_color{1, 1, 1};                   ///< Linear RGB, multiplied with the colours of vertices
+                                               ///< and texture.
+  /// Whether triangles are drawn from behind too.
   bool two_sided = false;
-  bool unlit = false;  ///< its colour is what is seen, whatever the light
-  MeshAlpha alpha_mode =
-      MeshAlpha::opaque;      ///< what alpha does: base_alpha times those of vertices and of the texture
-  float base_alpha = 1;       ///< in [0, 1]
-  float alpha_cutoff = 0.5f;  ///< of MeshAlpha::mask: a hole where alpha is below
-  std::vector<float> alphas;  ///< one a vertex, in [0, 1]; empty: 1
+  bool unlit = false;                        ///< Whether the colour is drawn as it is, without shading.
+  MeshAlpha alpha_mode = MeshAlpha::opaque;  ///< How alpha is used: the product of base_alpha, the
+                                             ///< vertex's and the texture's alpha.
+  float base_alpha = 1;                      ///< Alpha of the material, in [0, 1].
+  float alpha_cutoff = 0.5f;  ///< For MeshAlpha::mask: the surface has a hole where alpha is lower.
+  std::vector<float> alphas;  ///< One for each vertex, in [0, 1]. Empty: 1.
 };
 
-/// Meshes, which it owns, and their places: an instance is a view of a mesh with a transform.
+/// Owns meshes and makes instances of them: an instance is a view of a mesh with a transform.
 class MeshScene {
  public:
-  /// Returns the mesh's number. Errors: invalid_argument naming what does not fit (indices beyond the
-  /// vertices, numbers of normals, colours, coordinates or alphas, an alpha out of range); the scene is
-  /// then as it was.
+  /// Adds a mesh and returns its index. Errors: invalid_argument for an index beyond the vertices,
+  /// arrays whose lengths are not the number of vertices, or a base_alpha out of range; the message
+  /// names the field. On an error the scene is unchanged.
   Result<std::size_t> add(SurfaceMesh mesh) {
     const std::size_t n = mesh.geometry.vertices.size();
     const BadArgument bad{"SurfaceMesh: "};
@@ -149,11 +155,14 @@ class MeshScene {
     find_box(meshes_.back());
     return meshes_.size() - 1;
   }
+  /// Number of meshes.
   std::size_t size() const noexcept { return meshes_.size(); }
+  /// Mesh `i`. Valid while the scene lives and no mesh is added.
   const SurfaceMesh& mesh(std::size_t i) const& noexcept { return meshes_[i].surface; }
+  /// Deleted: the reference would point into a temporary.
   const SurfaceMesh& mesh(std::size_t i) const&& = delete;
 
-  /// The arrays of mesh i; valid while the scene lives and no mesh is added.
+  /// Views of the arrays of mesh `i`. Valid while the scene lives and no mesh is added.
   MeshView view(std::size_t i) const& noexcept {
     const Held& held = meshes_[i];
     const SurfaceMesh& m = held.surface;
@@ -176,12 +185,15 @@ class MeshScene {
     v.alphas = view_of(m.alphas);
     return v;
   }
+  /// Deleted: the view would point into a temporary.
   MeshView view(std::size_t i) const&& = delete;
-  /// Mesh i standing in the world; valid as view(i) is.
+  /// An instance of mesh `i` in the world. Valid while the scene lives and no mesh is added.
+  /// @param id value of the instance image where this mesh is visible, below kNoInstance.
   MeshInstance instance(std::size_t i, const Similarity& world_from_mesh = {},
                         std::uint32_t id = 0) const& noexcept {
     return {view(i), world_from_mesh, id};
   }
+  /// Deleted: the instance would point into a temporary.
   MeshInstance instance(std::size_t i, const Similarity& world_from_mesh = {},
                         std::uint32_t id = 0) const&& = delete;
 
@@ -195,7 +207,8 @@ class MeshScene {
     held.low = {kInfinity, kInfinity, kInfinity};
     held.high = -held.low;
     for (const Vec3f& v : held.surface.geometry.vertices) {
-      if (!is_finite(v)) {  // such a mesh is looked at in every frame: what is left out is counted
+      if (!is_finite(v)) {  // An empty box marks a mesh with vertices that are not finite: it is
+                            // processed in every frame, so that its left-out triangles are counted.
         held.low = {1, 1, 1};
         held.high = {};
         return;
@@ -207,11 +220,13 @@ class MeshScene {
   std::vector<Held> meshes_;
 };
 
-/// A mesh's arrays in a backend's own memory. On host backends nothing is copied: what `mesh` views must
-/// outlive it (docs/ownership.md).
+/// The arrays of a mesh in a backend's memory. Other backends than host backends get a copy. On host
+/// backends nothing is copied, and the arrays that `mesh` views must outlive this object
+/// (docs/ownership.md).
 template <Backend B>
 class MeshArrays {
  public:
+  /// Uploads the arrays of `mesh` where the backend has a memory of its own.
   MeshArrays(B& backend, const MeshView& mesh) : mesh_(mesh) {
     if constexpr (!is_host_backend<B>) {
       to_device(backend, mesh_.vertices, vectors_);
@@ -224,10 +239,11 @@ class MeshArrays {
       to_device(backend, mesh_.alphas, floats_);
     }
   }
-  /// The mesh placed in the world; valid while this lives.
+  /// The mesh placed in the world. Valid while this object lives.
   MeshInstance instance(const Similarity& world_from_mesh = {}, std::uint32_t id = 0) const& noexcept {
     return {mesh_, world_from_mesh, id};
   }
+  /// Deleted: the instance would point into a temporary.
   MeshInstance instance(const Similarity& world_from_mesh = {}, std::uint32_t id = 0) const&& = delete;
 
  private:

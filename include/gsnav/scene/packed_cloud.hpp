@@ -18,36 +18,42 @@
 
 namespace gsnav {
 
-/// What packing may cost. Beyond a bound the planes stay as exact as it asks for.
+/// Errors that packing may cause. Where a limit would be exceeded, values are stored more exactly.
 struct PackLimits {
-  /// How far any mean may move, in its Gaussian's largest standard deviations; else float32. 16 bits of
-  /// a chunk's box save 6 bytes, but Gaussians at nearly one depth may change places (docs/formats.md).
+  /// Largest movement of a mean, in the Gaussian's largest standard deviations; above it means stay
+  /// float32. 16 bits within a chunk's box save 6 bytes for each Gaussian, but Gaussians at nearly one
+  /// depth may change places (docs/formats.md).
   double mean = 0;
-  double sh =
-      2e-3;  ///< root mean square error by 8 bits of a coefficient of bands from 1 on; else binary16
-  double sh_max = 2e-3;  ///< largest error of one by binary16; else float32
+  double sh = 2e-3;  ///< Largest root mean square error of SH coefficients of bands 1 to 3 with 8 bits;
+                     ///< above it they become binary16.
+  double sh_max = 2e-3;  ///< Largest error of such a coefficient as binary16; above it they stay
+                         ///< float32.
 };
 
-/// A GaussianCloud in a third of its memory: 26 bytes a Gaussian for place, shape and opacity, 6 for its
-/// colour, 45 for SH degree 3 by 8 bits. Host backends render it as it is, in the bits of unpack_cloud's
-/// floats; others are given these (GaussianArrays). It can be edited and written only after
-/// unpack_cloud. Pack sorted clouds: places are steps of a chunk's box.
+/// A GaussianCloud in a third of the memory: for each Gaussian 26 bytes for position, shape and opacity,
+/// 6 for its colour, and 45 for SH degree 3 with 8 bits. Host backends render it directly, with the same
+/// bits as the floats of unpack_cloud; GaussianArrays gives those floats to other backends. Call
+/// unpack_cloud before you edit or write it. Pack sorted clouds only, because positions are steps within
+/// a chunk's box.
 struct PackedCloud {
-  std::vector<std::uint16_t> codes;  ///< ShapeRows::codes
-  std::vector<std::uint16_t> sh0;    ///< [N][3], binary16
-  std::vector<std::int8_t> shN;      ///< [N][(degree+1)^2 - 1][3]; empty where rest has the bands
-  std::vector<PackedChunk> chunks;   ///< [ceil(N / kProjectChunk)]
-  std::size_t count = 0;             ///< N
-  /// What is not packed: ids, origins, chunk bounds, what the asset says, and planes that a limit kept.
+  std::vector<std::uint16_t> codes;  ///< ShapeRows::codes.
+  std::vector<std::uint16_t> sh0;    ///< [N][3], binary16.
+  std::vector<std::int8_t> shN;      ///< [N][(degree+1)^2 - 1][3]; empty if `rest` has the bands.
+  std::vector<PackedChunk> chunks;   ///< [ceil(N / kProjectChunk)].
+  std::size_t count = 0;             ///< N, the number of Gaussians.
+  /// Everything that is not packed: ids, origins, chunk bounds, settings of the asset, and planes that a
+  /// limit kept.
   GaussianCloud rest;
 
+  /// Number of Gaussians, N.
   std::size_t size() const noexcept { return count; }
+  /// Bytes of the arrays.
   std::size_t bytes() const noexcept {
     return sizeof(std::uint16_t) * (codes.size() + sh0.size()) + shN.size() +
            sizeof(PackedChunk) * chunks.size() + rest.bytes() +
            sizeof(float) * (rest.means[0].empty() ? 0 : 3 * count);
   }
-  /// As GaussianCloud::view and set: they view this cloud's arrays, and a temporary has none.
+  /// Views of the arrays for kernels. Valid while the cloud lives.
   GaussianRows view() const& noexcept {
     GaussianRows v = rest.view();
     v.shape.size = count;
@@ -57,20 +63,24 @@ struct PackedCloud {
     v.shape.chunks = v.color.chunks = view_of(chunks);
     return v;
   }
+  /// Deleted: the view would point into a temporary.
   GaussianRows view() const&& = delete;
+  /// The cloud placed in the world, with views of its arrays. Valid while the cloud lives.
   GaussianSet set(const Similarity& world_from_asset = {}) const& noexcept {
     return {view(), world_from_asset, rest.filter, rest.eps2d, rest.color_space};
   }
+  /// Deleted: the set would point into a temporary.
   GaussianSet set(const Similarity& world_from_asset = {}) const&& = delete;
 };
 
 namespace detail {
 
+/// Rounds a value to a code in [0, largest].
 inline std::uint16_t code_of(double value, double largest) noexcept {
   return static_cast<std::uint16_t>(std::nearbyint(clamp(value, 0.0, largest)));
 }
 
-/// The three codes that unpack_quat reads.
+/// The three codes of a unit quaternion that unpack_quat reads.
 inline std::array<std::uint16_t, 3> pack_quat(const Quatd& q) noexcept {
   const double parts[] = {q.w, q.x, q.y, q.z};
   std::size_t missing = 0;
@@ -89,7 +99,7 @@ inline std::array<std::uint16_t, 3> pack_quat(const Quatd& q) noexcept {
   return out;
 }
 
-/// Steps and codes of a cloud's places, shapes and opacities.
+/// Fills the steps and codes of a cloud's positions, shapes and opacities.
 inline void pack_shapes(const GaussianCloud& cloud, PackedCloud& out) {
   const std::size_t n = cloud.size();
   out.codes = huge_vector<std::uint16_t>(ShapeRows::kCodePlanes * n);
@@ -129,7 +139,7 @@ inline void pack_shapes(const GaussianCloud& cloud, PackedCloud& out) {
   }
 }
 
-/// Compares places, shapes and opacities; `packed` is of `cloud`.
+/// Measures the errors of positions, shapes and opacities of `packed`, which was made from `cloud`.
 inline void compare_shapes(const GaussianCloud& cloud, const ShapeRows& packed,
                            PackErrors& out) noexcept {
   for (std::size_t i = 0; i < cloud.size(); ++i) {
@@ -144,7 +154,7 @@ inline void compare_shapes(const GaussianCloud& cloud, const ShapeRows& packed,
       change = std::max(change, std::fabs(static_cast<double>(scales[static_cast<int>(k)]) - s));
     }
     const double parts[] = {q.w, q.x, q.y, q.z};
-    double sum = 0;  // of squared differences: |q - r| = 2 sin(angle / 4)
+    double sum = 0;  // squared differences; |q - r| = 2 sin(angle / 4)
     for (std::size_t k = 0; k < 4; ++k) same += parts[k] * static_cast<double>(cloud.quats[k][i]);
     for (std::size_t k = 0; k < 4; ++k) {
       const double d = parts[k] - (same < 0 ? -1.0 : 1.0) * static_cast<double>(cloud.quats[k][i]);
@@ -160,15 +170,15 @@ inline void compare_shapes(const GaussianCloud& cloud, const ShapeRows& packed,
   }
 }
 
-/// Packs bands by 8 bits, chunk after chunk.
+/// Packs SH bands with 8 bits, chunk after chunk.
 class BandPacker {
  public:
-  /// `out`: with its chunks; its shN is made for bands up to `degree`.
+  /// Allocates out.shN for bands up to `degree`. out.chunks must exist.
   BandPacker(PackedCloud& out, int degree) : out_(out), rest_(sh_band_numbers(degree)) {
     out.rest.sh_degree = degree;
     out.shN = huge_vector<std::int8_t>(rest_ * out.count);
   }
-  /// The next `chunks` chunks, whose bands are at `bands`.
+  /// Packs the next `chunks` chunks, whose bands are at `bands`.
   void add(const float* bands, std::size_t chunks) {
     for (const std::size_t end = chunk_ + chunks; chunk_ < end; ++chunk_) {
       const std::size_t first = chunk_ * kProjectChunk * rest_;
@@ -194,7 +204,7 @@ class BandPacker {
       bands += n;
     }
   }
-  /// What that changed, of bands up to `degree`; those above are zero.
+  /// Writes the errors of the packed bands to `errors`. Bands above `degree` are zero.
   void give(PackErrors& errors, int degree) const noexcept {
     const std::size_t n = sh_band_numbers(degree) * out_.count;
     errors.sh = largest_;
@@ -207,7 +217,7 @@ class BandPacker {
   double largest_ = 0, squares_ = 0;
 };
 
-/// Bounds of what each `rows` packed rows stand for.
+/// Bounds of each run of `rows` packed rows, from the values that they stand for.
 inline std::vector<ChunkBounds> packed_bounds(const PackedCloud& packed, std::size_t rows) {
   const GaussianRows all = packed.view();
   const ShapeRows& v = all.shape;
@@ -227,7 +237,7 @@ inline std::vector<ChunkBounds> packed_bounds(const PackedCloud& packed, std::si
   return out;
 }
 
-/// All but the bands. What is packed of the cloud is used up, what is not moves.
+/// Packs everything except the bands. Consumes the planes of `cloud`.
 inline PackedCloud pack_rows(GaussianCloud& cloud, const PackLimits& limits, PackErrors& found) {
   PackedCloud out;
   out.count = cloud.size();
@@ -266,7 +276,7 @@ inline PackedCloud pack_rows(GaussianCloud& cloud, const PackLimits& limits, Pac
 
 }  // namespace detail
 
-/// Packs a cloud, which is used up plane by plane. `errors`: what that changed.
+/// Packs a cloud, which is consumed plane by plane. `errors`, if not null, gets the errors of packing.
 inline PackedCloud pack_cloud(GaussianCloud cloud, const PackLimits& limits = {},
                               PackErrors* errors = nullptr) {
   PackErrors found;
@@ -289,7 +299,7 @@ inline PackedCloud pack_cloud(GaussianCloud cloud, const PackLimits& limits = {}
   return out;
 }
 
-/// The floats that packed rows stand for.
+/// Converts packed rows back to floats.
 inline GaussianCloud unpack_cloud(const PackedCloud& packed) {
   GaussianCloud out = packed.rest;
   const GaussianRows all = packed.view();

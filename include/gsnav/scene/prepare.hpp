@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What is made of a cloud before it is drawn, and what is found out about it: editing, order in space,
-// levels of detail, visible sets, packed storage, the bands that matter, what a frame skipped. Functions
-// that work hard take a backend (gsnav/backends/...).
+// Preparation and inspection of clouds before they are drawn: editing, spatial order, levels of detail,
+// visible sets, packed storage, needed SH bands, the ledger of a frame. Functions with much work take a
+// backend (gsnav/backends/...).
 
 #include "gsnav/detail/scene/content_hash.hpp"
 #include "gsnav/detail/scene/describe_cloud.hpp"

@@ -25,46 +25,52 @@
 
 namespace gsnav {
 
-/// What of a cloud can be seen from where cameras go: what stands behind walls need not be looked at.
-/// Sampled: chunks, and of these rows, of which nobody saw anything from viewpoints in and around a cell
-/// are left out for cameras in it. An approximation, for the profiles `fast` and `lod`; docs/lod.md has
-/// its error.
+/// For each cell of space, the chunks and rows of a cloud that can be seen from it, so that renderers
+/// can skip Gaussians behind walls. The sets are sampled: for cameras in a cell, chunks and rows are
+/// left out that were not visible from any viewpoint in or near the cell. They are an approximation, for
+/// the profiles `fast` and `lod`; docs/lod.md gives the error.
 struct VisibleSets {
+  /// Index of a cell along x, y and z.
   using Key = std::array<std::int32_t, 3>;
 
-  /// Side of the cubic cells, in the asset's frame: cell k spans [k, k + 1) times this along each axis.
+  /// Side of the cubic cells, in the asset's frame: cell k spans [k, k + 1) times this length along each
+  /// axis.
   double cell = 0;
-  /// Focal length of the viewpoints' images, pixels: of cameras with a longer one nothing is known.
+  /// Focal length of the viewpoints' images, pixels. The sets are unknown for cameras with a longer one.
   double focal = 0;
-  double near_plane = 0;         ///< metres in the world: nor of those with a farther one
-  double near_sigma = 0;         ///< Camera::near_sigma: nor of those with another
-  double min_weight = 0;         ///< VisibleSettings::min_weight
-  std::size_t cloud_chunks = 0;  ///< of the cloud that these are of
-  std::size_t viewpoints = 0;    ///< that were looked from
-  std::vector<Key> keys;         ///< of the cells, ascending
+  double near_plane = 0;         ///< Near plane of those images, metres in the world. The sets are
+                                 ///< unknown for cameras with a farther one.
+  double near_sigma = 0;         ///< Camera::near_sigma of those images. The sets are unknown for
+                                 ///< cameras with another value.
+  double min_weight = 0;         ///< VisibleSettings::min_weight.
+  std::size_t cloud_chunks = 0;  ///< Number of chunks of the cloud.
+  std::size_t viewpoints = 0;    ///< Number of viewpoints that were used.
+  std::vector<Key> keys;         ///< The cells, ascending.
   std::vector<std::uint64_t>
-      ends;  ///< [cells], where the words of each end; those of the first begin at 0
-  std::vector<std::uint32_t> bits;  ///< Selection::seen of each cell, one behind the other
+      ends;  ///< [cells] end of each cell's words in `bits`. Those of the first cell begin at 0.
+  std::vector<std::uint32_t> bits;  ///< Selection::seen of each cell, one after another.
 
+  /// Number of cells.
   std::size_t cells() const noexcept { return keys.size(); }
-  /// Words of a cell that say which chunks it sees.
+  /// Number of words of a cell that mark the chunks it sees.
   std::size_t words() const noexcept { return (cloud_chunks + 31) / 32; }
+  /// Bytes of the arrays.
   std::size_t bytes() const noexcept {
     return keys.size() * sizeof(Key) + ends.size() * sizeof(std::uint64_t) +
            bits.size() * sizeof(std::uint32_t);
   }
-  /// What a cell sees; `there`: `bits` in a backend's memory, null: here.
+  /// Selection::seen of a cell. `there` is a copy of `bits` in a backend's memory; null: `bits` itself.
   View<const std::uint32_t> seen_from(std::size_t cell_index,
                                       const std::uint32_t* there = nullptr) const noexcept {
     const std::uint64_t begin = cell_index == 0 ? 0 : ends[cell_index - 1];
     return {(there != nullptr ? there : bits.data()) + begin,
             static_cast<std::size_t>(ends[cell_index] - begin)};
   }
-  /// How many chunks it sees.
+  /// Number of chunks that a cell sees.
   std::size_t count_seen(std::size_t cell_index) const noexcept {
     return count_bits_of(seen_from(cell_index), 0, words());
   }
-  /// How many Gaussians it sees, of a cloud of so many.
+  /// Number of Gaussians that a cell sees, for a cloud of `cloud_rows` Gaussians.
   std::size_t count_seen_rows(std::size_t cell_index, std::size_t cloud_rows) const noexcept {
     const View<const std::uint32_t> seen = seen_from(cell_index);
     if (seen.size > words()) return count_bits_of(seen, 2 * words(), seen.size);
@@ -74,20 +80,20 @@ struct VisibleSets {
                                     : 0;
     return kProjectChunk * count_seen(cell_index) - missing;
   }
-  /// Share of the chunks that a cell sees, on average.
+  /// Mean share of the chunks that a cell sees.
   double mean_share() const noexcept {
     double sum = 0;
     for (std::size_t c = 0; c < cells(); ++c) sum += static_cast<double>(count_seen(c));
     return sum / static_cast<double>(std::max<std::size_t>(cells() * cloud_chunks, 1));
   }
-  /// The same of the Gaussians of a cloud of so many.
+  /// Mean share of the Gaussians that a cell sees, for a cloud of `cloud_rows` Gaussians.
   double mean_row_share(std::size_t cloud_rows) const noexcept {
     double sum = 0;
     for (std::size_t c = 0; c < cells(); ++c) sum += static_cast<double>(count_seen_rows(c, cloud_rows));
     return sum / static_cast<double>(std::max<std::size_t>(cells() * cloud_rows, 1));
   }
 
-  /// The cell of a position in the asset's frame; none where its numbers do not fit.
+  /// The cell of a position in the asset's frame. Nothing if its index would be too large.
   static std::optional<Key> key_of(const Vec3d& p, double cell) noexcept {
     Key key{};
     for (int k = 0; k < 3; ++k) {
@@ -97,8 +103,8 @@ struct VisibleSets {
     }
     return key;
   }
-  /// Index of the cell that knows what a camera sees of the asset where it stands so; none: anything may
-  /// be seen.
+  /// Index of the cell whose set applies to a camera, for a cloud placed by `world_from_asset`. Nothing
+  /// if no set applies: everything may then be seen.
   std::optional<std::size_t> cell_of(const Camera& camera,
                                      const Similarity& world_from_asset = {}) const noexcept {
     const bool known = std::max(camera.fx, camera.fy) <= focal * (1 + 1e-6) &&
@@ -120,37 +126,37 @@ struct VisibleSets {
   }
 };
 
-/// How build_visible_sets works. Lengths in metres in the world.
+/// Settings of build_visible_sets. Lengths are metres in the world.
 struct VisibleSettings {
-  double cell = 0.5;         ///< side of a cell
-  double margin = 0.25;      ///< viewpoints so far outside of a cell count for it too
-  double min_weight = 1e-3;  ///< what is seen has more of a pixel than this
-  /// Rows of a chunk that are seen or not together, each a whole share of 32: Gaussians that lie
-  /// together. 0: all of a chunk.
+  double cell = 0.5;         ///< Side of a cell.
+  double margin = 0.25;      ///< A viewpoint counts for a cell if it is at most this far outside of it.
+  double min_weight = 1e-3;  ///< Least share of a pixel that a Gaussian must have to count as seen.
+  /// Consecutive rows that are seen or not together: 1, 2, 4, 8, 16 or 32. 0: all rows of a chunk.
   int rows = 8;
-  int face = 256;  ///< pixels along a face of the cube that is looked at from each viewpoint
+  int face = 256;  ///< Pixels along a side of the six images that are rendered for each viewpoint.
   double near_plane =
-      0.2;  ///< of these images (Camera); what lies nearer to a cell is in its set in any case
-  double near_sigma = 0;  ///< likewise
-  /// Gives up early where sets gain nothing: in the open a cell sees nearly all. 16 cells, spread
-  /// evenly, are finished first; where they see more than this share of the Gaussians on average,
-  /// build_visible_sets returns unsupported. In (0, 1]; 1: never. Fewer than 64 cells are all found.
+      0.2;  ///< Near plane of these images. Chunks nearer to a cell than this are always in its set.
+  double near_sigma = 0;  ///< Camera::near_sigma of these images.
+  /// Largest mean share of the Gaussians that a cell may see, in (0, 1]. Above it, as in the open, sets
+  /// gain nothing and build_visible_sets returns unsupported. It decides early, on 16 cells spread
+  /// evenly that are finished first. 1: never refuse. With fewer than 64 cells it never refuses either.
   double most_share = 0.9;
 
-  /// How far apart viewpoints should be (navmesh_viewpoints): with a margin of as much every cell has
-  /// several, each with its own directions.
+  /// Recommended distance between viewpoints (navmesh_viewpoints). Each cell then has several, each with
+  /// its own directions.
   double spacing() const noexcept { return 0.5 * cell; }
-  /// Has `face`, `near_plane` and `near_sigma` be such that the sets serve this camera.
+  /// Sets `face`, `near_plane` and `near_sigma` so that the sets apply to this camera.
   void serve(const Camera& camera) noexcept {
     face = static_cast<int>(std::ceil(2 * std::max(camera.fx, camera.fy) - 1e-6));
     near_plane = camera.near_plane;
     near_sigma = camera.near_sigma;
   }
-  /// Told the share of the work that is done, in [0, 1], for each viewpoint, by the calling thread.
+  /// Called after each viewpoint with the share of the work that is done, in [0, 1], by the calling
+  /// thread.
   std::function<void(double)> progress{};
 };
 
-/// Names the field that cannot be, or ok.
+/// Returns invalid_argument naming the field that is out of range, or ok.
 inline Status validate(const VisibleSettings& s) {
   const BadArgument bad{"VisibleSettings."};
   if (!(s.cell > 0 && is_finite(s.cell))) return bad("cell", s.cell, "must be positive");
@@ -173,8 +179,9 @@ inline Status validate(const VisibleSettings& s) {
 
 namespace detail {
 
-/// Fills out.keys: the cells that a viewpoint is in or within 5 cm (world) of. Returns the viewpoints in
-/// the asset's frame. out.cell is set.
+/// Fills out.keys with the cells that a viewpoint is in or within 5 cm (world) of. out.cell must be set.
+/// Returns the viewpoints in the asset's frame. Error: invalid_argument for a viewpoint that is not
+/// finite or too far away.
 inline Result<std::vector<Vec3d>> find_cells(VisibleSets& out, std::span<const Vec3d> viewpoints,
                                              const Similarity& world_from_asset) {
   constexpr double kBeside = 0.05;  // metres
@@ -186,8 +193,8 @@ inline Result<std::vector<Vec3d>> find_cells(VisibleSets& out, std::span<const V
       return Status(Errc::invalid_argument,
                     "build_visible_sets: viewpoint " + std::to_string(v) + " is not finite or too far");
     }
-    // Rounding, or a step in the floor, must not take a camera that is where a viewpoint is to a cell
-    // that has none.
+    // Rounding, or a step in the floor, must not move a camera at a viewpoint's position into a cell
+    // without a set.
     for (int corner = 0; corner < 8; ++corner) {
       Vec3d beside = eyes.back();
       for (int k = 0; k < 3; ++k)
@@ -200,8 +207,8 @@ inline Result<std::vector<Vec3d>> find_cells(VisibleSets& out, std::span<const V
   return eyes;
 }
 
-/// Adds the chunks within `distance` of each cell, whole: a camera in the cell may be in front of such a
-/// chunk where no viewpoint is.
+/// Adds all rows of the chunks within `distance` of each cell. A camera in the cell may be in front of
+/// such a chunk where no viewpoint is.
 template <Backend B>
 void add_near_chunks(B& backend, const VisibleSets& sets, const GaussianCloud& cloud, double distance,
                      std::vector<SeenOfCell>& found) {
@@ -216,14 +223,17 @@ void add_near_chunks(B& backend, const VisibleSets& sets, const GaussianCloud& c
 
 }  // namespace detail
 
-/// Finds what of a cloud is seen from each cell that has a viewpoint in it or within 5 cm (world,
-/// metres; navmesh_viewpoints makes them): the cloud stands in the world by `world_from_asset`, with
-/// bounds of its chunks (sort_spatially). Each viewpoint costs six frames of settings.face pixels a
-/// side. The same bits for any number of threads.
-///
-/// Errors: invalid_argument (a setting; no viewpoint, or one that is not finite; a cloud that is not in
-/// spatial order); unsupported (VisibleSettings::most_share: nothing is gained, draw without sets);
-/// those of rendering.
+/// Finds the chunks and rows of a cloud that are seen from each cell. The cells are those with a
+/// viewpoint in them or within 5 cm. Each viewpoint costs six frames with settings.face pixels a side.
+/// The same bits for any number of threads.
+/// @param cloud a sorted cloud (sort_spatially).
+/// @param viewpoints world frame, metres; navmesh_viewpoints makes them.
+/// @param world_from_asset placement of the cloud in the world.
+/// @return the sets, or one of these errors:
+/// - invalid_argument: a setting out of range, no viewpoint, a viewpoint that is not finite, or a cloud
+///   that is not sorted.
+/// - unsupported: the sets would gain nothing (VisibleSettings::most_share). Draw without them.
+/// - those of rendering.
 template <Backend B>
 requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
     B& backend, const GaussianCloud& cloud, std::span<const Vec3d> viewpoints,

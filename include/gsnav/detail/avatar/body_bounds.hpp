@@ -8,19 +8,21 @@
 
 namespace gsnav {
 
-/// A box that holds all Gaussians of a body in any pose. A skinned point is a mean of the places where
-/// its joints alone would put it, each as far from its joint as in the bind pose: it lies in the box
-/// around balls at the joints, each as large as the furthest Gaussian that its joint moves.
+/// Computes a box that contains all Gaussians of a body in any pose. A skinned point is a mean of the
+/// positions that its joints alone would give it, and each of these is as far from its joint as in the
+/// bind pose. It therefore lies in the box around balls at the joints, whose radius is the distance of
+/// the furthest Gaussian that the joint moves.
 class BodyBounds {
  public:
   explicit BodyBounds(const AvatarAsset& asset);
 
-  /// For joints to root frame, [J], metres.
+  /// The box for a pose. `joints` [J]: joint to root frame, metres.
   ChunkBounds at(const std::vector<Affine3<double>>& joints) const noexcept;
 
  private:
-  std::vector<double> reach_;  // [J] metres; negative: moves nothing
-  double bulge_ = 0;           // of dual quaternions: how far out of the box, as a share of its diagonal
+  std::vector<double> reach_;  // [J] metres; negative: the joint moves nothing
+  double bulge_ = 0;           // with dual quaternions: how far a point may lie outside, as a share of
+                               // the box's diagonal
   float scale_ = 0, opacity_ = 0;
 };
 

@@ -10,16 +10,18 @@
 
 namespace gsnav {
 
-/// Capsules fixed to joints, made of ones that were recorded frame by frame.
+/// Capsules fixed to joints, found from capsules that were recorded frame by frame.
 struct TrackedCapsules {
-  std::vector<ProxyCapsule> capsules;  ///< [C]
-  double error = 0.0;                  ///< metres; how far an end or a radius is from its track, at most
+  std::vector<ProxyCapsule> capsules;  ///< [C].
+  double error = 0.0;                  ///< Greatest distance of an end, or difference of a radius, from
+                                       ///< the recording; metres.
 };
 
-/// Finds for each recorded capsule (a driver's `proxy_capsules`, [T][C] in the clip's frame, root path
-/// included) the joint that it moves with: the one in whose frame its ends stay best in place over the
-/// clip's keys. Ends and radius are the means there. Errors: invalid_argument (the clip is of another
-/// skeleton, frames of different numbers).
+/// Finds the joint with which each recorded capsule moves: the one in whose frame the capsule's ends
+/// move least over the clip. Ends and radius are the means in that frame.
+/// @param track a driver's `proxy_capsules`, [T][C] in the clip's frame, root path included.
+/// @return the capsules, or invalid_argument (the clip is of another skeleton, or frames have different
+/// numbers of capsules).
 Result<TrackedCapsules> capsules_from_track(const Skeleton& skeleton, const MotionClip& clip,
                                             const std::vector<std::vector<Capsule<double>>>& track);
 

@@ -11,9 +11,9 @@
 
 namespace gsnav {
 
-/// Many actors' Gaussians on one backend, skinned together: their joint matrices go there in one copy,
-/// and a GPU skins all of them in one launch. Actors of one asset share its canonical arrays. Positions
-/// are the bits that SkinnedGaussians gives. The backend must outlive it.
+/// The Gaussians of many actors on one backend, skinned together. Their joint matrices are uploaded in
+/// one copy, and a GPU skins all actors in one launch. Actors of one asset share its canonical arrays.
+/// Positions have the same bits as with SkinnedGaussians. The backend must outlive this object.
 ///
 ///     SkinnedCrowd crowd(backend);
 ///     for (const AvatarActor& a : people) crowd.add(a.asset());
@@ -24,7 +24,7 @@ class SkinnedCrowd {
  public:
   explicit SkinnedCrowd(B& backend) : backend_(&backend), joints_(backend) {}
 
-  /// Makes room for one more actor, of this asset, and returns its place.
+  /// Adds a place for an actor of this asset and returns the place's index.
   std::size_t add(const std::shared_ptr<const AvatarAsset>& asset) {
     std::shared_ptr<const AvatarArrays<B>> arrays;
     for (const auto& known : assets_) {
@@ -34,15 +34,15 @@ class SkinnedCrowd {
       assets_.push_back(arrays = std::make_shared<const AvatarArrays<B>>(*backend_, asset));
     return add(std::move(arrays));
   }
-  /// The same of an asset's arrays that others share.
+  /// Adds a place for an actor of an asset whose arrays are shared with others.
   std::size_t add(std::shared_ptr<const AvatarArrays<B>> arrays) {
     actors_.emplace_back(*backend_, std::move(arrays));
     return actors_.size() - 1;
   }
 
-  /// Poses actors[i] (or *actors[i]) at place i as it is at time t (seconds); those that are not in the
-  /// scene then have empty sets. Errors: invalid_argument where there are not as many actors as places,
-  /// or one has another asset than its place; no set changes its Gaussians then.
+  /// Poses actors[i] (or *actors[i]) at place i, for time t (seconds). The sets of actors that are not
+  /// in the scene then are empty. Error: invalid_argument if the numbers of actors and places differ, or
+  /// an actor's asset is not that of its place; no Gaussians are changed then.
   Status pose(std::span<const AvatarActor> actors, double t) {
     return pose(
         actors.size(), [&](std::size_t i) -> const AvatarActor& { return actors[i]; }, t);
@@ -52,9 +52,9 @@ class SkinnedCrowd {
         actors.size(), [&](std::size_t i) -> const AvatarActor& { return *actors[i]; }, t);
   }
 
-  /// Poses them for what these cameras see by `config`, in two steps, as SkinnedGaussians::prepare has
-  /// it: the first is the host's alone, and several threads may take it, each for a crowd of its own.
-  /// Errors as above.
+  /// Poses the actors for rendering with `config` from these cameras, in two steps like
+  /// SkinnedGaussians::prepare. The first step runs on the host only; several threads may prepare
+  /// different crowds at once. Errors: as above.
   Status prepare(std::span<const AvatarActor> actors, double t, std::span<const Camera> cameras,
                  const RenderConfig& config) {
     if (Status s = check(actors.size()); !s) return s;
@@ -84,7 +84,7 @@ class SkinnedCrowd {
   }
 
   std::size_t size() const noexcept { return actors_.size(); }
-  /// The posed Gaussians at a place; valid until the next pose().
+  /// The posed Gaussians of a place. Valid until the next pose().
   GaussianSet set(std::size_t place) const& noexcept { return actors_[place].set(); }
   GaussianSet set(std::size_t place) const&& = delete;
 

@@ -14,36 +14,38 @@
 
 namespace gsnav {
 
-/// A rigged surface in its bind pose: what an avatar of Gaussians is made of.
+/// A rigged surface in its bind pose, from which an avatar of Gaussians is made.
 struct SkinnedMesh {
   std::string name;
   Skeleton skeleton;
-  std::vector<Vec3d> positions;  ///< [V] bind pose, root frame (Y up, facing -Z), metres
-  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< counter-clockwise seen from outside
-  std::size_t influences = 0;                           ///< k
-  std::vector<std::uint16_t> joint_indices;             ///< [V][k]
-  std::vector<float> weights;                           ///< [V][k], each row's sum is 1
-  std::vector<std::array<double, 2>> uvs;               ///< [V] or empty
-  std::vector<Vec3d> colors;                            ///< [V] linear light, or empty: white
-  std::vector<std::uint32_t> materials_of;  ///< [T] index into materials, or empty: the first
-  std::vector<SurfaceMaterial> materials;   ///< empty: white
+  std::vector<Vec3d> positions;  ///< [V] bind pose, root frame (Y up, facing -Z), metres.
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< Counter-clockwise seen from outside.
+  /// k, the number of joints that move one vertex.
+  std::size_t influences = 0;
+  std::vector<std::uint16_t> joint_indices;  ///< [V][k].
+  std::vector<float> weights;                ///< [V][k]; each row sums to 1.
+  std::vector<std::array<double, 2>> uvs;    ///< [V], or empty.
+  std::vector<Vec3d> colors;                 ///< [V] linear light. Empty: white.
+  std::vector<std::uint32_t> materials_of;   ///< [T] index into `materials`. Empty: the first.
+  std::vector<SurfaceMaterial> materials;    ///< Empty: white.
   std::vector<TextureImage> textures;
 
-  /// invalid_argument naming the array and what is wrong with it.
+  /// Checks the arrays. Error: invalid_argument naming the array and the problem.
   Status validate() const;
 };
 
-/// What reading a rigged surface did to it; nothing is repaired without being counted here.
+/// What reading a rigged surface changed. Every repair is counted here.
 struct SkinnedMeshReport {
   std::size_t vertices = 0, triangles = 0;
-  std::size_t skins = 1, skins_in_file = 1;  ///< whose meshes were read, and all (glTF)
+  std::size_t skins = 1, skins_in_file = 1;  ///< Skins whose meshes were read, and all skins of the file
+                                             ///< (glTF).
   std::size_t unequal_weights =
-      0;  ///< vertices whose weights did not sum to 1 (1e-3): divided by the sum
+      0;  ///< Vertices whose weights did not sum to 1 (within 1e-3); they were divided by the sum.
   double least_weight_sum = 1.0, greatest_weight_sum = 1.0;
   std::size_t without_weights =
-      0;  ///< vertices with none: moved by the nearest weighted vertex's joints
-  /// Greatest distance, metres, between a vertex posed by the file's own matrices and by rigid joints
-  /// (scales of joints are not kept), over the poses looked at.
+      0;  ///< Vertices without weights; the joints of the nearest weighted vertex move them.
+  /// Greatest distance, metres, over the poses looked at, between a vertex posed by the file's own
+  /// matrices and by rigid joints, which drop scales.
   double rigid_error = 0.0;
   std::vector<std::string> warnings;
 };

@@ -8,16 +8,18 @@
 
 namespace gsnav {
 
-/// A weight from its parts (AvatarAsset::skinning_weights).
+/// The weight that a number of parts stands for (AvatarAsset::skinning_weights).
 inline double weight_of_parts(std::uint16_t parts) noexcept { return skinning_weight<double>(parts); }
 
-/// Weights as parts of kWeightParts that add up to it. `weights` [k]: not negative, greatest first, any
-/// sum above zero; divided by it. `parts` [k]: greatest first too.
+/// Rounds weights to integer parts whose sum is kWeightParts.
+/// @param weights [k] not negative, greatest first, with any sum above zero, by which they are divided.
+/// @param parts [k] output, greatest first.
 ///
-/// Each weight is rounded down and those that lost most get one part more, so that none is off by a
-/// part. The positive errors and the negative ones then make k / 4 parts each at most, which bounds how
-/// far a point skinned with `parts` is from one skinned with `weights`: k / (4 * kWeightParts) of the
-/// greatest distance between two of the places where the joints alone would put it.
+/// Each weight is rounded down, and those that lost most get one part more, so that no weight is off by
+/// a whole part. The positive and the negative errors then sum to at most k / 4 parts each. A point
+/// skinned with `parts` is therefore at most k / (4 * kWeightParts) of a distance d away from the one
+/// skinned with `weights`, where d is the greatest distance between two of the positions that the joints
+/// alone would give.
 void round_weights(const double* weights, std::size_t k, std::uint16_t* parts);
 
 }  // namespace gsnav

@@ -14,19 +14,19 @@ const std::array<const char*, 55>& smplx_joint_names() noexcept;
 /// Parents of the SMPL-X joints, -1 for the root.
 const std::array<std::int32_t, 55>& smplx_joint_parents() noexcept;
 
-/// The 24 joint names of SMPL, in its order; the first 22 are SMPL-X's.
+/// The 24 joint names of SMPL, in its order. The first 22 are those of SMPL-X.
 const std::array<const char*, 24>& smpl_joint_names() noexcept;
 
 /// Parents of the SMPL joints, -1 for the root.
 const std::array<std::int32_t, 24>& smpl_joint_parents() noexcept;
 
-/// Names and parents of a body known by its number of joints.
+/// Names and parents of the joints of a known body model.
 struct BodyJoints {
-  std::span<const char* const> names;     ///< [J], empty where the number is no known body's
+  std::span<const char* const> names;     ///< [J]; empty for an unknown model.
   std::span<const std::int32_t> parents;  ///< [J]
 };
 
-/// SMPL for 24 joints, SMPL-X for 55, else empty.
+/// The joints of SMPL for 24, of SMPL-X for 55, else empty.
 BodyJoints body_joints(std::size_t count) noexcept;
 
 }  // namespace gsnav

@@ -9,14 +9,14 @@
 namespace gsnav {
 
 struct WeightGradientOptions {
-  std::size_t neighbours = 16;  ///< Gaussians to whose weights a gradient is fitted, >= 4
+  std::size_t neighbours = 16;  ///< Number of Gaussians to whose weights a gradient is fitted, >= 4.
 };
 
-/// Gives the asset linear_stretched skinning: AvatarAsset::weight_gradients by a linear fit to the
-/// weights of each Gaussian's nearest neighbours. Weights are known on the surface only, so a gradient
-/// has no part in directions in which the neighbours hardly spread; neighbours that share less than 0.3
-/// of their weights lie on another part of the body (a hand at the hip) and do not count. Errors:
-/// invalid_argument (the asset's, the options).
+/// Switches the asset to linear_stretched skinning. AvatarAsset::weight_gradients are a linear fit to
+/// the weights of each Gaussian's nearest neighbours. Weights are known on the surface only, so a
+/// gradient has no component in directions in which the neighbours hardly spread. Neighbours that share
+/// less than 0.3 of their weights are ignored: they lie on another part of the body, like a hand at the
+/// hip. Error: invalid_argument (those of the asset, or an option out of range).
 Status bake_weight_gradients(AvatarAsset& asset, const WeightGradientOptions& options = {});
 
 }  // namespace gsnav

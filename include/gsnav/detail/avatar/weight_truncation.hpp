@@ -10,31 +10,34 @@
 
 namespace gsnav {
 
-/// How many weights of a Gaussian are kept, and by what that is judged.
+/// Number of weights that are kept for each Gaussian, and how it is chosen.
 struct WeightOptions {
-  int influences =
-      0;  ///< 4 or 8; 0: 4 where that moves no Gaussian by more than `tolerance` in `poses`, else 8
-  double tolerance = 2e-4;  ///< metres
-  /// [pose][J] joint to root frame, metres. None: unknown, and 0 above means 8 where any Gaussian has
-  /// more than 4.
+  int influences = 0;  ///< 4, 8, or 0: 4 if that moves no Gaussian by more than `tolerance` in any of
+                       ///< `poses`, else 8.
+  double tolerance = 2e-4;  ///< Metres.
+  /// [pose][J] joint to root frame, metres. Without poses, `influences` = 0 means 8 if any Gaussian has
+  /// more than 4 weights.
   std::vector<std::vector<Affine3<double>>> poses;
 };
 
-/// What keeping the greatest weights of each Gaussian has done to it, against all of its weights divided
-/// by their sum in double.
+/// The error of keeping only the greatest weights of each Gaussian, compared with all of its weights
+/// divided by their sum in double.
 struct WeightReport {
-  int influences = kInfluences4;  ///< weights kept
-  std::size_t most_weights = 0;   ///< that any Gaussian has above zero
-  double dropped_mass = 0.0;      ///< greatest share of a Gaussian's weight that was dropped
-  std::size_t poses = 0;          ///< in which the following are measured; 0: unknown
-  double position_error = 0.0;    ///< metres, greatest, with the weights kept and rounded
-  double position_error_8 = 0.0;  ///< metres, greatest, had eight been kept
-  std::size_t needs_more = 0;     ///< Gaussians off by more than the tolerance with the weights kept
+  int influences = kInfluences4;  ///< Weights kept.
+  std::size_t most_weights = 0;   ///< Largest number of positive weights of any Gaussian.
+  double dropped_mass = 0.0;      ///< Greatest share of a Gaussian's weight that was dropped.
+  std::size_t poses = 0;          ///< Number of poses in which the following are measured; 0: they are
+                                  ///< unknown.
+  double position_error = 0.0;    ///< Greatest error of a position with the weights kept and rounded,
+                                  ///< metres.
+  double position_error_8 = 0.0;  ///< Greatest error of a position if eight were kept, metres.
+  std::size_t needs_more = 0;     ///< Gaussians whose error with the kept weights exceeds the tolerance.
 };
 
-/// AvatarAsset::set_weights with a bound: `indices` and `weights` are [N][k], a joint at most once a
-/// row. Keeps four or eight weights a Gaussian as `options` say and reports what that costs. Errors:
-/// what set_weights reports; invalid_argument (a pose of another number of joints, the options).
+/// Sets the weights of an asset and bounds the error: AvatarAsset::set_weights with the number of
+/// weights chosen by `options`. `indices` and `weights` are [N][k], each joint at most once in a row.
+/// Errors: those of set_weights; invalid_argument (a pose with another number of joints, an option out
+/// of range).
 Result<WeightReport> choose_weights(AvatarAsset& asset, std::size_t k,
                                     const std::vector<std::uint16_t>& indices,
                                     const std::vector<float>& weights, const WeightOptions& options);

@@ -13,15 +13,15 @@
 
 namespace gsnav {
 
-/// The embedded flat: what runs where no scene was given.
+/// The embedded flat: the scene that programs use if none is given.
 ///
 /// World frame: metres, Y up, floor at y = 0, ceiling at 2.7; inside walls x in [0, 10], z in [0, 8].
-/// Four furnished rooms joined by five openings, so that most targets can be reached two ways.
+/// Four furnished rooms are joined by five openings, so that most targets can be reached in two ways.
 struct DefaultScene {
-  GaussianCloud cloud;                                  ///< SH degree 0, light baked in
-  std::vector<Vec3d> vertices;                          ///< the same surfaces as a mesh
-  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< counter-clockwise seen from the front
-  Aabb<double> bounds{};                                ///< of the Gaussians' means
+  GaussianCloud cloud;                                  ///< SH degree 0, with baked light.
+  std::vector<Vec3d> vertices;                          ///< The same surfaces as a mesh, metres.
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< Counter-clockwise seen from the front.
+  Aabb<double> bounds{};                                ///< Box of the Gaussians' means.
 };
 
 /// A viewpoint in the flat that shows a room.
@@ -30,32 +30,35 @@ struct DefaultView {
   Vec3d eye, target;
 };
 
-/// Eye-level viewpoints, one a room, the living room first.
+/// Viewpoints at eye level, one for each room, the living room first.
 std::array<DefaultView, 4> default_scene_views() noexcept;
 
-/// Most Gaussians that SceneSampling::gaussians may ask for. They take 6 GB while they are made.
+/// Upper limit of SceneSampling::gaussians. Making that many takes 6 GB of memory.
 inline constexpr std::size_t kMostSceneGaussians = 50'000'000;
 
-/// How finely the surfaces of a generated scene are covered with Gaussians. Gaussians are as wide as
-/// their distance asks for, so surfaces stay closed; the mesh does not depend on it. Images look alike
-/// from a density of 0.3 on; below, edges blur.
+/// How densely the surfaces of a generated scene are covered with Gaussians. Gaussians are as wide as
+/// their spacing requires, so surfaces stay closed; the mesh does not change. Images look alike from a
+/// density of 0.3 on; below that, edges blur.
 struct SceneSampling {
-  /// Number of Gaussians, at most kMostSceneGaussians; 0: as many as `density` gives. A scene needs at
-  /// least one for each of its surfaces, some ten thousand: the error says how many.
+  /// Number of Gaussians, at most kMostSceneGaussians. 0: determined by `density`. A scene needs at
+  /// least one for each of its surfaces, some ten thousand; the error names the number.
   std::size_t gaussians = 0;
-  double density = 1.0;  ///< scales the number of Gaussians, [0.05, 20]; 1: about 390,000 for the flat
-  int threads = 0;       ///< 0: one a core, at most 16. Does not change the scene.
-  std::function<void(double)> progress;  ///< called with the share that is done, (0, 1], by one thread
+  double density = 1.0;  ///< Factor on the number of Gaussians, in [0.05, 20]. 1 is about 390,000 for
+                         ///< the flat.
+  int threads = 0;       ///< Number of threads; 0: one for each core, at most 16. Does not change the
+                         ///< scene.
+  std::function<void(double)> progress;  ///< Called with the share of work that is done, in (0, 1], by
+                                         ///< one thread.
 };
 
-/// Errors: invalid_argument naming the member.
+/// Checks the settings. Error: invalid_argument naming the member.
 Status validate(const SceneSampling& sampling);
 
-/// Makes the flat; the same arguments give the same bits. Errors: invalid_argument (`sampling`),
+/// Makes the flat. The same arguments give the same bits. Errors: invalid_argument (`sampling`),
 /// out_of_memory.
 Result<DefaultScene> make_default_scene(const SceneSampling& sampling);
 
-/// The same with so dense a sampling.
+/// Makes the flat with SceneSampling::density set to `density`.
 Result<DefaultScene> make_default_scene(double density = 1.0);
 
 }  // namespace gsnav

@@ -15,20 +15,20 @@ namespace gsnav {
 struct FloorRect {
   double x0 = 0, z0 = 0, x1 = 0, z1 = 0;
 
-  double width() const noexcept { return x1 - x0; }  ///< along x
-  double depth() const noexcept { return z1 - z0; }  ///< along z
+  double width() const noexcept { return x1 - x0; }  ///< Along x.
+  double depth() const noexcept { return z1 - z0; }  ///< Along z.
   double area() const noexcept { return width() * depth(); }
 };
 
-/// Most rooms of a floor plan.
+/// Largest number of rooms of a floor plan.
 inline constexpr int kMostRooms = 12;
 
-/// What a floor plan is drawn from.
+/// Settings of make_floor_plan.
 struct FloorPlanOptions {
   std::uint64_t seed = 1;
-  int rooms = 4;  ///< [1, kMostRooms]
-  /// Metres, [0.1, 0.35]. A disc of this radius fits through every door and reaches the floor of every
-  /// room between the furniture; only corners that are narrower for it are cut off.
+  int rooms = 4;  ///< In [1, kMostRooms].
+  /// Metres, in [0.1, 0.35]. A disc of this radius passes through every door and reaches the floor of
+  /// every room between the furniture, except corners that are too narrow for it.
   double clearance = 0.3;
 };
 
@@ -37,23 +37,24 @@ enum class RoomKind { living_room, kitchen, bedroom, study, dining_room, hall };
 /// Name of a kind of room, for people.
 const char* name_of(RoomKind kind) noexcept;
 
-/// The wall of a room on its side of lowest x, highest x, lowest z or highest z.
+/// A wall of a room: at its lowest x, highest x, lowest z or highest z.
 enum class WallSide { x_low, x_high, z_low, z_high };
 
-/// A room between its walls.
+/// A room: the floor between its walls.
 struct PlannedRoom {
   RoomKind kind = RoomKind::hall;
   FloorRect inside;
 };
 
-/// A doorway through the wall between two rooms; the floor goes on through it.
+/// A doorway in the wall between two rooms. The floor continues through it.
 struct PlannedDoor {
-  std::array<std::size_t, 2> rooms{};   ///< the first is on the side of lower coordinates
-  std::array<WallSide, 2> sides{};      ///< the wall as each of them sees it
-  double wall = 0;                      ///< centre of the wall, across it; metres
-  double from = 0, to = 0, height = 0;  ///< along the wall, and of the lintel; metres
+  std::array<std::size_t, 2> rooms{};   ///< The first is on the side of lower coordinates.
+  std::array<WallSide, 2> sides{};      ///< Side of the wall in each of the two rooms.
+  double wall = 0;                      ///< Coordinate of the wall's centre plane, metres.
+  double from = 0, to = 0, height = 0;  ///< Ends of the opening along the wall, and height of the
+                                        ///< lintel; metres.
 
-  /// The floor under it, as thick as the wall.
+  /// The floor below the opening, as deep as the wall is thick.
   FloorRect floor() const noexcept;
 };
 
@@ -61,8 +62,8 @@ struct PlannedDoor {
 struct PlannedWindow {
   std::size_t room = 0;
   WallSide side{};
-  double from = 0, to = 0, bottom = 0, top = 0;  ///< along the wall, and heights; metres
-  bool curtains = false;                         ///< one on each side
+  double from = 0, to = 0, bottom = 0, top = 0;  ///< Ends along the wall, and heights; metres.
+  bool curtains = false;                         ///< One on each side.
 };
 
 enum class FurnitureKind {
@@ -80,19 +81,20 @@ enum class FurnitureKind {
   fridge,
   plant,
   floor_lamp,
-  rug,  ///< walked on
+  rug,  ///< Can be walked on.
 };
 
-/// A piece of furniture. Its own frame has the back at z = 0, the front towards +z and x = 0 in the
-/// middle; tables, chairs, plants, lamps and rugs have their centre at the origin.
+/// A piece of furniture. In its own frame the back is at z = 0, the front faces +z, and x = 0 is the
+/// middle. Tables, chairs, plants, lamps and rugs have their centre at the origin.
 struct PlannedFurniture {
   FurnitureKind kind{};
   std::size_t room = 0;
-  double x = 0, z = 0;           ///< of the origin of its frame, metres
-  double yaw = 0;                ///< of its frame about +Y, radians
-  double width = 0, length = 0;  ///< along its x and z, metres, where a kind comes in several sizes
-  bool picture = false;          ///< one hangs above it
-  FloorRect footprint;           ///< holds all of it
+  double x = 0, z = 0;           ///< Origin of its frame, metres.
+  double yaw = 0;                ///< Rotation of its frame about +Y, radians.
+  double width = 0, length = 0;  ///< Size along its x and z, metres, for kinds that come in several
+                                 ///< sizes.
+  bool picture = false;          ///< Whether a picture hangs above it.
+  FloorRect footprint;           ///< Contains all of it.
 };
 
 /// A furnished flat as a drawing, without surfaces. World frame: metres, Y up, floor at y = 0, ceiling
@@ -100,21 +102,19 @@ struct PlannedFurniture {
 struct FloorPlan {
   std::uint64_t seed = 0;
   FloorRect outline;
-  std::vector<PlannedRoom> rooms;  ///< the largest first: the living room
+  std::vector<PlannedRoom> rooms;  ///< The largest, the living room, comes first.
   std::vector<PlannedDoor> doors;
   std::vector<PlannedWindow> windows;
   std::vector<PlannedFurniture> furniture;
 };
 
-/// Draws a floor plan: a rectangle is cut into rooms, doors join all of them (some by more than one
-/// way), outer walls get windows, and each room the furniture of its kind, as far as it fits. Doors are
-/// at least 0.85 m wide. The same options give the same plan.
-/// Errors: invalid_argument naming the option.
+/// Makes a floor plan. A rectangle is cut into rooms; doors join all of them, some by more than one way;
+/// outer walls get windows, and rooms get the furniture of their kind that fits. Doors are at least 0.85
+/// m wide. The same options give the same plan. Error: invalid_argument naming the option.
 Result<FloorPlan> make_floor_plan(const FloorPlanOptions& options = {});
 
-/// Builds a floor plan: walls, furniture and light, in colours drawn by its seed. Errors:
-/// invalid_argument
-/// (`sampling`), out_of_memory.
+/// Builds a floor plan: walls, furniture and light, with colours drawn from the plan's seed. Errors:
+/// invalid_argument (`sampling`), out_of_memory.
 Result<DefaultScene> make_planned_scene(const FloorPlan& plan, const SceneSampling& sampling = {});
 
 }  // namespace gsnav

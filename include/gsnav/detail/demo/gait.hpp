@@ -12,40 +12,41 @@
 
 namespace gsnav {
 
-/// How somebody walks. Angles in degrees, lengths in metres.
+/// How a person walks. Angles in degrees, lengths in metres.
 struct GaitOptions {
-  double speed = 1.2;        ///< metres a second, chooses the stride where that is 0
-  double stride = 0.0;       ///< metres from one step of a foot to its next; 0: by height and speed
-  double duty = 0.62;        ///< share of the cycle that a foot is on the ground, (0.5, 0.75)
-  double arm_swing = 22.0;   ///< of the upper arm, each way
-  double start_phase = 0.0;  ///< of the cycle at distance 0
+  double speed = 1.2;        ///< Metres per second; determines the stride if `stride` is 0.
+  double stride = 0.0;       ///< Metres from one footfall to the next of the same foot; 0: from height
+                             ///< and speed.
+  double duty = 0.62;        ///< Share of the cycle that a foot is on the ground, in (0.5, 0.75).
+  double arm_swing = 22.0;   ///< Swing of the upper arm to each side, degrees.
+  double start_phase = 0.0;  ///< Share of the cycle at distance 0.
 };
 
-/// A walk by joint angles for a skeleton with SMPL's names for the 22 body joints (Y up, facing -Z,
-/// standing upright in its bind pose; T and A poses both work, fingers are curled where there are any).
+/// A walk by joint angles, for a skeleton with SMPL's names of the 22 body joints (Y up, facing -Z,
+/// upright in its bind pose). Both T and A poses work; fingers, if any, are curled.
 ///
-/// The phase comes from the distance walked and the feet from the phase: each footfall has a place on
-/// the path, where the foot stays while the root goes on, rolling over heel and ball. Hip, knee and
-/// ankle angles follow by two-bone inverse kinematics, so feet do not slide whatever the pelvis does.
-/// The first and last footfalls of a walk lie where the walker stood and will stand; strides between are
-/// shortened a little so that a whole number of steps fits. Timing after the usual division of the human
-/// gait cycle (62 % stance, heel off in its second half).
+/// The phase follows from the distance walked, and the feet from the phase. Each footfall has a position
+/// on the path: the foot stays there while the root moves on, and rolls over heel and ball. Angles of
+/// hip, knee and ankle follow by two-bone inverse kinematics, so feet do not slide however the pelvis
+/// moves. The first and last footfalls of a walk are where the walker stood and will stand; strides in
+/// between are shortened a little so that a whole number of steps fits. The timing is the usual division
+/// of the human gait cycle: 62 % stance, heel off in its second half.
 class WalkMotion final : public MotionSource {
  public:
-  /// Errors: invalid_argument naming the joint that is missing or the option.
+  /// Makes a walk for a skeleton. Error: invalid_argument naming the missing joint or the option.
   static Result<WalkMotion> create(const Skeleton& skeleton, const GaitOptions& options = {});
 
   std::size_t joint_count() const noexcept override { return parents_.size(); }
-  /// Metres from one step of a foot to its next.
+  /// Metres from one footfall to the next of the same foot.
   double stride() const noexcept { return stride_; }
   const GaitOptions& options() const noexcept { return options_; }
 
   void pose(const MotionInput& input, LocalPose& out) const override { pose_of(input, {}, out); }
-  /// `needed` may be empty: all are.
+  /// Fills the needed joints of `out`. An empty `needed` means all joints.
   void pose_of(const MotionInput& input, const std::vector<char>& needed, LocalPose& out) const override;
 
-  /// The pose at `cycles` of the gait in the middle of a walk (0: the right heel strikes, 0.5: the
-  /// left). `walking` 0 is standing, at any phase; `time` (seconds) breathes.
+  /// The pose at phase `cycles` in the middle of a walk. The right heel strikes at 0, the left one at
+  /// 0.5. With `walking` = 0 the person stands, at any phase. `time` (seconds) drives breathing.
   void pose(double cycles, double walking, double time, LocalPose& out) const;
 
  private:
@@ -59,7 +60,7 @@ class WalkMotion final : public MotionSource {
   struct Steps {
     double cycles = 0, stride = 0;
     double gone = std::numeric_limits<double>::infinity();  // metres since the last stop
-    double left = std::numeric_limits<double>::infinity();  // metres until the next
+    double left = std::numeric_limits<double>::infinity();  // metres until the next stop
     double turn_cycles = 0, turning = 0;
   };
   struct Body {
@@ -73,7 +74,7 @@ class WalkMotion final : public MotionSource {
   };
   struct Leg {
     Quatd thigh, shin;
-    double stretch;  // of the leg, 1: straight
+    double stretch;  // of the leg; 1: straight
   };
 
   void pose(const Steps& steps, double walking, double time, const std::vector<char>& needed,
@@ -86,18 +87,19 @@ class WalkMotion final : public MotionSource {
 
   Body body(double phase, double walking, double drop) const;
 
-  // Phase of its own cycle at which a foot is right below the root.
+  // Phase of its own cycle at which a foot is directly below the root.
   double upright() const noexcept { return 0.43 * options_.duty; }
 
-  // Pitch of a standing foot at phase p of its cycle, degrees: heel strikes, flat, heel rises.
+  // Pitch of a standing foot at phase p of its cycle, degrees: heel strike, flat, heel rise.
   double stance_pitch(double p, double walking) const noexcept;
 
-  // The ankle of a foot pitched about heel or toes, for a footfall `forward` of the root.
+  // Position of the ankle of a foot that is pitched about heel or toes, for a footfall `forward` metres
+  // ahead of the root.
   Vec3d ankle(int side, double forward, double pitch) const;
 
   Foot foot(int side, const Steps& s, double walking) const;
 
-  // Two-bone inverse kinematics; the knee points forward.
+  // Two-bone inverse kinematics with the knee pointing forward.
   Leg solve(int side, const Body& b, const Foot& f) const;
 
   GaitOptions options_;

@@ -10,20 +10,21 @@
 
 namespace gsnav {
 
-/// Colour of person `index`'s clothes and of their marks in maps, display-referred.
+/// Colour of the clothes of person `index`, also used for marks in maps. Display-referred.
 Vec3d person_color(std::size_t index) noexcept;
 
-/// People on random ways over the largest island of `walkways` (a NavMesh for a body wider than the
-/// agent's keeps their shoulders off the furniture). Ways are drawn until one keeps 0.75 m from those
-/// before it, where that can be had; all have one period, so what holds for one round holds for ever.
-/// The same arguments give the same people; `density` scales the number of their Gaussians, as far as
-/// HumanoidOptions allows. Errors: nothing_navigable where nobody finds a place; invalid_argument where
-/// density is not finite.
+/// People on random paths over the largest island of `walkways`. Use a NavMesh for a body wider than
+/// that of the agent, so that their shoulders stay clear of furniture. Paths keep 0.75 m from earlier
+/// paths where possible. All paths have one period, so every round is the same. The same arguments give
+/// the same people.
+/// @param density factor on the number of their Gaussians, within HumanoidOptions' range.
+/// @return the people, or nothing_navigable if there is no place for any, or invalid_argument if density
+/// is not finite.
 Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::size_t count,
                                                 std::uint64_t seed, double density = 1.0);
 
-/// The embedded flat with its NavMesh for a body as of `task` and people who walk in it; `density`: of
-/// the flat's Gaussians, not of people's (walking_people). Errors: what the parts report.
+/// The embedded flat with its NavMesh for the body of `task`, and people who walk in it. `density` is
+/// that of the flat's Gaussians, not of the people's (see walking_people). Errors: those of the parts.
 Result<SimulatorScene> default_simulator_scene(std::size_t people = 3, std::uint64_t seed = 1,
                                                double density = 1.0, const TaskConfig& task = {});
 

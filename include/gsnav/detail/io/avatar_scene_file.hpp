@@ -12,54 +12,56 @@
 
 namespace gsnav::io {
 
-/// One avatar of a scene, as the file says. Paths are as they are to be opened.
+/// One avatar of a scene file. Paths are resolved: they can be opened as they are.
 struct SceneAvatar {
   std::string name;
-  std::filesystem::path canonical;  ///< `canonical_gaussians`
-  std::filesystem::path driver;     ///< `.npz`; a `.pkl` in the file stands for the `.npz` beside it
-  std::filesystem::path
-      trajectory;      ///< or empty: [T,7] place and quaternion (x, y, z, w) before all joint matrices
-  double scale = 1.0;  ///< about the floor below the root joint
-  double offset_y = 0.0;           ///< metres upwards
-  double time_begin = 0.0;         ///< seconds on the scene's clock
-  std::optional<double> time_end;  ///< none: when the driver's frames are over
-  Affine3<double> coordinates{};   ///< from the driver's frame to the world, rigid
-  bool guess_coordinates =
-      true;  ///< the file does not say: a root that stands on its head in the first frame is turned
+  std::filesystem::path canonical;  ///< The file of `canonical_gaussians`.
+  std::filesystem::path driver;     ///< A `.npz`. For a `.pkl` in the scene file, the `.npz` next to it.
+  std::filesystem::path trajectory;  ///< [T,7] position and quaternion (x, y, z, w), applied before all
+                                     ///< joint matrices; or empty.
+  double scale = 1.0;                ///< Scale about the floor below the root joint.
+  double offset_y = 0.0;             ///< Metres upwards.
+  double time_begin = 0.0;           ///< Seconds on the scene's clock.
+  std::optional<double> time_end;    ///< Empty: the avatar leaves after the driver's last frame.
+  Affine3<double> coordinates{};     ///< From the driver's frame to the world, rigid.
+  bool guess_coordinates = true;  ///< Whether the scene file names no coordinate system. An avatar whose
+                                  ///< root is upside down in the first frame is then turned over.
 };
 
-/// The avatars of a scene and its clock.
+/// The avatars of a scene, and its clock.
 struct AvatarScene {
   std::vector<SceneAvatar> avatars;
-  double time_max = 0.0;  ///< 0: when the last avatar has left
+  double time_max = 0.0;  ///< Length of the clock's period, seconds. 0: until the last avatar has left.
   bool time_loop = true;
-  /// Seconds by which a clock that loops goes on after `time_max` for those who are there at its end and
-  /// at its begin to get back, at least; more where they would move faster than 1.4 m/s. 0: they jump,
-  /// as with Habitat-GS.
+  /// Least duration of the blend that a looping clock adds after `time_max`, seconds. During the blend,
+  /// avatars that are present at both ends of the period move from where they stop to where they start.
+  /// It lasts longer if an avatar would move faster than 1.4 m/s. 0: avatars jump, as in Habitat-GS.
   double loop_blend = 0.5;
-  std::vector<std::string> warnings;  ///< keys that change nothing here
+  std::vector<std::string> warnings;  ///< Keys that have no effect here.
 };
 
-/// Reads `gaussian_avatars` (or `avatars`), `time_max` and `time_loop` of Habitat-GS's
-/// `*.scene_instance.json`; relative paths start at the file's folder. Of an avatar: name,
-/// canonical_gaussians, driver (a path, or an object of smpl_params and trajectory), scale, offset_y,
-/// time_begin, time_end, coord_system (opencv, smpl_opencv, gaussian_avatar: Y down, Z forward; habitat,
-/// world, none: the world's) and coord_transform (4x4 row-major, rigid). smpl_model_path, smpl_type,
-/// smpl_gender, use_smpl_trans, frame_time, fps, sync_cuda and trajectory_in_smpl change nothing here.
+/// Reads the avatars of Habitat-GS's `*.scene_instance.json`: `gaussian_avatars` (or `avatars`),
+/// `time_max` and `time_loop`. Relative paths start at the file's folder. An avatar has the keys name,
+/// canonical_gaussians, driver (a path, or an object with smpl_params and trajectory), scale, offset_y,
+/// time_begin, time_end, coord_system (opencv, smpl_opencv and gaussian_avatar have Y down and Z
+/// forward; habitat, world and none have the world's axes) and coord_transform (4x4 row-major, rigid).
+/// These have no effect: smpl_model_path, smpl_type, smpl_gender, use_smpl_trans, frame_time, fps,
+/// sync_cuda, trajectory_in_smpl.
 ///
-/// Errors name the file, the avatar and the key: file_not_found; invalid_file; unsupported (proxy_urdf);
-/// out_of_memory. A file without avatars gives none. Never throws.
+/// A file without avatars gives an empty list. Never throws. Errors name the file, the avatar and the
+/// key: file_not_found; invalid_file; unsupported (proxy_urdf); out_of_memory.
 Result<AvatarScene> load_avatar_scene(const std::filesystem::path& path);
 
-/// Loads what a scene names, one actor an entry and in its order; entries with the same canonical file
-/// share their body. Frames play at the driver's own rate, by slerp in joint space; where the window is
-/// longer the last pose is held. Where the scene's clock loops, actors repeat with it
-/// (ActorOptions::loop_period). Capsules are those of the canonical file, else the driver's. Errors:
-/// what the loaders report, with the avatar's name.
+/// Loads the files of a scene's avatars and makes one actor for each, in order. Entries with the same
+/// canonical file share their body. Frames play at the driver's own rate, interpolated by slerp in joint
+/// space; after the last frame the last pose is held. If the scene's clock loops, actors repeat with it
+/// (ActorOptions::loop_period). Capsules are those of the canonical file, or else of the driver. Errors:
+/// those of the loaders, with the avatar's name.
 Result<std::vector<AvatarActor>> load_scene_actors(const AvatarScene& scene);
 
-/// The scene's clock at `seconds` since the start: within [0, time_max + what blending takes) where it
-/// loops, else held at time_max. `actors` are the scene's, for a file without a time_max.
+/// The time on the scene's clock `seconds` after the start: in [0, time_max + blend) if it loops,
+/// otherwise limited to time_max. `actors` are the actors of the scene; they determine time_max if the
+/// file has none.
 double scene_time(const AvatarScene& scene, const std::vector<AvatarActor>& actors,
                   double seconds) noexcept;
 

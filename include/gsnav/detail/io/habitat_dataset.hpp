@@ -12,56 +12,59 @@
 
 namespace gsnav::io {
 
-/// A `*.stage_config.json`: what a scene is made of. Paths are as they are to be opened.
+/// A stage (`*.stage_config.json`): the assets of a scene. Paths are resolved: they can be opened as
+/// they are.
 struct StageConfig {
   std::filesystem::path file;
-  std::filesystem::path render_asset;     ///< Gaussians, or a mesh
-  std::filesystem::path collision_asset;  ///< a mesh, or empty
+  std::filesystem::path render_asset;     ///< Gaussians or a mesh.
+  std::filesystem::path collision_asset;  ///< A mesh, or empty.
   Vec3d up{0, 1, 0}, front{0, 0, -1}, origin{};
   double units_to_meters = 1.0;
   double scale = 1.0;
-  bool norm_quaternion = true;  ///< Habitat-GS's; quaternions are always normalised here
+  bool norm_quaternion = true;  ///< Read for Habitat-GS, without effect: gsnav always normalises
+                                ///< quaternions.
 
-  /// World from asset by up, front, origin, units and scale. Habitat-GS leaves all of these out for
-  /// Gaussians and takes them as they are stored, so data made for it wants the identity.
+  /// Transform from the asset to the world by up, front, origin, units and scale. Habitat-GS ignores
+  /// these for Gaussians, so data made for it needs the identity instead.
   Similarity world_from_asset() const noexcept;
 };
 
-/// A `*.scene_instance.json`: a stage, the NavMesh and who is in it.
+/// A scene (`*.scene_instance.json`): a stage, a NavMesh and avatars.
 struct HabitatScene {
-  std::string name;  ///< the file's, without `.scene_instance.json`
+  std::string name;  ///< Name of the file without `.scene_instance.json`.
   std::filesystem::path file;
   StageConfig stage;
-  std::filesystem::path navmesh;  ///< or empty
+  std::filesystem::path navmesh;  ///< Path of the NavMesh, or empty.
   AvatarScene avatars;
 };
 
-/// What a `*.scene_dataset_config.json` leads to. Its order is that of the scenes' names.
+/// A dataset (`*.scene_dataset_config.json`) with all its scenes, sorted by name.
 struct HabitatDataset {
   std::vector<HabitatScene> scenes;
   std::vector<std::string>
-      warnings;  ///< keys that are left out, each once, with the first file that has it
+      warnings;  ///< Keys that were left out, each once, with the first file that has it.
 
-  /// The scene of this name, or whose file or asset an episode's `scene_id` names; null where there is
-  /// none.
+  /// The scene with this name, or the one whose file or asset the `scene_id` of an episode names. Null
+  /// if there is none.
   const HabitatScene* find(const std::string& name) const noexcept;
 };
 
-/// Reads a dataset with Habitat-GS's additions: stages and scene_instances (`paths` by extension,
-/// folders or patterns with `*` in their last parts, relative to the dataset's file), default_attributes
-/// of stages, navmesh_instances (a map of names to paths). A dataset of stages alone has a scene for
-/// each of them. Light setups, objects and semantic descriptions are left out and said to be.
+/// Reads a dataset with Habitat-GS's additions: stages and scene_instances (`paths` by extension;
+/// folders, or patterns with `*` in their last parts, relative to the dataset's file),
+/// default_attributes of stages, and navmesh_instances (a map from names to paths). In a dataset without
+/// scenes, each stage becomes a scene. Light setups, objects and semantic descriptions are left out,
+/// with a warning.
 ///
-/// Paths in these files may be absolute and may hold `..`, as those of Habitat's own datasets do: what
-/// they name is read, never written. Files outside of the dataset's folder are named in `warnings`; do
-/// not read data of strangers as a user whose other files they must not learn of.
+/// Paths in these files may be absolute and may contain `..`, as in Habitat's own datasets. Files they
+/// name are read, never written; `warnings` names those outside the dataset's folder. Do not read
+/// untrusted datasets as a user whose other files must stay secret.
 ///
-/// Errors name the file and the key: file_not_found (also: a stage or NavMesh that a scene names);
-/// invalid_file; unsupported (a stage with a scale for each axis); out_of_memory. Never throws.
+/// Errors name the file and the key: file_not_found (also for a stage or NavMesh that a scene names);
+/// invalid_file; unsupported (a stage with a separate scale for each axis); out_of_memory. Never throws.
 Result<HabitatDataset> load_habitat_dataset(const std::filesystem::path& path);
 
-/// Reads one stage. Errors name the file and the key: file_not_found; invalid_file (also: no
-/// render_asset); unsupported (a scale for each axis); out_of_memory. Never throws.
+/// Reads one stage. Errors name the file and the key: file_not_found; invalid_file (also without a
+/// render_asset); unsupported (a separate scale for each axis); out_of_memory. Never throws.
 Result<StageConfig> load_stage_config(const std::filesystem::path& path);
 
 }  // namespace gsnav::io

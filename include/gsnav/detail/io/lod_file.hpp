@@ -10,35 +10,35 @@
 
 namespace gsnav::io {
 
-/// Writes a tree (build_lod) with the hash of the cloud and of the settings that it was built of, and a
-/// checksum. Errors: those of writing a file. Never throws.
+/// Writes a tree (build_lod), with a hash of the cloud and settings it was built from and a checksum.
+/// Errors: those of writing a file. Never throws.
 Status save_lod(const std::filesystem::path& path, const LodTree& tree, const GaussianCloud& cloud,
                 const LodSettings& settings = {});
 
-/// Reads a tree that was built of `cloud` with `settings`.
-/// Errors: file_not_found; invalid_argument (it was built of another cloud, or by other settings or
-/// another version of the builder); invalid_file (not such a file, truncated, too long, a checksum or a
-/// value that cannot be). What it allocates follows from the cloud, never from the file. Never throws.
+/// Reads a tree that was built from `cloud` with `settings`. The allocated memory depends on the cloud
+/// only, never on the file. Never throws. Errors: file_not_found; invalid_argument (built from another
+/// cloud, or with other settings or another version of the builder); invalid_file (not a tree file,
+/// truncated, too long, wrong checksum, or a value out of range).
 Result<LodTree> load_lod(const std::filesystem::path& path, const GaussianCloud& cloud,
                          const LodSettings& settings = {});
 
-/// Where the tree of a scene lies: beside the asset, under a name with the hash of its content.
-/// `spec` as of load_scene (of tiles, the first one's place).
+/// Path of the cached tree of a scene: next to the asset, under a name with a hash of the content.
+/// `spec` is that of load_scene; for several tiles the path is that of the first.
 std::filesystem::path lod_path(const std::string& spec, const GaussianCloud& cloud,
                                const LodSettings& settings = {});
 
-/// A tree, and what there is to say of where it came from.
+/// A tree, and how cached_lod got it.
 struct CachedLod {
   LodTree tree;
-  bool built = false;  ///< now; else read
+  bool built = false;  ///< Whether it was built now, rather than read.
   std::string
-      warning;  ///< why a file that is there was not taken, or why none could be written; or empty
+      warning;  ///< Why an existing file was not used, or why the tree could not be written; or empty.
 };
 
-/// The tree of a scene: read where lod_path() has it, else built by `build`, which returns a
-/// Result<LodTree>, and written there; trees of an earlier content of the scene's file, older than it,
-/// are then removed. A file that cannot be taken, and a folder that cannot be written, are warnings.
-/// Errors: those of `build`.
+/// The tree of a scene. It is read from lod_path(), or else built by `build`, which returns a
+/// Result<LodTree>, and written there. Writing removes trees of an earlier content of the scene's file,
+/// if they are older than it. A file that cannot be used and a folder that cannot be written only give a
+/// warning. Errors: those of `build`.
 template <class Build>
 Result<CachedLod> cached_lod(const std::string& spec, const GaussianCloud& cloud,
                              const LodSettings& settings, const Build& build) {

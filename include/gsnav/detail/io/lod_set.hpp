@@ -10,37 +10,38 @@
 
 namespace gsnav::io {
 
-/// How load_lod_set reads.
+/// Options of load_lod_set.
 struct LoadLodOptions {
-  int level = 0;            ///< 0 is the finest
-  bool environment = true;  ///< add the far shell, where the set names one
-  ReadLimits limits{};      ///< a tree of n levels is 2 n + 1 deep in JSON
+  int level = 0;            ///< Level to read; 0 is the finest.
+  bool environment = true;  ///< Whether to add the far shell, if the set has one.
+  ReadLimits limits{};      ///< A tree of n levels is nested 2 n + 1 deep in JSON.
 };
 
-/// Reads PlayCanvas' streamed LOD set: `lod-meta.json`, or its folder, with a tree of nodes each of
-/// which names rows of SOG files for some levels. All nodes are read at one level and merged; where a
-/// node has no such level, or its file is not there, the next coarser one is taken, else the next finer
-/// one, and the report's warnings say so. Rows come by file, as the set lists them.
+/// Reads PlayCanvas' streamed LOD set: `lod-meta.json` or its folder. The file has a tree of nodes, each
+/// of which names rows of SOG files for some of its levels. All nodes are read at one level and merged.
+/// Where a node lacks the level or its file is missing, the next coarser level is used, else the next
+/// finer one, with a warning in the report. Rows are ordered by file, as the set lists the files.
 ///
-/// Errors: as load_sog; file_not_found (no level of a node is there); invalid_argument (a level that the
-/// set does not have, named with those it has); unsupported (a tree deeper than `limits` allow);
-/// invalid_file (files outside of the folder, rows that two nodes share or that end behind their file).
-/// Never throws.
+/// Errors: those of load_sog; file_not_found (no level of a node exists); invalid_argument (a level that
+/// the set does not have, with those it has); unsupported (a tree deeper than `limits` allow). A set is
+/// invalid_file if it names files outside of its folder, or rows that two nodes share or that lie beyond
+/// the end of their file. Never throws.
 Result<LoadedCloud> load_lod_set(const std::filesystem::path& path, const LoadLodOptions& options = {});
 
-/// A streamed set with its levels of detail, to be drawn by a LodCut.
+/// A streamed set with its levels of detail, to be drawn with a LodCut.
 struct LoadedLodSet {
-  GaussianCloud cloud;  ///< the finest level that is there, in chunks of one node each; filled up with
-                        ///< transparent rows
-  LodTree tree;         ///< the levels above
-  LoadReport report;    ///< of the finest level; kept has no rows that fill chunks
+  /// The finest available level. Each chunk belongs to one node; chunks are filled up with transparent
+  /// rows.
+  GaussianCloud cloud;
+  LodTree tree;       ///< The coarser levels.
+  LoadReport report;  ///< Report of the finest level. `kept` does not count rows that fill chunks.
 };
 
-/// Reads all levels of a streamed set that are there, from `options.level` on: what load_lod_set gives
-/// is the finest, and each node may be shown by any coarser one. `row_ids` are places in load_lod_set's
-/// order. The environment is always shown whole. Errors: load_lod_set's; invalid_file (rows that two
-/// levels share, but where a node names the same rows twice); unsupported (nodes of so few rows that
-/// chunks would be mostly empty). Never throws.
+/// Reads all available levels of a streamed set, from `options.level` on. The finest is what
+/// load_lod_set reads; each node may be drawn at any coarser level. `row_ids` are places in the order of
+/// load_lod_set. The environment is always drawn whole. Errors: those of load_lod_set; invalid_file
+/// (rows that two levels share, unless one node names the same rows twice); unsupported (nodes of so few
+/// rows that chunks would be mostly empty). Never throws.
 Result<LoadedLodSet> load_lod_levels(const std::filesystem::path& path,
                                      const LoadLodOptions& options = {});
 

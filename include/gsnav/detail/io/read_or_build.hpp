@@ -8,15 +8,18 @@
 
 namespace gsnav::io::detail {
 
-/// Removes the files beside `path` (ASSET.HASH.lod) that have another hash and are older than ASSET, or,
-/// of a folder, than a file in it: they were made of content that is no longer there. Newer ones are of
-/// other settings, and stay.
+/// Removes stale caches: files next to `path` (ASSET.HASH.lod) with another hash that are older than
+/// ASSET, or for a folder older than any file in it. They were made from content that no longer exists.
+/// Newer ones belong to other settings and stay.
 void remove_stale_caches(const std::filesystem::path& path) noexcept;
 
-/// Fills `out` (`built`, `warning`, and `value`, one of its members) with what `path` has, else with
-/// what is built and then written there; files of an earlier content of the asset then go. `load(path)`
-/// and `build()` give a Result, `save(path, value)` a Status. A file that cannot be taken, and a folder
-/// that cannot be written, are warnings. Errors: those of `build`.
+/// Reads `path`, or else builds the value and writes it there, which removes the caches of an earlier
+/// content of the asset. A file that cannot be used and a folder that cannot be written only give a
+/// warning.
+/// @param value the member of `Cached` that is filled, next to `built` and `warning`.
+/// @param load,build return a Result<T>.
+/// @param save returns a Status.
+/// @return the value, or an error of `build`.
 template <class Cached, class T, class Load, class Build, class Save>
 Result<Cached> read_or_build(const std::filesystem::path& path, T Cached::*value, const Load& load,
                              const Build& build, const Save& save) {

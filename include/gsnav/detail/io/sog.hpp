@@ -8,33 +8,43 @@
 
 namespace gsnav::io {
 
-/// Reads PlayCanvas' SOG format: a folder with meta.json and lossless WebP planes, the path of its
-/// meta.json, or a bundled `.sog` (zip, stored or deflated entries). Versions 2 and 1 (version 1 only
-/// without SH bands). SH degree 0 to 3 through the palette. `"antialias": true` sets the filter to mip.
+/// Reads PlayCanvas' SOG format: a folder with meta.json and lossless WebP images, the path of its
+/// meta.json, or a bundled `.sog` (zip with stored or deflated entries). Reads version 2, and version 1
+/// without SH bands. SH bands (degree 1 to 3) come from the palette. `"antialias": true` sets the filter
+/// to mip.
 ///
-/// Memory is bounded by 62 MB and 2 kB for each byte of the planes: constant planes of any size fit into
-/// some bytes. Errors name the file, the field and the value: file_not_found (a plane is missing);
-/// invalid_file (sizes of planes that do not fit the count or each other, a quaternion mode outside
-/// 252..255, a palette label or a codebook index beyond its end, a damaged zip or WebP, more pixels than
-/// so few bytes are believed to hold); unsupported (other versions, lossy planes, encrypted bundles);
-/// out_of_memory. Never throws.
+/// Memory is at most 62 MB plus 2 kB for each byte of the images, because constant images of any size
+/// compress to a few bytes. Errors name the file, the field and the value. Never throws.
+/// @return the result, or one of these errors:
+/// - file_not_found: an image is missing.
+/// - invalid_file: sizes of images that do not fit the count or each other, a quaternion mode outside
+///   252..255, a palette label or codebook index beyond its end, a damaged zip or WebP, or more pixels
+///   than the number of bytes makes plausible.
+/// - unsupported: other versions, lossy images, or encrypted bundles.
+/// - out_of_memory.
 Result<LoadedCloud> load_sog(const std::filesystem::path& path);
 
-/// Writes a cloud as SOG version 2: a bundle where `path` ends in `.sog`, else the files beside
-/// `path`/meta.json, whose folder must exist. Where a scene lies there already the new images get names
-/// that it does not use (means_l.1.webp), meta.json is replaced last and the old images are removed:
-/// whenever the writer is stopped, the folder has one whole scene. Rows are written in the order in
-/// which they were read. Planes compress better where neighbours in space are neighbours there: clear
-/// `row_ids` after sort_spatially to have the cloud's own order written; ties of depth are then drawn in
+/// Writes a cloud as SOG version 2: a bundle if `path` ends in `.sog`, otherwise files next to `path`,
+/// which must be named meta.json, in an existing folder. If the folder has a scene already, the new
+/// images get unused names (means_l.1.webp), meta.json is replaced last and the old images are then
+/// removed. The folder holds a complete scene at any moment.
+///
+/// Rows are written in the order in which they were read. Images compress better in spatial order: to
+/// write the cloud's own order, clear `row_ids` after sort_spatially. Ties of depth are then drawn in
 /// another order.
 ///
-/// Read back: a mean v is within (1 + |v|) r / 131070, r being the range of log(1 + |v|) of its axis;
-/// the quaternion's smaller components within 0.0028, opacities within 1/510; log-scales (-infinity is
-/// written as -20) and degree-0 coefficients within 1/255 of their range, exact where there are at most
-/// 256 different values. Higher SH bands share a palette of N/2 entries, at least 1024 and at most
-/// 65536; up to that many different ones are kept but for the codebook's 1/255 of the range. Errors:
-/// file_not_found (the folder is missing), write_failed; invalid_argument (arrays of
-/// different lengths, another name); unsupported (more than 268 million Gaussians, a bundle of 4 GiB);
+/// Values are read back with these errors:
+///
+/// - mean v: (1 + |v|) r / 131070, with r the range of log(1 + |v|) of its axis.
+/// - the three smaller components of a quaternion: 0.0028.
+/// - opacity: 1/510.
+/// - log-scales (-infinity is written as -20) and coefficients of degree 0: 1/255 of their range; exact
+///   if there are at most 256 different values.
+/// - higher SH bands: they share a palette of N/2 entries, at least 1024 and at most 65536. With no more
+///   distinct values than that, the error is 1/255 of the range.
+///
+/// Errors: file_not_found (the folder is missing); write_failed; invalid_argument (arrays of different
+/// lengths, another name); unsupported (more than 268 million Gaussians, a bundle of 4 GiB);
 /// out_of_memory. Never throws.
 Status save_sog(const std::filesystem::path& path, const GaussianCloud& cloud);
 

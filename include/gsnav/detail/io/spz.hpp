@@ -11,50 +11,54 @@
 
 namespace gsnav::io {
 
-/// How load_spz reads.
+/// Options of load_spz.
 struct LoadSpzOptions {
-  /// Keep the file's axes. Without it they are taken for SPZ's own (x right, y up, z backwards) and
-  /// turned to those of a PLY (x right, y down, z forward) by half a turn about x, SH bands included.
+  /// Keep the file's axes. Otherwise they are taken for SPZ's (x right, y up, z backwards) and turned to
+  /// those of a PLY (x right, y down, z forward), by half a turn about x that includes SH bands.
   bool keep_axes = false;
 };
 
-/// Reads Niantic's SPZ, versions 1 to 3 (a gzip stream) and 4 (a zstd stream for each field): positions
-/// of 24 bits (float16 in version 1), log-scales of 8 bits in steps of 1/16, quaternions of 3 x 8 bits
-/// or of 3 x 10 (from version 3), colours, opacities and SH bands of 8 bits. Of SH degree 4 the bands up
-/// to degree 3 are read, with a warning; the antialiased flag sets the filter to mip; extensions are
-/// skipped with a warning. Versions 1 and 2 are untested on a real file; 3 and 4 are tested on bytes
-/// that Niantic's own library wrote.
+/// Reads Niantic's SPZ, versions 1 to 3 (one gzip stream) and 4 (one zstd stream for each field).
+/// Positions have 24 bits (float16 in version 1), log-scales 8 bits in steps of 1/16, quaternions 3 x 8
+/// bits (from version 3 on 3 x 10), and colours, opacities and SH bands 8 bits. The fourth SH band is
+/// left out, with a warning. The antialiased flag sets the filter to mip. Extensions are skipped with a
+/// warning. Versions 3 and 4 are tested on bytes that Niantic's own library wrote; versions 1 and 2 are
+/// untested on a real file.
 ///
-/// Memory is bounded by 100 times the file's size and the cloud that comes out of it. Errors:
-/// file_not_found; invalid_file (a stream that is damaged or holds another size, a header that is none,
-/// fewer bytes than the count needs, more Gaussians than so few bytes are believed to hold); unsupported
-/// (other versions); out_of_memory. Never throws.
+/// Memory is at most 100 times the file's size plus the resulting cloud. Never throws. Errors:
+/// file_not_found; invalid_file (a stream that is damaged or has another size, a bad header, fewer bytes
+/// than the count needs, more Gaussians than the number of bytes makes plausible); unsupported (other
+/// versions); out_of_memory.
 Result<LoadedCloud> load_spz(const std::filesystem::path& path, const LoadSpzOptions& options = {});
 
-/// The same for a file's bytes; `source` names them in messages and in the report.
+/// Reads the bytes of a file. `source` names them in messages and in the report.
 Result<LoadedCloud> parse_spz(std::span<const std::byte> bytes, std::string source,
                               const LoadSpzOptions& options = {});
 
-/// How save_spz writes.
+/// Options of save_spz.
 struct SaveSpzOptions {
-  /// Keep the cloud's axes. Without it they are taken for those of a PLY and turned to SPZ's own.
+  /// Keep the cloud's axes. Otherwise they are taken for those of a PLY and turned to the axes of SPZ.
   bool keep_axes = false;
-  /// Positions are in steps of 2^-fractional_bits metres, 0 to 23; fewer bits are used where the
-  /// farthest mean would not fit into 24 bits (at 12 bits: beyond 2047.9 m).
+  /// Positions are stored in steps of 2^-fractional_bits metres, 0 to 23. Fewer bits are used if the
+  /// farthest mean does not fit into 24 bits (at 12 bits: beyond 2047.9 m).
   int fractional_bits = 12;
-  /// Bits kept of the SH bands of degree 1 and of higher ones, 1 to 8. Fewer make smaller files;
+  /// Bits kept of SH bands of degree 1 and of higher ones, 1 to 8. Fewer bits make smaller files;
   /// Niantic's own writer keeps 5 and 4.
   int sh1_bits = 8, sh_rest_bits = 8;
 };
 
-/// Writes a cloud as SPZ version 4, rows in the order in which they were read; the mip filter becomes
-/// the antialiased flag. Read back, a mean is within half of its step, a log-scale within 1/32 (where it
-/// is in [-10, 5.9]), an opacity within 1/510, a degree-0 SH coefficient within 1/76 (where it is
-/// within 3.3 of zero), another one within 2^-bits (where its magnitude is at most 1 - 2^(1 - bits)),
-/// the quaternion's smaller components within 0.0007. What lies outside of these ranges becomes their
-/// nearer end. Errors: file_not_found (the parent folder is missing), write_failed;
-/// invalid_argument (arrays of different lengths, options out of range, a mean beyond 8388 km);
-/// out_of_memory. Never throws.
+/// Writes a cloud as SPZ version 4, rows in the order in which they were read. The mip filter becomes
+/// the antialiased flag. Values outside of the format's ranges are clamped. Errors on reading back:
+///
+/// - mean: half of a step.
+/// - log-scale in [-10, 5.9]: 1/32.
+/// - opacity: 1/510.
+/// - SH coefficient of degree 0, in [-3.3, 3.3]: 1/76.
+/// - other SH coefficients of magnitude up to 1 - 2^(1 - bits): 2^-bits.
+/// - the three smaller components of a quaternion: 0.0007.
+///
+/// Errors: file_not_found (the parent folder is missing); write_failed; invalid_argument (arrays of
+/// different lengths, options out of range, a mean beyond 8388 km); out_of_memory. Never throws.
 Status save_spz(const std::filesystem::path& path, const GaussianCloud& cloud,
                 const SaveSpzOptions& options = {});
 

@@ -11,35 +11,35 @@
 
 namespace gsnav::io {
 
-/// Writes visible sets of a cloud (build_visible_sets), with the hash of the cloud but for its colours
-/// and a checksum. Errors: those of writing a file. Never throws.
+/// Writes the visible sets of a cloud (build_visible_sets), with a checksum and a hash of the cloud
+/// without its colours. Errors: those of writing a file. Never throws.
 Status save_visible_sets(const std::filesystem::path& path, const VisibleSets& sets,
                          const GaussianCloud& cloud);
 
-/// Reads what save_visible_sets wrote for `cloud`. Errors: file_not_found; invalid_argument (of another
-/// cloud, or by another version); invalid_file (not such a file, truncated, too long, a checksum or a
-/// value that cannot be; names it). Allocates no more than the file's size. Never throws.
+/// Reads what save_visible_sets wrote for `cloud`. Allocates no more than the file's size. Never throws.
+/// Errors: file_not_found; invalid_argument (of another cloud or another version); invalid_file (not
+/// such a file, truncated, too long, wrong checksum, or a value out of range).
 Result<VisibleSets> load_visible_sets(const std::filesystem::path& path, const GaussianCloud& cloud);
 
-/// Where the visible sets of a scene lie: beside the asset, under a name with the hash of all that they
-/// are made of. `spec` as of load_scene (of tiles, the first one's place).
+/// Path of the cached visible sets of a scene: next to the asset, under a name with a hash of everything
+/// that determines them. `spec` is that of load_scene; for several tiles the path is that of the first.
 std::filesystem::path visible_sets_path(const std::string& spec, const GaussianCloud& cloud,
                                         std::span<const Vec3d> viewpoints,
                                         const VisibleSettings& settings = {},
                                         const Similarity& world_from_asset = {});
 
-/// Visible sets, and what there is to say of where they came from.
+/// Visible sets, and how cached_visible_sets got them.
 struct CachedVisibleSets {
   VisibleSets sets;
-  bool built = false;  ///< now; else read
+  bool built = false;  ///< Whether they were built now, rather than read.
   std::string
-      warning;  ///< why a file that is there was not taken, or why none could be written; or empty
+      warning;  ///< Why an existing file was not used, or why the sets could not be written; or empty.
 };
 
-/// The visible sets of a scene: read where visible_sets_path() has them, else built by `build`, which
-/// returns a Result<VisibleSets>, and written there; those of an earlier content of the scene's file,
-/// older than it, are then removed. A file that cannot be taken, and a folder that cannot be written,
-/// are warnings. Errors: those of `build`.
+/// The visible sets of a scene. They are read from visible_sets_path(), or else built by `build`, which
+/// returns a Result<VisibleSets>, and written there. Writing removes those of an earlier content of the
+/// scene's file, if they are older than it. A file that cannot be used and a folder that cannot be
+/// written only give a warning. Errors: those of `build`.
 template <class Build>
 Result<CachedVisibleSets> cached_visible_sets(const std::string& spec, const GaussianCloud& cloud,
                                               std::span<const Vec3d> viewpoints,

@@ -19,7 +19,7 @@ namespace gsnav {
 
 namespace detail {
 
-/// Finds the triangle nearest to a point among those of the vertices near it.
+/// Finds the triangle nearest to a point, among the triangles at the vertices near it.
 class NearestTriangle {
  public:
   explicit NearestTriangle(const SkinnedMesh& mesh);
@@ -41,24 +41,24 @@ class NearestTriangle {
 }  // namespace detail
 
 struct CloudBindingOptions {
-  Similarity mesh_from_cloud{};  ///< takes the cloud's frame to the mesh's: HumanGaussian's are scaled
-                                 ///< and shifted
-  double furthest = 0.05;        ///< metres; Gaussians further from the surface are left out
+  Similarity mesh_from_cloud{};  ///< Transform from the frame of the cloud to that of the mesh.
+                                 ///< HumanGaussian's clouds are scaled and shifted.
+  double furthest = 0.05;        ///< Metres. Gaussians further from the surface are left out.
   WeightOptions weights;
 };
 
 struct BoundCloud {
   AvatarAsset asset;
-  std::size_t left_out = 0;  ///< Gaussians further from the surface than allowed
-  double furthest = 0.0;     ///< metres, of those kept
+  std::size_t left_out = 0;  ///< Gaussians further from the surface than allowed.
+  double furthest = 0.0;     ///< Greatest distance from the surface of those kept, metres.
   WeightReport weights;
 };
 
-/// An avatar from Gaussians that were made around a body without weights (HumanGaussian's PLY, a scan):
-/// each takes those of the nearest point of the rigged surface, which stands in the pose the Gaussians
-/// are in. SH above degree 0 is kept only where the frames are not turned against each other. Errors:
-/// what the mesh reports; invalid_argument (the options; nothing is near the surface); unsupported (SH
-/// of a higher degree in a turned frame; a body further than 32 m from its root).
+/// Makes an avatar from Gaussians without weights, such as HumanGaussian's PLY or a scan of a person.
+/// Each Gaussian takes the weights of the nearest point of the rigged surface, whose pose must be that
+/// of the Gaussians. SH above degree 0 is kept only if `mesh_from_cloud` does not rotate. Errors: those
+/// of the mesh; invalid_argument (an option out of range; no Gaussian near the surface); unsupported (SH
+/// of a higher degree with a rotation; a body that reaches further than 32 m from its root).
 Result<BoundCloud> bind_cloud(const GaussianCloud& cloud, const SkinnedMesh& mesh,
                               const CloudBindingOptions& options = {});
 

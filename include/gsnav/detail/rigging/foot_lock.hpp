@@ -9,34 +9,36 @@
 
 namespace gsnav {
 
-/// The joints of a leg above a foot: thigh and shin each turn as a whole, whatever joints a rig cuts
-/// them into.
+/// The joints of a leg above a foot. Thigh and shin each rotate as a whole, even where a rig splits them
+/// into several joints.
 struct Leg {
   std::size_t hip = 0, knee = 0, ankle = 0;
   std::vector<std::size_t> thigh, shin,
-      foot;  ///< joints that move with each, hip, knee and ankle included
+      foot;  ///< Joints that move with each part, hip, knee and ankle included.
 };
 
 struct FootLockOptions {
-  double clearance = 0.02;  ///< metres: as for FootSlideMeter
-  double shortest = 0.08;   ///< seconds a foot is down at least, and up at least in between
-  double furthest =
-      0.10;  ///< metres: no foot is moved further; what it would slide beyond that it slides
+  double clearance = 0.02;  ///< Metres, as for FootSlideMeter.
+  double shortest = 0.08;   ///< Least duration of a contact, and of the time between two contacts,
+                            ///< seconds.
+  double furthest = 0.10;   ///< Greatest correction of a foot, metres. Sliding beyond it remains.
 };
 
 struct FootLockReport {
-  double moved = 0.0;         ///< metres: greatest way that a foot was moved
-  double out_of_reach = 0.0;  ///< metres: greatest way that a leg was too short for
+  double moved = 0.0;         ///< Greatest distance that a foot was moved, metres.
+  double out_of_reach = 0.0;  ///< Greatest distance by which a leg was too short, metres.
 };
 
-/// The legs of feet in their order. Errors: invalid_argument (other than two feet, a leg without a
-/// knee).
+/// Finds the legs that belong to the feet, in their order. Errors: invalid_argument (not two feet, or a
+/// leg without a knee).
 Result<std::vector<Leg>> find_legs(const Skeleton& skeleton, const std::vector<Foot>& feet);
 
-/// Holds the feet of a recorded walk where they come down, by inverse kinematics of two bones: of a foot
-/// that is down (FootSlideMeter's rule) the point that slides least is held, heel, ball or toes in turn;
-/// between two steps the foot gets from the one correction to the other. `frames`: joints in the world,
-/// [T][J]; `bodies`: where the walker is on the floor, [T]. Errors: invalid_argument (sizes, find_legs).
+/// Keeps the feet of a recorded walk in place while they are down, by inverse kinematics of two bones.
+/// While a foot is down (by the rule of FootSlideMeter), its point that slides least is held: heel, ball
+/// and toes in turn. Between two contacts the correction changes smoothly from one to the next. Errors:
+/// invalid_argument (sizes; those of find_legs).
+/// @param bodies [T] position of the walker on the floor.
+/// @param frames [T][J] joints in the world, corrected in place.
 Result<FootLockReport> lock_feet(const Skeleton& skeleton, const std::vector<Foot>& feet,
                                  double frame_rate, const std::vector<Vec3d>& bodies,
                                  std::vector<std::vector<Affine3<double>>>& frames,

@@ -12,20 +12,20 @@
 namespace gsnav {
 
 struct MeshAvatarOptions {
-  std::size_t gaussians = 100000;  ///< about so many, [100, 4000000]
+  std::size_t gaussians = 100000;  ///< Approximate number of Gaussians, in [100, 4000000].
   std::uint64_t seed = 1;
-  double overlap = 0.7;     ///< standard deviation along the surface over the least spacing, > 0
-  double thickness = 0.12;  ///< standard deviation across the surface over the spacing, > 0
-  double opacity = 0.99;    ///< (0, 1)
-  double shade =
-      0.0;  ///< share of the light that surfaces lose which look down in the bind pose, [0, 1]
-  WeightOptions weights{};  ///< its poses should be those of the motions it will make
+  double overlap = 0.7;     ///< Standard deviation along the surface, in units of the least spacing, >
+                            ///< 0.
+  double thickness = 0.12;  ///< Standard deviation across the surface, in units of the spacing, > 0.
+  double opacity = 0.99;    ///< In (0, 1).
+  double shade = 0.0;  ///< Share of light lost by surfaces that look down in the bind pose, in [0, 1].
+  WeightOptions weights{};  ///< Choose its poses from the motions that the avatar will make.
 };
 
 struct MeshAvatar {
   AvatarAsset asset;
-  double area = 0.0;     ///< of the surface in its bind pose, square metres
-  double spacing = 0.0;  ///< metres; no two Gaussians of one side are nearer than this
+  double area = 0.0;     ///< Area of the surface in its bind pose, square metres.
+  double spacing = 0.0;  ///< Least distance between two Gaussians on one side of the surface, metres.
   WeightReport weights;
 };
 
@@ -34,19 +34,18 @@ namespace detail {
 /// A point of a mesh.
 struct MeshSample {
   std::size_t triangle = 0;
-  Vec3d at{}, position{}, normal{};  // barycentric; metres; unit, outwards
+  Vec3d at{}, position{}, normal{};  // barycentric coordinates; metres; unit, outwards
 };
 
 }  // namespace detail
 
-/// An avatar of Gaussians from a rigged surface: points spread evenly over it (dart throwing: none
-/// nearer than `spacing` to another that looks the same way), each a Gaussian flattened along its
-/// triangle, of the surface's colour there (SH degree 0, display-referred) and with the weights of its
-/// triangle's corners. Gaussians lie on the surface where it is flat between vertices, in the bind pose
-/// and, to within the weights kept, in every other: a point's skinned place is not its triangle's, but
-/// what its own blended weights make of it. The same input gives the same Gaussians. Errors: what the
-/// mesh reports; invalid_argument naming the option; unsupported (a body further than 32 m from its
-/// root).
+/// Makes an avatar of Gaussians from a rigged surface. Points are spread evenly over it by dart
+/// throwing: two points that face the same way are at least `spacing` apart. Each becomes a Gaussian
+/// that is flattened along its triangle, with the surface's colour there (SH degree 0, display-referred)
+/// and the weights of the triangle's corners. In the bind pose, Gaussians lie on the triangles. In
+/// another pose each moves by its own blended weights, so that it is near its posed triangle, but not
+/// exactly on it. The same input gives the same Gaussians. Errors: those of the mesh; invalid_argument
+/// naming the option; unsupported (a body that reaches further than 32 m from its root).
 Result<MeshAvatar> make_mesh_avatar(const SkinnedMesh& mesh, const MeshAvatarOptions& options = {});
 
 }  // namespace gsnav

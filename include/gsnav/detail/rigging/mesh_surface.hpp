@@ -8,23 +8,23 @@
 
 namespace gsnav {
 
-/// sRGB's transfer function and its inverse, for one channel in [0, 1].
+/// The sRGB transfer function and its inverse, for one channel in [0, 1].
 double srgb_from_linear(double c) noexcept;
 double linear_from_srgb(double c) noexcept;
 
-/// Colour and opacity of a surface point.
+/// Colour of a point of a surface, and whether it is a hole.
 struct SurfaceColor {
-  Vec3d rgb{1, 1, 1};  ///< linear light
-  bool hole = false;   ///< its texel has less alpha than the material's cut-off
+  Vec3d rgb{1, 1, 1};  ///< Linear light.
+  bool hole = false;   ///< Whether its texel has less alpha than the material's cut-off.
 };
 
-/// Answers what colour a mesh has where. Keeps a reference to the mesh.
+/// Evaluates the colours of a mesh. Keeps a reference to the mesh.
 class MeshColors {
  public:
   explicit MeshColors(const SkinnedMesh& mesh);
 
-  /// At barycentric coordinates `at` of triangle t: texture (bilinear, repeated) times factor times
-  /// vertex colour.
+  /// Colour at the barycentric coordinates `at` of triangle t: texture (bilinear, repeated) times factor
+  /// times vertex colour.
   SurfaceColor color(std::size_t t, const Vec3d& at) const;
 
  private:

@@ -8,7 +8,7 @@
 
 namespace gsnav {
 
-/// Squared distance of p from the segment a b.
+/// Squared distance from p to the segment a b.
 inline double segment_distance2(const Vec3d& a, const Vec3d& b, const Vec3d& p) noexcept {
   const Vec3d ab = b - a;
   const double length2 = dot(ab, ab);
@@ -17,13 +17,13 @@ inline double segment_distance2(const Vec3d& a, const Vec3d& b, const Vec3d& p) 
   return dot(d, d);
 }
 
-/// Canonical Gaussian centres after skinning by joint matrices (double, root frame, metres).
+/// Centres of the canonical Gaussians after skinning by joint matrices (in double, root frame, metres).
 std::vector<Vec3d> skinned_centers(const AvatarAsset& asset, const std::vector<Affine3<double>>& joints);
 
-/// Fits `capsules` of the asset to its Gaussians over poses (joint to root frame each, [J]): every
-/// centre goes to the capsule whose axis is nearest in the bind pose among those of its joints, then
-/// ends are drawn in or out along the axis and the radius is the `percentile` of the distances in all
-/// poses. Capsules that get no Gaussian are dropped.
+/// Fits the asset's `capsules` to its Gaussians over poses ([J] joint to root frame each). Each centre
+/// goes to the capsule of one of its joints whose axis is nearest in the bind pose. The ends then move
+/// along the axis to fit, and the radius becomes the `percentile` of the distances in all poses.
+/// Capsules without Gaussians are dropped.
 void fit_capsules(AvatarAsset& asset, const std::vector<std::vector<Affine3<double>>>& poses,
                   double percentile = 0.99);
 

@@ -14,8 +14,8 @@
 
 namespace gsnav {
 
-/// 128-bit content hash: two chains of SplitMix64's finaliser over 8-byte words. For telling contents
-/// apart, not against forgery.
+/// A 128-bit hash of contents: two chains of SplitMix64's finaliser over 8-byte words. It tells contents
+/// apart; it does not protect against forgery.
 class Hasher {
  public:
   void bytes(const void* data, std::size_t size) noexcept {
@@ -45,7 +45,7 @@ class Hasher {
     value(s.size());
     bytes(s.data(), s.size());
   }
-  /// 32 hexadecimal digits.
+  /// The hash as 32 hexadecimal digits.
   std::string hex() const {
     char out[40];
     std::snprintf(out, sizeof out, "%016llx%016llx", static_cast<unsigned long long>(state_[0]),
@@ -67,7 +67,7 @@ class Hasher {
   std::array<std::uint64_t, 2> state_{0x243f6a8885a308d3ull, 0x13198a2e03707344ull};
 };
 
-/// Adds all that what is seen of a cloud depends on, but for its colours.
+/// Adds everything in a cloud that an image depends on, except its colours.
 inline void hash_shapes(Hasher& h, const GaussianCloud& cloud) {
   for (const auto& v : cloud.means) h.array(v);
   for (const auto& v : cloud.quats) h.array(v);
@@ -83,18 +83,19 @@ inline void hash_shapes(Hasher& h, const GaussianCloud& cloud) {
   h.value(cloud.sort_order);
 }
 
-/// Adds all that an image depends on in a cloud.
+/// Adds everything in a cloud that an image depends on.
 inline void hash_cloud(Hasher& h, const GaussianCloud& cloud) {
   hash_shapes(h, cloud);
   h.array(cloud.sh0);
   h.array(cloud.shN);
   if (!cloud.shN_half.empty()) h.array(cloud.shN_half);
   h.value(cloud.sh_degree);
-  // Only what is not the rule, so that hashes of before stay valid.
+  // Add the colour space only where it is not the default, so that hashes from before it existed stay
+  // valid.
   if (cloud.color_space != ColorSpace::display) h.value(cloud.color_space);
 }
 
-/// All that an image depends on in a cloud: 32 hexadecimal digits.
+/// Hash of everything in a cloud that an image depends on: 32 hexadecimal digits.
 inline std::string content_hash(const GaussianCloud& cloud) {
   Hasher h;
   hash_cloud(h, cloud);

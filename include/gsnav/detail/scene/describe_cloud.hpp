@@ -14,7 +14,7 @@
 
 namespace gsnav {
 
-/// The highest SH band of which any Gaussian has a coefficient that is not zero, 0 to sh_degree.
+/// The highest SH band in which any Gaussian has a non-zero coefficient, 0 to sh_degree.
 inline int sh_degree_in_use(const GaussianCloud& cloud) noexcept {
   const auto highest = [&](const auto& bands) {
     int found = 0;
@@ -25,7 +25,7 @@ inline int sh_degree_in_use(const GaussianCloud& cloud) noexcept {
         const auto first = bands.begin() + static_cast<std::ptrdiff_t>(row);
         const auto band = first + 3 * (sh_coefficient_count(degree - 1) - 1);
         const auto next = first + 3 * (sh_coefficient_count(degree) - 1);
-        // Of binary16, -0 (0x8000) counts as something; the writer of such a file meant no band either.
+        // In binary16, -0 (0x8000) counts as non-zero. That only overestimates the degree.
         if (std::any_of(band, next, [](auto v) { return v != 0; })) found = degree;
       }
     }
@@ -34,30 +34,38 @@ inline int sh_degree_in_use(const GaussianCloud& cloud) noexcept {
   return cloud.shN_half.empty() ? highest(cloud.shN) : highest(cloud.shN_half);
 }
 
-/// Which way is up, and what says so.
+/// A guess of the up axis, and how sure it is.
 struct UpGuess {
-  Vec3d up{};             ///< a unit axis of the asset's frame; zero of an empty cloud
-  bool seen = false;      ///< the cloud's ground says so; false: `usual` is what it is
-  double confidence = 0;  ///< of a seen one, 0 to 1: its lead over the other axes and its opposite
+  Vec3d up{};             ///< A unit axis of the asset's frame; zero for an empty cloud.
+  bool seen = false;      ///< Whether the ground of the cloud decided it. false: `up` is the format's
+                          ///< usual axis.
+  double confidence = 0;  ///< Confidence if `seen`, 0 to 1: how far the axis is ahead of the other axes
+                          ///< and of its opposite.
 };
 
 namespace detail {
 
-/// The ground as seen along one axis: flat Gaussians that face along it, in slabs across it.
+/// The best candidate for the ground across one axis: the slab that is covered most by flat Gaussians
+/// facing along the axis.
 struct GroundSearch {
-  double area = 0;   ///< of the slab that is covered most, square metres
-  double share = 0;  ///< of the box that it covers
-  double side = 0;   ///< from 1, all else lies further along the axis than it, to -1
+  double area = 0;   ///< Covered area of that slab, square metres.
+  double share = 0;  ///< Share of the box's cross section that the slab covers.
+  double side = 0;   ///< From 1, where everything else lies further along the axis than the slab, to -1,
+                     ///< where it lies before it.
 };
 
-/// `points` are the sampled means, `facing` the unit normals of those that are flat (zero of others,
-/// which may face anywhere), `low` and `high` the box that has most of them.
+/// Searches the ground across one axis.
+/// @param points sampled means.
+/// @param facing unit normals of the flat ones; zero for others, which may face anywhere.
+/// @param low,high box that holds most of the points.
 inline GroundSearch search_ground(const std::vector<Vec3d>& points, const std::vector<Vec3d>& facing,
                                   const Vec3d& low, const Vec3d& high, int axis) {
-  constexpr std::size_t kCells = 16;  // of a slab on each side
+  constexpr std::size_t kCells = 16;  // cells of a slab along each side
   constexpr double kAlong = 0.9;      // cosine of 26 degrees
-  constexpr double kBeyond = 0.3;     // of the box's height, on each side: ground may be its outer tenth
-  constexpr double kThick = 0.015;    // of the box's shorter side: ground is neither thin nor level
+  constexpr double kBeyond = 0.3;     // share of the box's height added on each side: ground may lie in
+                                      // the outer tenth
+  constexpr double kThick = 0.015;    // thickness as a share of the box's shorter side: ground is
+                                      // neither thin nor level
   constexpr double kMostSlabs = 512, kLeastSlabs = 8;
   const int b = (axis + 1) % 3, c = (axis + 2) % 3;
   const double height = (1 + 2 * kBeyond) * (high[axis] - low[axis]),
@@ -73,7 +81,7 @@ inline GroundSearch search_ground(const std::vector<Vec3d>& points, const std::v
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Vec3d& p = points[i];
     const auto cell = [&](int k) {
-      // In a box of 1e20 m, p just below `high` is rounded to it.
+      // In a box of 1e20 m, a p just below `high` rounds to it.
       const double at_cell = kCells * (p[k] - low[k]) / (high[k] - low[k]);
       return std::min(static_cast<std::size_t>(at_cell), kCells - 1);
     };
@@ -88,7 +96,7 @@ inline GroundSearch search_ground(const std::vector<Vec3d>& points, const std::v
     if (!flat || along) covered[(s * kCells + cell(b)) * kCells + cell(c)] = 1;
     if (!flat || !along) upright[s] += 1;
   }
-  // Two neighbouring slabs at a time, so that none is cut in two.
+  // Merge neighbouring slabs in pairs, so that a floor on a border is not cut in two.
   std::vector<double> share(slabs);
   for (std::size_t s = 0; s + 1 < slabs; ++s) {
     std::size_t cells = 0;
@@ -109,11 +117,11 @@ inline GroundSearch search_ground(const std::vector<Vec3d>& points, const std::v
     last = std::max(last, s);
   }
   double above = 0, below = 0;
-  if (last > first + 5) {  // a floor and a ceiling: more stands than hangs
+  if (last > first + 5) {  // floor and ceiling: more things stand than hang
     const std::size_t third = (last - first) / 3;
     for (std::size_t s = first + 2; s <= first + third; ++s) above += upright[s];
     for (std::size_t s = last - third; s + 2 <= last; ++s) below += upright[s + 1];
-  } else {  // ground alone: all else is above it
+  } else {  // ground alone: everything else is above it
     for (std::size_t s = 0; s < slabs; ++s) {
       if (s > last + 1) above += mass[s];
       if (s < first) below += mass[s];
@@ -125,17 +133,18 @@ inline GroundSearch search_ground(const std::vector<Vec3d>& points, const std::v
 
 }  // namespace detail
 
-/// Guesses which way is up from the ground: the largest surface that lies across an axis, of Gaussians
-/// that face along it. Up is the side on which more lies; between a floor and a ceiling, from which more
-/// stands than hangs; where that is undecided, +z or the sign of `usual`. Where there is no such surface
-/// (an object) `usual` is returned. A guess for people to check and for default cameras, one of +y, -y
-/// and +z, which are all that tools make. It depends on the Gaussians alone, not on the order of their
-/// rows.
+/// Guesses the up axis from the ground: the largest surface across an axis, of Gaussians that face along
+/// the axis. Up is the side on which more lies. If there are a floor and a ceiling, the floor is the one
+/// with more things near it. Where that is undecided, up is +z or has the sign of `usual`. Where there
+/// is no ground (an object), the result is `usual`.
+///
+/// The guess is one of +y, -y and +z, which are all that tools produce. It is for people to check and
+/// for default cameras. It depends on the Gaussians only, not on the order of their rows.
 inline UpGuess guess_up(const GaussianCloud& cloud, const Vec3d& usual = {0, -1, 0}) {
   constexpr std::size_t kSample = 1 << 14;
   constexpr double kOutliers = 0.1, kFlat = 0.5, kLeastAhead = 0.4, kLeastShare = 0.55, kDecided = 0.1;
   if (cloud.size() == 0) return {};
-  // By their own bits, so that any order of the rows gives the same ones.
+  // Sample by a hash of the position, so that any order of the rows gives the same sample.
   const std::size_t every = (cloud.size() + kSample - 1) / kSample;
   std::vector<Vec3d> points, facing;
   points.reserve(kSample + kSample / 8);
@@ -184,12 +193,13 @@ inline UpGuess guess_up(const GaussianCloud& cloud, const Vec3d& usual = {0, -1,
   const double before = usual[static_cast<int>(axis)];
   Vec3d up{};
   up[static_cast<int>(axis)] = decided ? std::copysign(1.0, ground.side) : before < 0 ? -1 : 1;
-  if (up.z < 0) return {usual, false, 0};  // no tool's
+  if (up.z < 0) return {usual, false, 0};  // No tool writes scenes with -z up.
   const double confidence = std::min(ahead, decided ? std::fabs(ground.side) : kDecided);
   return {up, true, confidence};
 }
 
-/// Fills in what a report says of the cloud as a whole: SH bands in use, filter, order, memory, up.
+/// Fills in the fields of a report that describe the cloud as a whole: SH bands in use, filter, order,
+/// memory, up axis.
 inline void describe(const GaussianCloud& cloud, LoadReport& report,
                      const Vec3d& usual_up = {0, -1, 0}) {
   report.sh_degree_used = sh_degree_in_use(cloud);

@@ -14,7 +14,7 @@ namespace gsnav {
 
 namespace detail {
 
-/// Cuts n rows of bands up to degree `from` to degree `to`, and gives their memory back.
+/// Cuts n rows of SH bands from degree `from` to degree `to` and frees the memory.
 template <class T>
 void cut_bands(std::vector<T>& bands, std::size_t n, int from, int to) {
   if (bands.empty()) return;
@@ -26,8 +26,8 @@ void cut_bands(std::vector<T>& bands, std::size_t n, int from, int to) {
 
 }  // namespace detail
 
-/// Drops the SH bands above `degree`, in [0, 3]: rows become shorter, and their memory is given back. A
-/// cloud that has fewer stays as it is. Returns how many bytes less it takes.
+/// Drops the SH bands above `degree`, in [0, 3], and frees their memory. A cloud of a lower degree is
+/// unchanged. Returns the bytes saved.
 inline std::size_t limit_sh_degree(GaussianCloud& cloud, int degree) {
   if (degree >= cloud.sh_degree) return 0;
   const std::size_t before = cloud.bytes();
@@ -36,6 +36,7 @@ inline std::size_t limit_sh_degree(GaussianCloud& cloud, int degree) {
   cloud.sh_degree = degree;
   return before - cloud.bytes();
 }
+/// The same for a packed cloud.
 inline std::size_t limit_sh_degree(PackedCloud& cloud, int degree) {
   GaussianCloud& rest = cloud.rest;
   if (degree >= rest.sh_degree) return 0;
@@ -47,9 +48,9 @@ inline std::size_t limit_sh_degree(PackedCloud& cloud, int degree) {
   return before - cloud.bytes();
 }
 
-/// Lets go of the bands of a cloud (GaussianCloud or PackedCloud) that no chunk needs (scene_bands).
-/// `needed` fits the cloud as before, and says how many bytes that were. Bands that some chunks need are
-/// held for all: docs/lod.md has what storage by chunk would save.
+/// Drops the bands of a cloud (GaussianCloud or PackedCloud) that no chunk needs. `needed` is the result
+/// of scene_bands for this cloud; it still fits afterwards, and gets the number of bytes dropped. Bands
+/// that only some chunks need are kept for all (docs/lod.md has what storage by chunk would save).
 template <class Cloud>
 void drop_bands(Cloud& cloud, SceneBands& needed) {
   needed.bytes_let_go +=

@@ -19,9 +19,9 @@
 
 namespace gsnav {
 
-/// Moves, turns and scales a cloud as a solid body, SH bands included. Chunk bounds are dropped: sort
-/// again. `by.rotation` must be a unit quaternion and `by.scale` positive. A compact cloud's bands are
-/// rounded again.
+/// Moves, rotates and scales a cloud as a rigid body, with its SH bands. Chunk bounds are dropped, so
+/// sort again. `by.rotation` must be a unit quaternion and `by.scale` positive. The bands of a compact
+/// cloud are rounded once more.
 inline void transform(GaussianCloud& cloud, const Similarity& by) {
   const bool compact = !cloud.shN_half.empty();
   expand_sh(cloud);
@@ -51,8 +51,9 @@ inline void transform(GaussianCloud& cloud, const Similarity& by) {
 
 namespace detail {
 
-/// Turns the columns of `a` until they are orthogonal (one-sided Jacobi): a = rotation * diag(lengths) *
-/// v for some rotation v. Flat and line-like ones keep their small lengths, which squares would lose.
+/// Rotates the columns of `a` until they are orthogonal (one-sided Jacobi): a = rotation * diag(lengths)
+/// * v for some rotation v. Flat and needle-like shapes keep their small lengths, which a decomposition
+/// of squares would lose.
 inline void orthogonal_columns(Mat3d& a, Mat3d& rotation, Vec3d& lengths) {
   const auto column = [&a](int k) { return Vec3d{a(0, k), a(1, k), a(2, k)}; };
   for (int sweep = 0; sweep < 16; ++sweep) {
@@ -81,14 +82,14 @@ inline void orthogonal_columns(Mat3d& a, Mat3d& rotation, Vec3d& lengths) {
     if (lengths[k] <= lengths[shortest]) shortest = k;
   }
   if (!(lengths[longest] > 0) || longest == shortest) {
-    rotation =
-        Mat3d::identity();  // a point: no axes; of three equal lengths above 0 the last is the shortest
+    rotation = Mat3d::identity();  // A point has no axes. (Three equal lengths above 0 do not come here:
+                                   // the last counts as shortest.)
     return;
   }
   const int middle = 3 - longest - shortest;
   Vec3d axes[3];
   axes[longest] = column(longest) * (1 / lengths[longest]);
-  // A length of 0 has no direction of its own: any that is orthogonal.
+  // A length of 0 has no direction of its own: take any orthogonal one.
   Vec3d second = column(middle);
   if (!(lengths[middle] > 1e-12 * lengths[longest])) {
     int least = 0;
@@ -101,7 +102,8 @@ inline void orthogonal_columns(Mat3d& a, Mat3d& rotation, Vec3d& lengths) {
   second = second - axes[longest] * dot(second, axes[longest]);
   axes[middle] = second * (1 / norm(second));
   const Vec3d third = cross(axes[longest], axes[middle]);
-  const bool even = (middle - longest + 3) % 3 == 1;  // of the columns' order: determinant 1
+  // whether the columns' order is even, so that the determinant is 1
+  const bool even = (middle - longest + 3) % 3 == 1;
   axes[shortest] = even ? third : -third;
   for (int i = 0; i < 3; ++i) {
     for (int k = 0; k < 3; ++k) rotation(i, k) = axes[k][i];
@@ -110,13 +112,14 @@ inline void orthogonal_columns(Mat3d& a, Mat3d& rotation, Vec3d& lengths) {
 
 }  // namespace detail
 
-/// Moves a cloud by any map that can be undone, M and a translation: uneven scales, shears, mirrors. A
-/// covariance C becomes M C M^T, taken apart into a rotation and scales again. Colours turn with the
-/// orthogonal factor Q of M = Q P (P symmetric and positive): what was seen from direction d is seen
-/// from Q d. Where M mirrors, Q does: the bands of odd degree change their sign, then turn by the
-/// rotation -Q. A direction that is only stretched keeps its colours. Chunk bounds are dropped: sort
-/// again. Errors: invalid_argument (M is flat, its smallest stretch below 1e-6 of its largest, or not
-/// finite); the cloud is then as it was.
+/// Moves a cloud by an invertible affine map, M and a translation: uneven scales, shears and mirrors. A
+/// covariance C becomes M C M^T, which is split into a rotation and scales again. Colours turn with the
+/// orthogonal factor Q of M = Q P (P symmetric and positive definite): the colour seen from direction d
+/// is then seen from Q d. A direction that is only stretched keeps its colours. Where M mirrors, so does
+/// Q: SH bands of odd degree change sign and then turn by the rotation -Q.
+///
+/// Chunk bounds are dropped, so sort again. Error: invalid_argument where M is not finite or too flat
+/// (smallest stretch at most 1e-6 of the largest); the cloud is then unchanged.
 inline Status transform(GaussianCloud& cloud, const Affine3<double>& by) {
   const Mat3d& m = by.linear;
   Mat3d columns = m, axes;
@@ -155,7 +158,7 @@ inline Status transform(GaussianCloud& cloud, const Affine3<double>& by) {
     for (std::size_t k = 0; k < 4; ++k) cloud.quats[k][i] = static_cast<float>(parts[k]);
     for (int k = 0; k < 3; ++k)
       cloud.scales[static_cast<std::size_t>(k)][i] = static_cast<float>(scales[k]);
-    // Degree 1 has coefficients 0 to 2 of those behind degree 0, degree 3 has 8 to 14.
+    // In shN, coefficients 0 to 2 are degree 1 and 8 to 14 degree 3.
     for (std::size_t k = 0; sign < 0 && k < rest / 3; ++k) {
       if (k >= 3 && k < 8) continue;
       for (std::size_t c = 0; c < 3; ++c) cloud.shN[i * rest + 3 * k + c] *= -1.0f;
@@ -171,8 +174,8 @@ inline Status transform(GaussianCloud& cloud, const Affine3<double>& by) {
   return {};
 }
 
-/// Keeps the rows for which `keep(i)` holds, in their order and with the order in which they were read.
-/// Chunk bounds are dropped: sort again.
+/// Keeps the rows for which `keep(i)` is true, in their order. `row_ids` still has the order in which
+/// they were read. Chunk bounds are dropped, so sort again.
 template <class Keep>
 void filter_rows(GaussianCloud& cloud, const Keep& keep) {
   std::vector<std::uint32_t> rows;
@@ -181,7 +184,8 @@ void filter_rows(GaussianCloud& cloud, const Keep& keep) {
   }
   const auto pick = [&rows](auto& plane, std::size_t stride) {
     if (plane.empty()) return;
-    for (std::size_t to = 0; to < rows.size(); ++to) {  // rows[to] >= to: nothing is overwritten early
+    // rows[to] >= to, so no row is overwritten before it is read
+    for (std::size_t to = 0; to < rows.size(); ++to) {
       for (std::size_t k = 0; k < stride; ++k) plane[to * stride + k] = plane[rows[to] * stride + k];
     }
     plane.resize(rows.size() * stride);
@@ -196,7 +200,7 @@ void filter_rows(GaussianCloud& cloud, const Keep& keep) {
   pick(cloud.shN_half, rest);
   pick(cloud.origin_ids, 1);
   pick(cloud.row_ids, 1);
-  if (!cloud.row_ids.empty()) {  // places among those that are left
+  if (!cloud.row_ids.empty()) {  // renumber to places among the rows that are left
     const std::vector<std::uint32_t> order = rows_as_read(cloud);
     for (std::size_t i = 0; i < order.size(); ++i)
       cloud.row_ids[order[i]] = static_cast<std::uint32_t>(i);
@@ -205,7 +209,7 @@ void filter_rows(GaussianCloud& cloud, const Keep& keep) {
   cloud.part_bounds.clear();
 }
 
-/// Keeps the Gaussians whose means lie in the box, bounds included.
+/// Keeps the Gaussians whose means lie in the box, borders included.
 inline void crop(GaussianCloud& cloud, const Aabb<double>& box) {
   filter_rows(cloud, [&](std::size_t i) {
     const Vec3d m = cloud.mean(i);

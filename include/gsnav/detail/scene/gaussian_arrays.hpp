@@ -15,19 +15,19 @@
 
 namespace gsnav {
 
-/// A cloud's arrays in a backend's own memory. On host backends nothing is copied: the cloud, and the
-/// bands where they are given, must outlive it. Other backends get a copy, and packed clouds become
-/// floats there. The same code is right on each: a cloud or bands that are temporaries do not compile on
-/// any (docs/ownership.md). The backend must outlive it.
+/// The arrays of a cloud in a backend's memory. On host backends nothing is copied, and the cloud (and
+/// `bands`, if given) must outlive this object. Other backends get a copy, in which a packed cloud
+/// becomes floats. Temporaries do not compile on any backend, so that code which is right on one is
+/// right on all (docs/ownership.md). The backend must outlive this object.
 template <Backend B>
 class GaussianArrays {
  public:
   GaussianArrays(B& backend, const GaussianCloud& cloud) : set_(cloud.set()) {
     if constexpr (!is_host_backend<B>) upload(backend, cloud);
   }
-  /// Without the SH bands that no chunk needs (detail/scene/scene_bands.hpp):
-  /// elsewhere than on host backends those that none does take no memory, those that a chunk does not
-  /// are not read.
+  /// Leaves out the SH bands that no chunk needs (detail/scene/scene_bands.hpp). On other backends than
+  /// host backends, bands that no chunk needs take no memory; bands that one chunk does not need are not
+  /// read for it.
   GaussianArrays(B& backend, const GaussianCloud& cloud, const SceneBands& bands)
       : set_(bands.applied_to(cloud.set())) {
     if constexpr (!is_host_backend<B>) {
@@ -58,7 +58,7 @@ class GaussianArrays {
   GaussianArrays(B& backend, const PackedCloud&& cloud, const SceneBands& bands) = delete;
   GaussianArrays(B& backend, const PackedCloud& cloud, const SceneBands&& bands) = delete;
 
-  /// The arrays placed in the world; valid while this lives.
+  /// The arrays placed in the world. Valid while this object lives.
   GaussianSet set(const Similarity& world_from_asset = {}) const& noexcept {
     GaussianSet s = set_;
     s.world_from_asset = world_from_asset;
@@ -83,10 +83,10 @@ class GaussianArrays {
     detail::move_to(backend, v.row_ids, ids_);
     detail::move_to(backend, v.chunk_bounds, bounds_);
     detail::move_to(backend, v.part_bounds, bounds_);
-    origins_ = cloud.origins;  // read by the host
+    origins_ = cloud.origins;  // origins stay on the host, which reads them
     v.origins = view_of(std::as_const(origins_));
   }
-  /// Leaves out the bands that no chunk has: rows become shorter.
+  /// Shortens the rows by the bands that no chunk needs.
   static void drop_bands(ColorRows& v, std::size_t size, std::vector<float>& floats,
                          std::vector<std::uint16_t>& halves) {
     const int most = needed_sh_degree(v);

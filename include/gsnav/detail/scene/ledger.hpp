@@ -17,36 +17,38 @@
 
 namespace gsnav {
 
-/// What a frame left out, put together, limited or rounded, how many, and the bound of each; made when
-/// asked for.
+/// Counts and error bounds of everything that a frame skipped, merged or rounded. It is computed on
+/// request.
 struct FrameLedger {
-  // Skipped without any change of the image.
-  CullCounts culled;              ///< by chunks out of view or not in the cut
-  std::uint64_t visible = 0;      ///< RenderStats::visible; 0 where the device does not count
-  std::uint64_t transparent = 0;  ///< left out when the scene was read: below 1/255 everywhere
+  // Skipped without changing the image.
+  CullCounts culled;              ///< Gaussians of chunks out of view or not in the cut.
+  std::uint64_t visible = 0;      ///< RenderStats::visible; 0 where the device does not count.
+  std::uint64_t transparent = 0;  ///< Left out by the reader: opacity below 1/255, so never drawn.
   // Changed.
   std::uint64_t converted =
-      0;  ///< Gaussians of sets whose colours are of another space than the frame blends in
-  bool other_order = false;  ///< blended in another order than the scene's file asks for
-  std::uint64_t unseen = 0;  ///< Gaussians left out by a visible set (VisibleSets)
-  double unseen_weight =
-      0;         ///< of which no viewpoint saw more than this part of a pixel: sampled, no bound
-  LodStats lod;  ///< zeros where no level of detail was asked for
-  std::uint64_t sh_skipped = 0;      ///< SH coefficients in bands that are not read, held or not
-  double sh_error = 0;               ///< that changes no colour by more
-  std::uint64_t sh_bytes = 0;        ///< what bands that are not held would take
-  std::uint64_t clamped = 0;         ///< Gaussians whose log-scale the reader limited to [-20, 20]
-  double sh_storage_error = 0;       ///< largest change of a coefficient by compact storage
-  double alpha_min = 0;              ///< alphas below are not blended
-  double transmittance_min = 0;      ///< light that still comes through where a pixel ends
-  double alpha_error = 0;            ///< relative, of the exponential
-  int max_sh_degree = kMaxShDegree;  ///< SH bands above it were left out, whatever a set has
-  int key_bits = 32;                 ///< of the sort key that were compared
-  bool other_rules = false;          ///< response or compat is not the contract's: without a bound
+      0;  ///< Gaussians of sets whose colours are in another space than the frame's blend_space.
+  bool other_order = false;  ///< Whether the frame blends in another order than the scene's file asks
+                             ///< for.
+  std::uint64_t unseen = 0;  ///< Gaussians left out by a visible set (VisibleSets).
+  double unseen_weight = 0;  ///< Largest share of a pixel that any viewpoint saw of an unseen Gaussian.
+                             ///< It is sampled, not a bound.
+  LodStats lod;              ///< Counts of the cut. Zeros without level of detail.
+  std::uint64_t sh_skipped = 0;      ///< SH coefficients in bands that are not read, in memory or not.
+  double sh_error = 0;               ///< Largest change of a colour by the skipped bands.
+  std::uint64_t sh_bytes = 0;        ///< Bytes that the dropped bands would take.
+  std::uint64_t clamped = 0;         ///< Gaussians whose log-scale the reader limited to [-20, 20].
+  double sh_storage_error = 0;       ///< Largest change of an SH coefficient by compact storage.
+  double alpha_min = 0;              ///< Alphas below this are not blended.
+  double transmittance_min = 0;      ///< Largest share of light lost behind a closed pixel.
+  double alpha_error = 0;            ///< Relative error of the exponential.
+  int max_sh_degree = kMaxShDegree;  ///< Highest SH degree evaluated; bands above it were left out.
+  int key_bits = 32;                 ///< Bits of the sort key that were compared.
+  bool other_rules = false;          ///< Whether `response` or `compat` differs from the contract. Such
+                                     ///< an error has no bound here.
 };
 
-/// Fills a ledger for a frame of `sets` from `camera`, whose counts are `stats`.
-/// `report`, `bands`, `lod`: where there are any. Cuts read all bands that are held.
+/// Makes the ledger of a frame of `sets` from `camera`, whose counts are `stats`. `report`, `bands` and
+/// `lod` are optional. With `lod`, all stored bands count as read.
 inline FrameLedger frame_ledger(std::span<const GaussianSet> sets, const Camera& camera,
                                 const RenderConfig& config, const RenderStats& stats,
                                 const LoadReport* report = nullptr, const SceneBands* bands = nullptr,
@@ -63,7 +65,7 @@ inline FrameLedger frame_ledger(std::span<const GaussianSet> sets, const Camera&
   out.visible = stats.visible;
   out.alpha_min = config.quality.alpha_min;
   out.transmittance_min = config.quality.transmittance_min;
-  // What exp2 by a quintic, and by a cubic, is off by (Exponential).
+  // Relative errors of the quintic and of the cubic for exp2 (Exponential).
   out.alpha_error = config.quality.exponential == Exponential::exact ? 4e-7 : 1.0e-4;
   out.max_sh_degree = config.quality.max_sh_degree;
   out.key_bits = config.quality.key_bits;
@@ -83,7 +85,7 @@ inline FrameLedger frame_ledger(std::span<const GaussianSet> sets, const Camera&
   return out;
 }
 
-/// The ledger as text for people, one thing a line, each ended.
+/// The ledger as text: one line for each fact, each ended by a newline.
 inline std::string ledger_text(const FrameLedger& l) {
   std::string out;
   const auto line = [&out](const char* format, auto... values) {

@@ -11,50 +11,57 @@
 
 namespace gsnav {
 
-/// What becomes of a row of a file.
+/// Result of reading a row: kept, or the reason why it was dropped.
 enum class RowFate : std::uint8_t { kept, non_finite, zero_quat, transparent };
 
-/// What packing a cloud changed: the largest difference of any row's.
+/// What packing changed: the largest error of any row.
 struct PackErrors {
-  int mean_bits = 16;          ///< 16, or 32: floats
-  int sh_bits = 8;             ///< 8, 16 or 32
-  double mean = 0;             ///< metres
-  double mean_deviations = 0;  ///< the same in the Gaussian's largest standard deviations
-  double scale = 0;            ///< of a standard deviation, in the Gaussian's largest
-  double rotation = 0;         ///< radians
+  int mean_bits = 16;          ///< Bits of a mean's coordinate: 16, or 32 (float).
+  int sh_bits = 8;             ///< Bits of an SH coefficient: 8, 16 or 32.
+  double mean = 0;             ///< Movement of a mean, metres.
+  double mean_deviations = 0;  ///< Movement of a mean, in its Gaussian's largest standard deviations.
+  double scale = 0;            ///< Change of a standard deviation, relative to the Gaussian's largest.
+  double rotation = 0;         ///< Rotation, radians.
   double opacity = 0;
-  double sh0 = 0;             ///< of a coefficient of degree 0
-  double sh = 0, sh_rms = 0;  ///< of one from band 1 on: largest, root mean square
+  double sh0 = 0;             ///< Change of a coefficient of degree 0.
+  double sh = 0, sh_rms = 0;  ///< Change of a coefficient of bands 1 to 3: largest, and root mean
+                              ///< square.
 };
 
-/// What a loader did to a file: nothing is repaired or dropped without being counted here.
+/// The report of a loader on a file. Every repaired or dropped row is counted here.
 struct LoadReport {
-  std::string source;                     ///< path or description
-  std::uint64_t read = 0;                 ///< rows in the file
-  std::uint64_t kept = 0;                 ///< Gaussians in the cloud
-  std::uint64_t dropped_non_finite = 0;   ///< NaN or infinite position, scale NaN, opacity NaN, SH
-  std::uint64_t dropped_zero_quat = 0;    ///< zero or non-finite quaternion
-  std::uint64_t dropped_transparent = 0;  ///< opacity below 1/255: never drawn (lossless)
-  std::uint64_t clamped_scales = 0;       ///< log-scale outside [-20, 20]
-  int sh_degree = 0;                      ///< of the file; the cloud has room for fewer where:
-  std::uint64_t sh_bytes_let_go =
-      0;                   ///< what bands of zeros alone would take (LoadSceneOptions::keep_zero_bands)
-  int sh_degree_used = 0;  ///< highest band with a coefficient that is not zero
-  Filter filter = Filter::classic;  ///< that the file asks for
-  float eps2d = 0.3f;               ///< its term on the 2D covariance's diagonal, px^2
+  std::string source;                     ///< Path or description.
+  std::uint64_t read = 0;                 ///< Rows in the file.
+  std::uint64_t kept = 0;                 ///< Gaussians in the cloud.
+  std::uint64_t dropped_non_finite = 0;   ///< Rows with a position or SH coefficient that is not finite,
+                                          ///< or a NaN scale or opacity.
+  std::uint64_t dropped_zero_quat = 0;    ///< Rows whose quaternion is zero or not finite.
+  std::uint64_t dropped_transparent = 0;  ///< Rows with opacity below 1/255, which are never drawn.
+                                          ///< Dropping them changes no image.
+  std::uint64_t clamped_scales = 0;       ///< Gaussians with a log-scale outside [-20, 20].
+  int sh_degree = 0;                      ///< SH degree of the file. The cloud has a lower one if
+                                          ///< sh_bytes_let_go is not 0.
+  std::uint64_t sh_bytes_let_go = 0;      ///< Bytes saved by dropping bands that are zero everywhere
+                                          ///< (LoadSceneOptions::keep_zero_bands).
+  int sh_degree_used = 0;                 ///< Highest band with a non-zero coefficient.
+  Filter filter = Filter::classic;        ///< Filter that the file asks for.
+  float eps2d = 0.3f;                     ///< Its term on the diagonal of the 2D covariance, px^2.
   SortOrder sort_order = SortOrder::z_depth;
-  std::uint64_t memory = 0;  ///< bytes of the cloud's arrays
-  Vec3d up{};                ///< guessed, asset frame: one of +-y, +-z; zero of an empty cloud
-  bool up_seen = false;  ///< by the cloud's ground (guess_up); false: only by what its kind of file does
-  double up_confidence = 0;     ///< of a seen one, 0 to 1
-  double sh_storage_error = 0;  ///< largest difference of a coefficient by keeping them as binary16
-  bool compact = false;         ///< SH is kept as binary16
-  bool packed = false;          ///< all is kept in fewer bits (PackedCloud), which changed:
+  std::uint64_t memory = 0;  ///< Bytes of the cloud's arrays.
+  Vec3d up{};                ///< Guessed up axis in the asset's frame, one of +-y and +-z; zero for an
+                             ///< empty cloud.
+  bool up_seen = false;  ///< Whether the cloud's ground decided `up` (guess_up). false: it is the usual
+                         ///< axis of the format.
+  double up_confidence = 0;     ///< Confidence if up_seen, 0 to 1.
+  double sh_storage_error = 0;  ///< Largest change of an SH coefficient by binary16 storage.
+  bool compact = false;         ///< Whether SH is stored as binary16.
+  bool packed = false;          ///< Whether the cloud is packed (PackedCloud); `packing` has the errors.
   PackErrors packing;
-  bool moving = false;  ///< 4D Gaussians; these are the first and the last of their own times, seconds:
+  bool moving = false;  ///< Whether the file has 4D Gaussians. first_time and last_time are then the
+                        ///< least and the greatest of their own times, seconds.
   double first_time = 0, last_time = 0;
-  Aabb<double> bounds{};              ///< of the kept means, asset frame
-  std::vector<std::string> warnings;  ///< everything else a person should know
+  Aabb<double> bounds{};              ///< Box of the kept means, asset frame.
+  std::vector<std::string> warnings;  ///< Everything else that a person should know.
 
   /// Counts a row that was read.
   void count(RowFate fate, bool clamped) noexcept {
@@ -76,7 +83,7 @@ struct LoadReport {
     }
   }
 
-  /// Adds the counts of another part of the same scene, and its bounds.
+  /// Adds the counts and the bounds of another part of the same scene.
   void add_counts(const LoadReport& part) noexcept {
     read += part.read;
     kept += part.kept;

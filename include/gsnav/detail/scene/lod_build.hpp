@@ -22,8 +22,7 @@ namespace gsnav {
 
 namespace detail {
 
-/// Gives a tree the size that it has for a cloud in spatial order: levels, nodes, rows; leaves with
-/// their bounds.
+/// Sizes a tree for a cloud in spatial order: levels, nodes, rows, and the bounds of leaves.
 inline void shape_lod(LodTree& out, const GaussianCloud& source, const LodSettings& settings) {
   if (source.size() == 0) return;
   GaussianCloud& m = out.merged;
@@ -54,7 +53,7 @@ inline void shape_lod(LodTree& out, const GaussianCloud& source, const LodSettin
   for (std::size_t c = 0; c < out.leaves(); ++c) out.nodes[c].reach = source.chunk_bounds[c];
 }
 
-/// Builds the nodes of a tree, one after the other or side by side.
+/// Builds the nodes of a tree. Nodes of one level may be built in parallel.
 class LodBuilder {
  public:
   LodBuilder(const GaussianCloud& source, const LodSettings& settings, LodTree& out)
@@ -66,7 +65,7 @@ class LodBuilder {
     grains_.resize(out.nodes.size());
   }
 
-  /// Fills leaf i but for its bounds.
+  /// Fills leaf i, except its bounds.
   void measure(std::size_t i) {
     LodGrain& sum = grains_[i];
     for (std::size_t row = i * kProjectChunk; row < std::min((i + 1) * kProjectChunk, source_.size());
@@ -75,7 +74,7 @@ class LodBuilder {
     }
     out_.nodes[i].grain = sum.size();
   }
-  /// Fills node i of level l > 0; its children must be there.
+  /// Fills node i of level l > 0 from its children, which must be complete.
   void make(std::size_t l, std::size_t i) {
     const std::uint32_t* const begin = out_.level_begin.data();
     const std::size_t first = begin[l - 1] + 2 * i, end = std::min<std::size_t>(first + 2, begin[l]);
@@ -176,7 +175,7 @@ class LodBuilder {
     }
     const Svd3<double> axes = svd(g.covariance.matrix());
     double opacity = g.mass / std::max(lod_area(g.covariance), 1e-30), grow = 1;
-    if (opacity > 1) {  // no Gaussian takes more than all light: its area has to
+    if (opacity > 1) {  // No Gaussian takes more than all light, so its area grows instead.
       grow = std::sqrt(opacity);
       opacity = 1;
     }
@@ -194,7 +193,7 @@ class LodBuilder {
     m.opacities[row] = static_cast<float>(opacity);
     spreads_[row] = static_cast<float>(g.spread);
   }
-  /// A row that shows nothing, where `like` is.
+  /// Makes a transparent row at the position of row `like`.
   void pad(std::size_t row, std::size_t like) {
     GaussianCloud& m = out_.merged;
     for (auto& p : m.means) p[row] = p[like];
@@ -212,9 +211,10 @@ class LodBuilder {
 
 }  // namespace detail
 
-/// Builds the tree of a cloud in spatial order (sort_spatially). The same bits on any backend in host
-/// memory, for any number of threads. About 15 s a million Gaussians and core. Errors: invalid_argument
-/// (no chunk bounds: the cloud is not sorted; a setting out of range).
+/// Builds the level-of-detail tree of a cloud in spatial order (sort_spatially). Takes about 15 s for
+/// each million Gaussians on one core. The result has the same bits on any host backend and for any
+/// number of threads. Errors: invalid_argument (a cloud without chunk bounds, which is not sorted; a
+/// setting out of range).
 template <Backend B>
 requires is_host_backend<B> Result<LodTree> build_lod(B& backend, const GaussianCloud& cloud,
                                                       const LodSettings& settings = {}) {

@@ -14,7 +14,7 @@
 
 namespace gsnav::detail {
 
-/// Row i of a cloud (float SH) as clusters are made of it; `spread` m^2.
+/// Row i of a cloud with float SH as a LodGaussian. `spread` is in m^2.
 inline LodGaussian lod_gaussian(const GaussianCloud& cloud, std::size_t i, double spread) noexcept {
   LodGaussian g;
   g.mean = cloud.mean(i);
@@ -36,7 +36,7 @@ inline LodGaussian lod_gaussian(const GaussianCloud& cloud, std::size_t i, doubl
   return g;
 }
 
-/// Sum of mass, and of mass times log of area, of Gaussians.
+/// Sums over Gaussians of their mass and of mass times log(area).
 struct LodGrain {
   double mass = 0, log_area = 0;
   void add(const LodGaussian& g) noexcept {
@@ -47,19 +47,19 @@ struct LodGrain {
     mass += o.mass;
     log_area += o.log_area;
   }
-  /// LodNode::grain
+  /// The value of LodNode::grain, metres.
   float size() const noexcept {
     return mass > 0 ? static_cast<float>(std::exp(0.5 * log_area / mass)) : 0.0f;
   }
 };
 
-/// Puts Gaussians together, two at a time, the cheapest pair of neighbours first, until `target` are
-/// left.
+/// Merges Gaussians in pairs, the cheapest pair of neighbours first, until `target` are left.
 class GreedyMerge {
  public:
   explicit GreedyMerge(int neighbours) : k_(static_cast<std::size_t>(neighbours)) {}
 
-  /// [in]: the Gaussians. owner()[i] then says which of left() shows the i-th.
+  /// Merges the Gaussians `in`, which are consumed. Afterwards owner()[i] is the index in left() of the
+  /// one that stands for Gaussian i.
   void run(std::vector<LodGaussian>& in, std::size_t target) {
     items_.swap(in);
     const std::size_t n = items_.size();
@@ -77,7 +77,7 @@ class GreedyMerge {
         join(p.a, p.b);
         --alive;
       }
-      if (alive == before) break;  // nothing has neighbours: one Gaussian
+      if (alive == before) break;  // no pair has neighbours: one Gaussian is left
     }
     left_.clear();
     place_.resize(items_.size());
@@ -97,7 +97,7 @@ class GreedyMerge {
   struct Pair {
     double cost;
     std::uint32_t a, b;                             ///< a < b
-    bool operator<(const Pair& o) const noexcept {  // the queue's top is its greatest
+    bool operator<(const Pair& o) const noexcept {  // the top of the queue is its greatest element
       if (cost != o.cost) return cost > o.cost;
       return a != o.a ? a > o.a : b > o.b;
     }
@@ -140,7 +140,7 @@ class GreedyMerge {
     if (nearest.empty()) return;
     const auto middle = nearest.begin() + static_cast<std::ptrdiff_t>(nearest.size() / 2);
     std::nth_element(nearest.begin(), middle, nearest.end());
-    // A pixel about as wide as neighbours are apart blurs by a third of that.
+    // A pixel about as wide as the distance between neighbours blurs by a third of that distance.
     variance_ = std::max(0.25 * *middle, 1e-12);
     for (const std::uint32_t i : alive) {
       for (const Neighbour& n : near_[i]) {

@@ -21,13 +21,13 @@
 
 namespace gsnav {
 
-/// One level of a set that ships its levels: Gaussians, and the box that each belongs to.
+/// One level of a streamed set: its Gaussians, and the box of each.
 struct LodLevel {
-  GaussianCloud cloud;               ///< rows in the order of the file
-  std::vector<std::uint32_t> boxes;  ///< [N]
+  GaussianCloud cloud;               ///< Rows in the order of the file.
+  std::vector<std::uint32_t> boxes;  ///< [N] index of each row's box.
 };
 
-/// A cloud whose chunks belong to one box each, and its levels of detail. The last chunk of a box is
+/// A cloud in which every chunk belongs to one box, and its levels of detail. The last chunk of a box is
 /// filled up with transparent rows.
 struct LeveledCloud {
   GaussianCloud cloud;
@@ -36,16 +36,17 @@ struct LeveledCloud {
 
 namespace detail {
 
-/// Where a box's rows of one level are.
+/// The rows of one box at one level.
 struct BoxRows {
-  std::uint32_t first = 0, count = 0;  ///< rows of the level, sorted by box but not filled up
+  std::uint32_t first = 0, count = 0;  ///< Rows of the level when sorted by box, before chunks are
+                                       ///< filled up.
   std::uint32_t first_chunk = 0, chunks = 0;
 
-  /// The i-th row in the chunks.
+  /// Index of the box's i-th row in the padded arrays.
   std::size_t row(std::size_t i) const noexcept { return first_chunk * kProjectChunk + i; }
 };
 
-/// Rows of all levels once each box has chunks of its own.
+/// Number of rows of all levels once each box fills whole chunks.
 inline std::size_t filled_rows(const std::vector<LodLevel>& levels, std::size_t boxes) {
   std::size_t chunks = 0;
   std::vector<std::uint32_t> counts;
@@ -57,8 +58,8 @@ inline std::size_t filled_rows(const std::vector<LodLevel>& levels, std::size_t 
   return chunks * kProjectChunk;
 }
 
-/// Sorts the rows of a level by box, within a box along Hilbert's curve with the largest last as in
-/// sort_spatially, and fills up chunks. `row_ids` keeps the rows' places in the file.
+/// Sorts the rows of a level by box, and within a box like sort_spatially: along Hilbert's curve, large
+/// Gaussians last. Fills up chunks. `row_ids` keeps the places of the rows in the file.
 template <Backend B>
 std::vector<BoxRows> sort_boxes(B& backend, LodLevel& level, std::size_t boxes) {
   GaussianCloud& in = level.cloud;
@@ -133,8 +134,8 @@ std::vector<BoxRows> sort_boxes(B& backend, LodLevel& level, std::size_t boxes) 
   return out;
 }
 
-/// Root mean square, by mass, of the distance from each of a box's finest Gaussians to the nearest of a
-/// coarser level.
+/// Distance from the finest Gaussians of a box to the nearest ones of a coarser level: root mean square
+/// by mass, metres.
 inline double distance_to_level(const GaussianCloud& fine, const BoxRows& in_fine,
                                 const GaussianCloud& coarse, const BoxRows& in_coarse) {
   std::vector<Vec3d> points(in_coarse.count);
@@ -179,12 +180,14 @@ struct LevelForest {
   std::vector<LodLevel> levels;
   std::vector<std::vector<BoxRows>> rows;  ///< [level][box]
   LodTree tree;
-  std::vector<std::uint32_t> box_of;  ///< of each node
+  std::vector<std::uint32_t> box_of;  ///< box of each node
 
-  /// Makes a node of each box at each level, from the finest to the coarsest.
+  /// Adds a node for each box at each level, from the finest level to the coarsest.
   void add_nodes() {
-    std::vector<std::uint32_t> node_of(rows[0].size(), LodBox::kNone);  // the coarsest so far, by box
-    std::uint32_t first_chunk = 0;                                      // of the level, in merged
+    // coarsest node so far of each box
+    std::vector<std::uint32_t> node_of(rows[0].size(), LodBox::kNone);
+    // first chunk of the level in `merged`
+    std::uint32_t first_chunk = 0;
     for (std::size_t l = 0; l < levels.size(); ++l) {
       tree.level_begin.push_back(static_cast<std::uint32_t>(tree.nodes.size()));
       for (std::uint32_t b = 0; b < node_of.size(); ++b) {
@@ -204,7 +207,7 @@ struct LevelForest {
     }
   }
 
-  /// A node of level l, whose finer node is known.
+  /// Measures a node of level l. Its finer node must be measured already.
   LodNode measured(std::size_t at, std::size_t l) const {
     const std::uint32_t b = box_of[at];
     const BoxRows& r = rows[l][b];
@@ -254,13 +257,17 @@ struct LevelForest {
 
 }  // namespace detail
 
-/// Makes a cloud with levels of detail from the levels that a set ships, finest first. A box's level k
-/// is the k-th level that has the box. Boxes without rows in the first level are not shown. A node's
-/// error is the root mean square distance, by mass, from the box's finest Gaussians to the nearest of
-/// the node's own, and at least that of the finer node. The same bits for any number of threads. The
-/// levels are consumed. Errors: invalid_argument (no level, compact SH, a box that is not one of
-/// `boxes`, levels of different filters); unsupported (boxes so small that filling their chunks would
-/// take many times the rows).
+/// Builds a cloud with levels of detail from the levels of a streamed set, finest first. The k-th level
+/// of a box is the k-th level in the set that has rows in it. Boxes without rows in the first level are
+/// not drawn. A node's error is the distance from the finest Gaussians of its box to the nearest of its
+/// own (root mean square by mass), and at least the error of the finer node. The same bits for any
+/// number of threads.
+/// @param levels are consumed.
+/// @param boxes number of boxes.
+/// @return the result, or one of these errors:
+/// - invalid_argument: no level, compact SH, a box index beyond `boxes`, or levels with different
+///   filters.
+/// - unsupported: boxes so small that filled chunks would take more than about four times the rows.
 template <Backend B>
 requires is_host_backend<B> Result<LeveledCloud> join_levels(B& backend, std::vector<LodLevel> levels,
                                                              std::size_t boxes) {

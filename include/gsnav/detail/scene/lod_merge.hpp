@@ -15,8 +15,8 @@ struct Sym3 {
 
   Mat3d matrix() const noexcept { return {{{xx, xy, xz}, {xy, yy, yz}, {xz, yz, zz}}}; }
   double trace() const noexcept { return xx + yy + zz; }
-  /// Sum of the principal minors: of a covariance, 3 times the mean over directions of its projection's
-  /// determinant.
+  /// Sum of the principal minors. For a covariance this is 3 times the determinant of its projection,
+  /// averaged over directions.
   double minors() const noexcept {
     return (xx * yy - xy * xy) + (xx * zz - xz * xz) + (yy * zz - yz * yz);
   }
@@ -28,7 +28,7 @@ struct Sym3 {
     yz += w * o.yz;
     zz += w * o.zz;
   }
-  /// + w d d^T
+  /// Adds w d d^T.
   void add_outer(const Vec3d& d, double w) noexcept {
     xx += w * d.x * d.x;
     xy += w * d.x * d.y;
@@ -39,24 +39,26 @@ struct Sym3 {
   }
 };
 
-/// A Gaussian while clusters are made, in double.
+/// A Gaussian during clustering, in double.
 struct LodGaussian {
-  Vec3d mean{};       ///< metres
-  Sym3 covariance{};  ///< m^2
-  double mass = 0;  ///< opacity times area, m^2: what it takes from the light behind it, over its image
-  double spread = 0;    ///< mean squared distance of what was merged from this mean, by mass, m^2
-  Vec3d color{};        ///< SH of degree 0 as a colour, for the cost
-  Vec3d normal{};       ///< axis of the least extent, unit
-  double flatness = 0;  ///< 1 - least / middle standard deviation: how much `normal` says
+  Vec3d mean{};         ///< Metres.
+  Sym3 covariance{};    ///< m^2.
+  double mass = 0;      ///< Opacity times area, m^2: the light that it takes, integrated over its image.
+  double spread = 0;    ///< Mean squared distance from this mean to the Gaussians it was merged from, by
+                        ///< mass, m^2.
+  Vec3d color{};        ///< Colour of SH degree 0, for the cost.
+  Vec3d normal{};       ///< Axis of the least extent, unit.
+  double flatness = 0;  ///< 1 - least / middle standard deviation: how well `normal` is defined.
 };
 
-/// Area that a Gaussian covers, averaged over directions: sqrt of the sum of the covariance's principal
-/// minors, m^2. For a disc s1 s2 (its face), for a ball sqrt(3) s^2; areas of one shape compare as their
-/// projections do.
+/// Area that a Gaussian covers, averaged over directions, m^2: the square root of the sum of the
+/// covariance's principal minors. It is s1 s2 for a disc (its face) and sqrt(3) s^2 for a ball. For
+/// Gaussians of one shape it is proportional to the projected area.
 inline double lod_area(const Sym3& c) noexcept { return std::sqrt(std::max(c.minors(), 0.0)); }
 
-/// The Gaussian of the same mass, mean and covariance as the two together, weighted by mass (moment
-/// matching): to second order in their distance it casts the same image through any pixel filter.
+/// Merges two Gaussians by moment matching: the result has the sum of their masses, and the mean and
+/// covariance of both together, weighted by mass. To second order in their distance it makes the same
+/// image through any pixel filter.
 inline LodGaussian moment_match(const LodGaussian& a, const LodGaussian& b) noexcept {
   LodGaussian m;
   m.mass = a.mass + b.mass;
@@ -77,9 +79,9 @@ inline LodGaussian moment_match(const LodGaussian& a, const LodGaussian& b) noex
   return m;
 }
 
-/// What two Gaussians take from the same light, in units of LodGaussian::mass: the integral over the
-/// plane across `n` (unit) of the product of their alphas, exp(-q / 2) with the opacities that their
-/// masses give, over 2 pi.
+/// Light that both of two Gaussians take, in units of LodGaussian::mass. It is the integral of the
+/// product of their alphas over the plane across `n` (unit), divided by 2 pi. An alpha is the opacity
+/// (mass / area) times exp(-q / 2).
 inline double lod_overlap(const LodGaussian& a, const LodGaussian& b, const Vec3d& n) noexcept {
   const Vec3d any = std::abs(n.x) < 0.6 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0};
   Vec3d u = cross(n, any);
@@ -106,17 +108,16 @@ inline double lod_overlap(const LodGaussian& a, const LodGaussian& b, const Vec3
   return opacity(a) * opacity(b) * std::sqrt(fa.det() * fb.det() / det) * std::exp(-0.5 * q);
 }
 
-/// The Gaussian that stands for two: as moment_match, but it lets through what the two let through
-/// together, where they cover one another: the integral of 1 - (1 - alpha_a) (1 - alpha_b), not of
-/// alpha_a + alpha_b.
+/// The Gaussian that stands for two. Unlike moment_match it accounts for their overlap: its mass is the
+/// integral of 1 - (1 - alpha_a) (1 - alpha_b), not of alpha_a + alpha_b.
 inline LodGaussian merged(const LodGaussian& a, const LodGaussian& b) noexcept {
   LodGaussian m = moment_match(a, b);
   m.mass = std::max(m.mass - lod_overlap(a, b, m.normal), std::max(a.mass, b.mass));
   return m;
 }
 
-/// Integral over space of the product of two Gaussian densities (of integral 1), each blurred by
-/// variance / 2: the density of the difference of their means.
+/// Integral over space of the product of two normalised Gaussian densities, each blurred by variance /
+/// 2. It equals the density of the difference of their means.
 inline double density_product(const LodGaussian& a, const LodGaussian& b, double variance) noexcept {
   Sym3 s = a.covariance;
   s.add(b.covariance, 1);
@@ -137,10 +138,10 @@ inline double density_product(const LodGaussian& a, const LodGaussian& b, double
   return std::exp(-0.5 * q) / (kTwoPi * std::sqrt(kTwoPi * det));
 }
 
-/// What merging costs: the squared L2 distance, over space, of the light that two Gaussians give (colour
-/// and coverage, mass times density, blurred by `variance` m^2: half of it each) from what the merged
-/// one gives, closed form. More for faces that look different ways, so that clusters stay thin along the
-/// view.
+/// Cost of merging two Gaussians: the squared L2 distance over space, in closed form, between the light
+/// of the two and that of the merged one. Light is colour and coverage: mass times density, blurred so
+/// that a product is blurred by `variance` (m^2). Faces that look in different directions cost more, so
+/// that clusters stay thin along the view.
 inline double merge_cost(const LodGaussian& a, const LodGaussian& b, double variance) noexcept {
   const LodGaussian m = moment_match(a, b);
   const auto light = [](const LodGaussian& g, const LodGaussian& h) {

@@ -10,12 +10,13 @@
 
 namespace gsnav {
 
-/// Numbers that a Gaussian has in SH bands 1 to `degree`, of all channels: 0, 9, 24 or 45.
+/// Number of SH coefficients of a Gaussian in bands 1 to `degree`, in all three channels: 0, 9, 24 or
+/// 45.
 constexpr std::size_t sh_band_numbers(int degree) noexcept {
   return 3 * static_cast<std::size_t>(sh_coefficient_count(degree) - 1);
 }
 
-/// The highest SH degree that any chunk needs: bands above it need not be held.
+/// The highest SH degree that any chunk needs. Higher bands need not be stored.
 inline int needed_sh_degree(const ColorRows& v) noexcept {
   if (v.chunk_degrees.empty()) return v.degree;
   int most = 0;
@@ -24,7 +25,7 @@ inline int needed_sh_degree(const ColorRows& v) noexcept {
   return most;
 }
 
-/// The first `to` of the `from` numbers of each of n rows, to `out`, which may be where the rows are.
+/// Copies the first `to` of the `from` numbers of each of n rows to `out`, which may be `rows` itself.
 template <class T>
 void cut_rows(const T* rows, std::size_t n, std::size_t from, std::size_t to, T* out) noexcept {
   for (std::size_t i = 0; i < n; ++i) {
@@ -32,18 +33,20 @@ void cut_rows(const T* rows, std::size_t n, std::size_t from, std::size_t to, T*
   }
 }
 
-/// What of a cloud a frame has to read: measured once by scene_bands (detail/scene/scene_bands.hpp).
+/// The SH bands that each chunk of a cloud needs, measured once by scene_bands
+/// (detail/scene/scene_bands.hpp).
 struct SceneBands {
-  std::vector<std::uint8_t> chunk_sh_degrees;  ///< what ColorRows::chunk_degrees takes, [chunks]
-  std::uint64_t sh_numbers = 0;  ///< SH coefficients above degree 0, of all channels, that there are
-  std::uint64_t sh_numbers_read = 0;  ///< of these, in the bands that are kept
-  double color_error = 0;             ///< no colour changes by more; 0 where only zeros are left out
-  // Of drop_bands (detail/scene/drop_bands.hpp), which keeps the bands that some chunk needs:
-  std::uint64_t bytes_let_go = 0;    ///< what it gave back
-  std::uint64_t bytes_unneeded = 0;  ///< what is held of bands that their own chunk does not need
+  std::vector<std::uint8_t> chunk_sh_degrees;  ///< [chunks], for ColorRows::chunk_degrees.
+  std::uint64_t sh_numbers = 0;       ///< SH coefficients above degree 0 in the cloud, in all channels.
+  std::uint64_t sh_numbers_read = 0;  ///< Number of those in needed bands.
+  double color_error = 0;             ///< Largest change of a colour by leaving out the rest; 0 where
+                                      ///< only zeros are left out.
+  // Set by drop_bands (detail/scene/drop_bands.hpp), which keeps every band that some chunk needs.
+  std::uint64_t bytes_let_go = 0;    ///< Bytes that drop_bands freed.
+  std::uint64_t bytes_unneeded = 0;  ///< Bytes still stored of bands that their own chunk does not need.
 
-  /// The set, of arrays in host memory, without the bands that were found to say nothing. This must
-  /// outlive it. For other backends: GaussianArrays.
+  /// The set without the bands that are not needed. `set` has arrays in host memory; for other backends
+  /// use GaussianArrays. This object must outlive the result.
   GaussianSet applied_to(GaussianSet set) const& noexcept {
     set.gaussians.color.chunk_degrees = {chunk_sh_degrees.data(), chunk_sh_degrees.size()};
     return set;

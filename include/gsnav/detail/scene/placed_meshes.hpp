@@ -13,14 +13,15 @@
 
 namespace gsnav {
 
-/// A surface ready to be drawn: its meshes, one a part, and where they stand.
+/// A surface ready to be drawn: one mesh for each part, and where the parts stand.
 struct PlacedMeshes {
   MeshScene meshes;
   std::vector<TexturedScene::Instance> instances;
-  std::vector<std::string> warnings;  ///< what is drawn otherwise than asked for
+  std::vector<std::string> warnings;  ///< A line for each thing that is drawn differently than the file
+                                      ///< asks for.
 
-  /// All of it in the world, for BasicRenderer::set_meshes on host backends; ids count from `first_id`.
-  /// Valid while this lives and no mesh is added.
+  /// All instances in the world, for BasicRenderer::set_meshes on host backends. Their ids count up from
+  /// `first_id`. Valid while this object lives and no mesh is added.
   std::vector<MeshInstance> in_world(const Similarity& world_from_scene = {},
                                      std::uint32_t first_id = 0) const& {
     std::vector<MeshInstance> all;
@@ -34,8 +35,9 @@ struct PlacedMeshes {
                                      std::uint32_t first_id = 0) const&& = delete;
 };
 
-/// Takes a surface as files give it (io::load_textured_scene). Parts share their textures' mip chains.
-/// Errors: invalid_argument naming the part, texture or instance that does not fit.
+/// Makes meshes from a surface as files describe it (io::load_textured_scene). Parts with the same
+/// texture share its mip chain. Error: invalid_argument naming the part, texture or instance that does
+/// not fit.
 inline Result<PlacedMeshes> placed_meshes(TexturedScene scene) {
   PlacedMeshes out;
   out.warnings = std::move(scene.warnings);

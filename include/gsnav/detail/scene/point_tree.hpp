@@ -13,8 +13,9 @@
 
 namespace gsnav::detail {
 
-/// Points by a k-d tree without nodes: [first, last) is split at its middle by its longest axis, over
-/// and over. Points that are not finite are left out. The points must stay.
+/// A k-d tree over points, stored as an order of their indices: a range [first, last) is split at its
+/// middle along its longest axis. Points that are not finite are left out. The points must outlive the
+/// tree.
 class PointTree {
  public:
   explicit PointTree(std::span<const Vec3d> points) : points_(points), axes_(points.size()) {
@@ -23,16 +24,16 @@ class PointTree {
     }
     split(0, order_.size());
   }
-  /// Numbers of the points, neighbours mostly together.
+  /// Indices of the points; neighbours mostly lie together.
   const std::vector<std::uint32_t>& order() const noexcept { return order_; }
 
-  /// Calls best.add(number, squared distance) for every point nearer to `from` than the root of
-  /// best.worst(), which may shrink meanwhile, and for others.
+  /// Calls best.add(index, squared distance) for every point nearer to `from` than sqrt(best.worst()),
+  /// and for some others. best.worst() may shrink during the search.
   template <class Best>
   void search(const Vec3d& from, Best& best) const {
     search(0, order_.size(), from, best);
   }
-  /// Squared distance to the nearest point; infinity where there is none.
+  /// Squared distance to the nearest point; infinity if there is none.
   double nearest_squared(const Vec3d& from) const {
     struct Least {
       double least = std::numeric_limits<double>::infinity();

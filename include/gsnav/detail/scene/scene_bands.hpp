@@ -16,13 +16,14 @@
 
 namespace gsnav {
 
-/// What `fast` and `lod` may leave out of a colour: a quarter of a step of 8 bits.
+/// Change of a colour that `fast` and `lod` accept: a quarter of an 8-bit step.
 inline constexpr double kUnseenColor = 1.0 / 1020;
 
-/// Finds, for each chunk, the SH bands that matter: those above a degree are left out where, for every
-/// Gaussian and channel of the chunk, they change the colour by at most `unseen`, seen from anywhere. By
-/// the addition theorem a band l of coefficients c is at most |c| sqrt((2 l + 1) / (4 pi)). `unseen` = 0
-/// leaves out zeros alone: the same bits. `cloud`: arrays in host memory, packed ones too.
+/// Finds the SH bands that matter, for each chunk. Bands above a degree are left out where, for every
+/// Gaussian and channel of the chunk and from every direction, they change the colour by at most
+/// `unseen`. By the addition theorem, a band l with coefficients c contributes at most |c| sqrt((2 l +
+/// 1) / (4 pi)). With `unseen` = 0 only zeros are left out, and images keep their bits.
+/// @param cloud arrays in host memory, packed or not.
 inline SceneBands scene_bands(const GaussianRows& cloud, double unseen = 0) {
   SceneBands out;
   const ColorRows& sh = cloud.color;
@@ -39,7 +40,7 @@ inline SceneBands scene_bands(const GaussianRows& cloud, double unseen = 0) {
   PoolBackend backend(threads_for(size));
   backend.parallel_for(errors.size(), [&](std::size_t c) {
     const std::size_t first = c * kProjectChunk, end = std::min(size, first + kProjectChunk);
-    double left_out[kMaxShDegree + 1] = {};  // largest error where bands above a degree are
+    double left_out[kMaxShDegree + 1] = {};  // [degree] largest error without the bands above it
     for (std::size_t i = first; i < end; ++i) {
       for (std::size_t channel = 0; channel < 3; ++channel) {
         double error = 0;
@@ -68,7 +69,7 @@ inline SceneBands scene_bands(const GaussianRows& cloud, double unseen = 0) {
   }
   return out;
 }
-/// Of a GaussianCloud or a PackedCloud.
+/// The same for a GaussianCloud or a PackedCloud.
 template <class Cloud>
 requires requires(const Cloud& c) { c.view(); }
 SceneBands scene_bands(const Cloud& cloud, double unseen = 0) {

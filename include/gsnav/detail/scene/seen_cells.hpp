@@ -16,13 +16,13 @@
 #include "gsnav/image/camera.hpp"
 #include "gsnav/math/functions.hpp"
 
-// What cells see of a cloud, as scene/visible_sets.hpp finds it.
+// Building blocks of scene/visible_sets.hpp: what the cells see of a cloud.
 
 namespace gsnav {
 
 namespace detail {
 
-/// Distance between two boxes, along no axis less than 0.
+/// Distance between two boxes; 0 where they touch or overlap.
 inline double box_distance(const Vec3d& low, const Vec3d& high, const Vec3d& other_low,
                            const Vec3d& other_high) noexcept {
   Vec3d gap;
@@ -38,17 +38,17 @@ struct CellCube {
       high[k] = low[k] + side;
     }
   }
-  /// Distance to another box; 0 where they overlap.
+  /// Distance to a box; 0 where they overlap.
   double distance(const Vec3d& other_low, const Vec3d& other_high) const noexcept {
     return box_distance(low, high, other_low, other_high);
   }
   Vec3d low, high;
 };
 
-/// A bit a row of a chunk.
+/// One bit for each row of a chunk.
 using RowBits = std::array<std::uint32_t, kSeenRowWords>;
 
-/// Those of chunk `chunk` that a cloud of so many Gaussians has.
+/// The rows that chunk `chunk` has in a cloud of `size` Gaussians.
 inline RowBits all_rows(std::size_t size, std::size_t chunk) noexcept {
   RowBits out{};
   for (std::size_t k = 0; k < kSeenRowWords; ++k) {
@@ -58,7 +58,8 @@ inline RowBits all_rows(std::size_t size, std::size_t chunk) noexcept {
   return out;
 }
 
-/// Those that take more of a pixel than min_weight, with all that are seen together with them.
+/// The rows of a chunk that take more than min_weight of a pixel, together with all rows of their groups
+/// of `rows` rows (0: the whole chunk). `most` [N] has the largest weight of each row.
 inline RowBits seen_rows(std::span<const float> most, std::size_t chunk, int rows,
                          double min_weight) noexcept {
   RowBits out = all_rows(most.size(), chunk);
@@ -75,7 +76,7 @@ inline RowBits seen_rows(std::span<const float> most, std::size_t chunk, int row
   return out;
 }
 
-/// What a cell sees, as it is found.
+/// Collects the chunks and rows that one cell sees.
 class SeenOfCell {
  public:
   explicit SeenOfCell(std::size_t chunks) : places_(chunks, kNone) {}
@@ -90,7 +91,7 @@ class SeenOfCell {
     for (std::size_t k = 0; k < kSeenRowWords; ++k) to[k] |= rows[k];
   }
 
-  /// How many Gaussians.
+  /// Number of Gaussians seen.
   std::size_t count() const noexcept {
     std::size_t sum = 0;
     for (const RowBits& r : rows_) {
@@ -99,7 +100,7 @@ class SeenOfCell {
     return sum;
   }
 
-  /// As Selection::seen has it.
+  /// Appends the words of Selection::seen to `bits`, with or without the rows of each chunk.
   void append_to(std::vector<std::uint32_t>& bits, bool with_rows) const {
     const std::size_t begin = bits.size(), words = (places_.size() + 31) / 32;
     bits.resize(begin + (with_rows ? 2 : 1) * words);
@@ -118,23 +119,25 @@ class SeenOfCell {
 
  private:
   static constexpr std::uint32_t kNone = 0xffffffffu;
-  std::vector<std::uint32_t> places_;  // [chunks] into rows_
+  std::vector<std::uint32_t> places_;  // [chunks] index into rows_, or kNone
   std::vector<RowBits> rows_;
 };
 
-/// Cells that are looked at before it is said whether sets are worth their time, and the least number of
-/// cells for which it is asked.
+/// Number of cells that are finished first, to decide whether sets are worth their time, and the least
+/// number of cells for which that is done.
 inline constexpr std::size_t kSampleCells = 16, kLeastSampled = 64;
 
-/// In which order viewpoints are looked from: those that the sampled cells need come first. The sets do
-/// not depend on it.
+/// The order in which viewpoints are processed: those of the sampled cells first. The sets do not depend
+/// on it.
 struct ViewpointOrder {
-  std::vector<std::size_t> sample;  ///< cells, spread evenly; empty: none are sampled
-  std::vector<std::size_t> order;   ///< [viewpoints]
-  std::size_t sampled = 0;          ///< first in `order`: after these, the sampled cells are complete
+  std::vector<std::size_t> sample;  ///< Sampled cells, spread evenly; empty if none are sampled.
+  std::vector<std::size_t> order;   ///< [viewpoints].
+  std::size_t sampled = 0;          ///< Number of viewpoints, first in `order`, after which the sampled
+                                    ///< cells are complete.
 };
 
-/// `counts_for(cell, viewpoint)`: the cell sees what this viewpoint sees.
+/// Orders the viewpoints. `counts_for(cell, viewpoint)` returns whether the cell sees what this
+/// viewpoint sees.
 template <class CountsFor>
 ViewpointOrder order_viewpoints(std::size_t cells, std::size_t viewpoints, bool with_sample,
                                 const CountsFor& counts_for) {
@@ -153,8 +156,8 @@ ViewpointOrder order_viewpoints(std::size_t cells, std::size_t viewpoints, bool 
   return out;
 }
 
-/// VisibleSettings::most_share: unsupported where the sampled cells see more than that of `size`
-/// Gaussians on average.
+/// Checks VisibleSettings::most_share: unsupported if the sampled cells see on average more than that
+/// share of `size` Gaussians.
 inline Status check_sample(const std::vector<SeenOfCell>& found, const std::vector<std::size_t>& sample,
                            std::size_t size, double most_share) {
   double share = 0;
@@ -169,9 +172,9 @@ inline Status check_sample(const std::vector<SeenOfCell>& found, const std::vect
                                  " %. Draw without them, or set most_share = 1"};
 }
 
-/// Cameras that look at the six faces of a cube, turned about the world's up (Y) by another angle for
-/// each viewpoint: in what order Gaussians are blended depends on where a camera looks, so that some are
-/// seen in one direction only.
+/// Cameras for the six faces of a cube around `eye`. The cube is turned about the world's up axis (Y) by
+/// another angle for each viewpoint. The order in which Gaussians are blended depends on where a camera
+/// looks, so that some are visible in one direction only.
 inline std::array<Camera, 6> cube_cameras(const Vec3d& eye, std::size_t viewpoint, int face,
                                           double near_plane, double near_sigma) noexcept {
   constexpr double kGoldenRatio = 0.6180339887498949, kQuarter = 1.5707963267948966;

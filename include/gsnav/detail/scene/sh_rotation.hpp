@@ -10,14 +10,14 @@
 
 namespace gsnav {
 
-/// Turns spherical harmonics of degree 0 to 3 with the scene that carries them: the colour seen along a
-/// turned direction afterwards is the one seen along the direction before. Exact but for rounding.
+/// Rotates spherical harmonics of degree 0 to 3 together with the scene. The colour seen along a rotated
+/// direction is then the one that was seen along the original direction. Exact except for rounding.
 class ShRotation {
  public:
   /// `rotation` is a unit quaternion.
   explicit ShRotation(const Quatd& rotation) noexcept {
-    // A band's matrix is the integral of Y_i(d) Y_j(R^-1 d) over the sphere. The rule is exact up to
-    // degree 7: Gauss-Legendre in z, even steps around it.
+    // The matrix of a band is the integral of Y_i(d) Y_j(R^-1 d) over the sphere. The quadrature,
+    // Gauss-Legendre in z and even steps around it, is exact up to degree 7.
     constexpr double kNodes[] = {-0.8611363115940526, -0.3399810435848563, 0.3399810435848563,
                                  0.8611363115940526};
     constexpr double kWeights[] = {0.34785484513745385, 0.6521451548625461, 0.6521451548625461,
@@ -39,7 +39,7 @@ class ShRotation {
     }
   }
 
-  /// Turns the coefficients of one Gaussian in place: [(degree + 1)^2 - 1][3], colour inner.
+  /// Rotates the coefficients of one Gaussian in place: [(degree + 1)^2 - 1][3], colour inner.
   void apply(int degree, float* rest) const noexcept {
     for (int band = 1; band <= degree; ++band) {
       const std::size_t first = static_cast<std::size_t>(band * band - 1);
@@ -59,7 +59,7 @@ class ShRotation {
   }
 
  private:
-  static constexpr std::size_t kTerms = 15;  ///< of degree 1 to 3
+  static constexpr std::size_t kTerms = 15;  ///< Basis functions of degree 1 to 3.
   using Basis = std::array<double, kTerms>;
 
   static Basis basis(const Vec3d& d) noexcept {

@@ -22,7 +22,7 @@ namespace gsnav {
 
 namespace detail {
 
-/// Every third bit of the result is one of the lowest 21 of x.
+/// Spreads the lowest 21 bits of x to every third bit of the result.
 inline std::uint64_t spread_bits(std::uint64_t x) noexcept {
   x &= 0x1fffff;
   x = (x | x << 32) & 0x001f00000000ffff;
@@ -32,14 +32,14 @@ inline std::uint64_t spread_bits(std::uint64_t x) noexcept {
   return (x | x << 2) & 0x1249249249249249;
 }
 
-/// Floats as numbers in the same order.
+/// Maps floats to integers that compare in the same order.
 inline std::uint32_t ordered_bits(float v) noexcept {
   const auto bits = std::bit_cast<std::uint32_t>(v);
   return bits ^ ((bits >> 31) != 0 ? 0xffffffffu : 0x80000000u);
 }
 
-/// The value that `rank` of the others are not greater than, of values without NaN: counted by halves of
-/// their bits.
+/// The value of rank `rank` (0 is the least) among values without NaN. Counts the upper half of their
+/// bits, then the lower half.
 inline float value_of_rank(const std::vector<float>& values, std::size_t rank) {
   std::vector<std::size_t> counts(1 << 16);
   const auto find = [&] {
@@ -57,14 +57,15 @@ inline float value_of_rank(const std::vector<float>& values, std::size_t rank) {
   return std::bit_cast<float>(bits ^ ((bits >> 31) != 0 ? 0x80000000u : 0xffffffffu));
 }
 
-/// Place of a cell of a 2^21 grid on Hilbert's curve (Skilling, "Programming the Hilbert curve", 2004).
+/// Position on Hilbert's curve of a cell in a grid of 2^21 cells along each axis (Skilling, "Programming
+/// the Hilbert curve", 2004).
 inline std::uint64_t hilbert_code(std::array<std::uint32_t, 3> x) noexcept {
   constexpr std::uint32_t kTop = 1u << 20;
   for (std::uint32_t q = kTop; q > 1; q >>= 1) {
     const std::uint32_t below = q - 1;
     for (std::uint32_t& v : x) {
-      // Where the bit is set the first coordinate is turned over, else the two change places. Branches
-      // would be chance.
+      // If the bit is set, the first coordinate is inverted, otherwise the two are exchanged. The
+      // condition is random, so avoid a branch.
       const std::uint32_t set = (v & q) != 0 ? ~0u : 0u, swapped = (x[0] ^ v) & below & ~set;
       x[0] ^= swapped | (below & set);
       v ^= swapped;
@@ -72,13 +73,13 @@ inline std::uint64_t hilbert_code(std::array<std::uint32_t, 3> x) noexcept {
   }
   x[1] ^= x[0];
   x[2] ^= x[1];
-  std::uint32_t turned = x[2] >> 1;  // of each bit: the parity of those above it
+  std::uint32_t turned = x[2] >> 1;  // each bit: the parity of the bits above it
   for (int shift = 1; shift < 32; shift *= 2) turned ^= turned >> shift;
   for (std::uint32_t& v : x) v ^= turned;
   return spread_bits(x[0]) << 2 | spread_bits(x[1]) << 1 | spread_bits(x[2]);
 }
 
-/// Rows by their code in 63 bits, and of equal codes by their number. `code(i)`: of row i.
+/// Indices of n rows, sorted by `code(i)` (63 bits) and then by index.
 template <Backend B, class Code>
 std::vector<std::uint32_t> rows_by_code(B& backend, std::size_t n, const Code& code) {
   Buffer<std::uint32_t, B> keys(backend), rows(backend), high(backend);
@@ -101,7 +102,7 @@ std::vector<std::uint32_t> rows_by_code(B& backend, std::size_t n, const Code& c
 
 }  // namespace detail
 
-/// Bounds of each `rows` consecutive rows.
+/// Bounds of each run of `rows` rows.
 template <Backend B>
 std::vector<ChunkBounds> chunk_bounds_of(B& backend, const GaussianCloud& cloud,
                                          std::size_t rows = kProjectChunk) {
@@ -119,7 +120,8 @@ std::vector<ChunkBounds> chunk_bounds_of(B& backend, const GaussianCloud& cloud,
   backend.synchronize().throw_if_error();
   return out;
 }
-/// Bounds chunks and their parts; for whoever moved or scaled rows that lie in spatial order.
+/// Computes the bounds of chunks and parts. Call it after moving or scaling rows that stay in spatial
+/// order.
 template <Backend B>
 void bound_chunks(B& backend, GaussianCloud& cloud) {
   cloud.chunk_bounds = chunk_bounds_of(backend, cloud);
@@ -130,9 +132,9 @@ inline void bound_chunks(GaussianCloud& cloud) {
   bound_chunks(backend, cloud);
 }
 
-/// The rows of a cloud in the order in which they were read, by which renderers break ties of depth and
-/// in which writers write: result[i] is the cloud's row that was read as the i-th of those that are
-/// left.
+/// Rows in the order in which they were read: result[i] is the row of the cloud that comes i-th in the
+/// file, among those that are left. Renderers break ties of depth by this order, and writers write in
+/// it.
 inline std::vector<std::uint32_t> rows_as_read(const GaussianCloud& cloud) {
   const std::size_t n = cloud.size();
   std::vector<std::uint32_t> rows(n);
@@ -144,11 +146,10 @@ inline std::vector<std::uint32_t> rows_as_read(const GaussianCloud& cloud) {
   return rows;
 }
 
-/// Brings the rows into the order of Hilbert's curve through their means and bounds each chunk of them,
-/// so that a renderer touches what is near the view only, and neighbours lie together in memory.
-/// `row_ids` keeps each row's place, so that images stay the same, bit for bit. Large Gaussians go
-/// together behind the others: one among small ones would open its whole chunk's bounds. The order is
-/// the same for any number of threads.
+/// Sorts the rows along Hilbert's curve through their means and computes the bounds of each chunk. A
+/// renderer then touches only rows near the view, and neighbours lie together in memory. `row_ids` keeps
+/// each row's place, so that images keep their bits. Large Gaussians go to the end: one among small ones
+/// would inflate the bounds of its chunk. The order is the same for any number of threads.
 template <Backend B>
 void sort_spatially(B& backend, GaussianCloud& cloud) {
   static_assert(is_host_backend<B>);

@@ -9,22 +9,22 @@
 
 namespace gsnav {
 
-/// A picture that colours a surface. Display-referred (sRGB-encoded), 8 bits.
+/// A texture image of a surface, sRGB-encoded, 8 bits.
 struct TextureImage {
   std::size_t width = 0, height = 0;
-  std::vector<std::uint8_t> rgba;  ///< [height][width][4], row 0 is v = 0
+  std::vector<std::uint8_t> rgba;  ///< [height][width][4], row 0 is v = 0.
 };
 
-/// How a part of a surface is coloured: its texture, or white, times a factor in linear light.
+/// The material of a part: its texture (white without one) times a factor in linear light.
 struct SurfaceMaterial {
-  Vec3d factor{1, 1, 1};      ///< linear light
-  double alpha_cutoff = 0.0;  ///< where alpha is less there is a hole
-  std::int32_t texture = -1;  ///< index into the textures beside it, or -1; it repeats beyond [0, 1]
-  bool double_sided = false;  ///< seen from behind too
-  bool unlit = false;         ///< its colour is what is seen, whatever the light
-  bool blend = false;         ///< what is behind is seen through it, as alpha says
-  double alpha =
-      1.0;  ///< in [0, 1], times the texture's; read where holes are cut or what is behind is seen
+  Vec3d factor{1, 1, 1};      ///< Linear RGB.
+  double alpha_cutoff = 0.0;  ///< The surface has a hole where alpha is less.
+  std::int32_t texture = -1;  ///< Index into the scene's textures, or -1. Textures repeat beyond [0, 1].
+  bool double_sided = false;  ///< Whether it is visible from behind.
+  bool unlit = false;         ///< Whether the colour is shown as it is, without shading.
+  bool blend = false;         ///< Whether it is blended with the background, by alpha.
+  double alpha = 1.0;  ///< Alpha in [0, 1], multiplied with that of the texture. Used with alpha_cutoff
+                       ///< and blend only.
 };
 
 }  // namespace gsnav

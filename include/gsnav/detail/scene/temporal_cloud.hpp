@@ -10,22 +10,22 @@
 
 namespace gsnav {
 
-/// Gaussians that move and fade in host memory (TemporalView has the formulas).
+/// Gaussians in host memory that move and fade over time (TemporalView has the formulas).
 struct TemporalCloud {
-  GaussianCloud cloud;        ///< each Gaussian at its own time
-  std::vector<float> times;   ///< [N] seconds
-  std::vector<float> sigmas;  ///< [N] seconds; infinity: always there
+  GaussianCloud cloud;        ///< Each Gaussian as it is at its own time.
+  std::vector<float> times;   ///< [N] seconds.
+  std::vector<float> sigmas;  ///< [N] standard deviations in time, seconds; infinity: always present.
   std::array<std::vector<float>, kMotionPlanes>
-      motion;  ///< x, y, z of velocity, acceleration, jerk; [N] or empty
+      motion;  ///< x, y, z of velocity, acceleration and jerk; [N] each, or empty.
 
   std::size_t size() const noexcept { return cloud.size(); }
-  /// Bytes held by the arrays.
+  /// Bytes of the arrays.
   std::size_t bytes() const noexcept {
     std::size_t values = times.size() + sigmas.size();
     for (const auto& plane : motion) values += plane.size();
     return cloud.bytes() + sizeof(float) * values;
   }
-  /// What kernels read; valid while this lives and does not grow.
+  /// Views for kernels. Valid while this object lives and does not grow.
   TemporalView view() const& noexcept {
     TemporalView v;
     v.base = cloud.view();

@@ -13,14 +13,15 @@
 
 namespace gsnav {
 
-/// Gives a cloud without motion the planes of one: it stands, always.
+/// Gives a cloud without motion the planes of one: it never moves and is always present.
 inline void stand_still(TemporalCloud& scene) {
   scene.times.assign(scene.size(), 0.0f);
   scene.sigmas.assign(scene.size(), std::numeric_limits<float>::infinity());
   for (auto& plane : scene.motion) plane.clear();
 }
 
-/// Sorts the rows in space by their means at their own times. A scene is sorted once, as it was read.
+/// Sorts the rows in space by their means at their own times. A scene must be sorted only once, after
+/// reading.
 inline void sort_spatially(TemporalCloud& scene) {
   scene.cloud.row_ids.clear();
   PoolBackend backend(threads_for(scene.size()));
@@ -31,8 +32,8 @@ inline void sort_spatially(TemporalCloud& scene) {
   for (auto& plane : scene.motion) permute_rows(backend, order, 1, plane);
 }
 
-/// The scene at a finite time `t`, seconds, as a cloud that stands: computed in double, Gaussians below
-/// 1/255 left out. Not sorted.
+/// The scene at time `t` (seconds, finite) as a static cloud. Computed in double; Gaussians below 1/255
+/// are left out. Not sorted.
 inline GaussianCloud cloud_at(const TemporalCloud& scene, double t) {
   const TemporalView view = scene.view();
   GaussianCloud out = scene.cloud, moved;

@@ -10,9 +10,9 @@
 
 namespace gsnav {
 
-/// A moving scene in a backend's memory, taken to one time after the other. On host backends the scene's
-/// arrays are used as they are: it must outlive this, as must the backend. A scene that is a temporary
-/// does not compile, on any backend.
+/// A moving scene in a backend's memory, evaluated at one time after another. On host backends the
+/// scene's arrays are used in place. The scene and the backend must outlive this object; a temporary
+/// scene does not compile on any backend.
 template <Backend B>
 class TemporalGaussians {
  public:
@@ -27,9 +27,9 @@ class TemporalGaussians {
   }
   TemporalGaussians(B& backend, const TemporalCloud&& scene) = delete;
 
-  /// Errors: those of gaussians_at.
+  /// Evaluates the scene at time t, seconds. Errors: those of gaussians_at.
   Status set_time(double t) { return gaussians_at<float>(backend_, view_, t, moment_); }
-  /// The scene as it is since the last set_time, which must have come first.
+  /// The scene as of the last set_time, which must have been called before.
   GaussianSet set(const Similarity& world_from_asset = {}) const& noexcept {
     GaussianSet s = arrays_.set(world_from_asset);
     s.gaussians = moment_.gaussians;

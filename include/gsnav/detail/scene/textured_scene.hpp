@@ -12,17 +12,17 @@
 
 namespace gsnav {
 
-/// Triangles of one material, in the part's own frame.
+/// Triangles of one material, in the frame of the part.
 struct TexturedPart {
-  TriangleMesh geometry;         ///< V vertices
-  std::vector<Vec3f> normals;    ///< [V] of unit length, or empty: those of the faces
-  std::vector<Vec3f> colors;     ///< [V] linear RGB, or empty: white
-  std::vector<Vec2<float>> uvs;  ///< [V], (0, 0) is the texture's top left; or empty
-  std::vector<float> alphas;     ///< [V] in [0, 1], or empty: 1; where the material reads alpha
-  SurfaceMaterial material;      ///< its texture is one of the scene's
+  TriangleMesh geometry;         ///< V vertices.
+  std::vector<Vec3f> normals;    ///< [V] unit length. Empty: the normals of the faces.
+  std::vector<Vec3f> colors;     ///< [V] linear RGB. Empty: white.
+  std::vector<Vec2<float>> uvs;  ///< [V], (0, 0) is the top left of the texture; or empty.
+  std::vector<float> alphas;     ///< [V] in [0, 1], used where the material reads alpha. Empty: 1.
+  SurfaceMaterial material;      ///< Its texture is an index into TexturedScene::textures.
 };
 
-/// A surface as it is drawn: parts, and where they stand. One part may stand in many places.
+/// A surface: parts, textures, and where the parts stand. A part may stand in many places.
 struct TexturedScene {
   struct Instance {
     std::size_t part = 0;
@@ -31,7 +31,7 @@ struct TexturedScene {
   std::vector<TexturedPart> parts;
   std::vector<TextureImage> textures;
   std::vector<Instance> instances;
-  std::vector<std::string> warnings;  ///< what was left out or taken otherwise
+  std::vector<std::string> warnings;  ///< A line for each thing that was left out or changed.
 };
 
 }  // namespace gsnav

@@ -12,9 +12,9 @@
 
 namespace gsnav {
 
-/// `count` cameras of 60 degrees on a circle around the middle of a box, slightly above it, that look at
-/// the middle.
-/// @param up  unit axis of the asset's frame that points up (`LoadReport::up`, `guess_up`)
+/// `count` cameras with a field of view of 60 degrees on a circle around a box, slightly above its
+/// middle, looking at the middle.
+/// @param up unit axis of the asset's frame that points up (`LoadReport::up`, `guess_up`).
 inline std::vector<Camera> views_around(const Aabb<double>& box, const Vec3d& up, int count, int width,
                                         int height) {
   std::vector<Camera> out;
@@ -32,7 +32,7 @@ inline std::vector<Camera> views_around(const Aabb<double>& box, const Vec3d& up
   return out;
 }
 
-/// The same around a scene: its outermost tenth on each side is left out of the box. Empty for an empty
+/// Cameras around a cloud. Its outermost tenth on each side is left out of the box. Empty for an empty
 /// cloud.
 inline std::vector<Camera> views_around(const GaussianCloud& cloud, const Vec3d& up, int count,
                                         int width, int height) {
