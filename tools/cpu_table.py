@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Makes the README's table of CPU renderers: gsnav and the baselines, timed in one run, with error and memory.
+"""Makes the table of CPU renderers in docs/benchmarks.md: gsnav and the baselines, timed in one run, with error and
+memory.
 
     tools/cpu_table.py --build build/dev            # what there is beside the data: flats, LaCadiere, two baselines
-    tools/cpu_table.py --build build/dev --readme   # and puts it into README.md
+    tools/cpu_table.py --build build/dev --page     # and puts it into docs/benchmarks.md
     tools/cpu_table.py --build build/dev --scene flat=flat.ply:cameras.json --baseline NAME=BINARY
 
 A scene is what gsnav-convert reads; all renderers get the same PLY. A baseline is a binary, or a C++ source that is
@@ -277,13 +278,13 @@ def summary(rows, threads, baselines):
     return "\n".join(lines)
 
 
-def put_into_readme(text):
-    readme = ROOT / "README.md"
-    old = readme.read_text()
+def put_into_page(text):
+    page = ROOT / "docs/benchmarks.md"
+    old = page.read_text()
     if old.count(MARKS[0]) != 1 or old.count(MARKS[1]) != 1:
-        stop(f"README.md lacks the lines {MARKS[0]} and {MARKS[1]}")
+        stop(f"docs/benchmarks.md lacks the lines {MARKS[0]} and {MARKS[1]}")
     head, rest = old.split(MARKS[0])
-    readme.write_text(head + MARKS[0] + "\n" + text + "\n" + MARKS[1] + rest.split(MARKS[1])[1])
+    page.write_text(head + MARKS[0] + "\n" + text + "\n" + MARKS[1] + rest.split(MARKS[1])[1])
 
 
 def parse_options():
@@ -303,7 +304,7 @@ def parse_options():
                         help="wait so long, size by size, for other programs to end")
     parser.add_argument("--cache", type=pathlib.Path, help="default: BUILD/cpu_table")
     parser.add_argument("--out", type=pathlib.Path, help="Markdown file; JSON beside it; default: CACHE/table.md")
-    parser.add_argument("--readme", action="store_true", help="replace the marked block of README.md")
+    parser.add_argument("--page", action="store_true", help="replace the marked block of docs/benchmarks.md")
     options = parser.parse_args()
     options.build = options.build.resolve()
     if not (options.build / "CMakeCache.txt").exists():
@@ -333,8 +334,8 @@ def main():
     options.out.write_text(text + "\n")
     options.out.with_suffix(".json").write_text(json.dumps(rows, indent=1) + "\n")
     print(text + "\n\n" + summary(rows, options.threads, names))
-    if options.readme:
-        put_into_readme(text)
+    if options.page:
+        put_into_page(text)
 
 
 if __name__ == "__main__":
