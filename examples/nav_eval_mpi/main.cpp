@@ -141,11 +141,10 @@ int main(int argc, char** argv) {
   const Ranks ranks(&argc, &argv);
   gsnav_eval::Options o;
   bool draw = false;
-  CLI::App app{
-      "Evaluates a policy over MPI ranks, to the journal of gsnav-eval, which makes the page of it."};
+  CLI::App app{"Evaluates a policy on several MPI ranks and writes the journal of gsnav-eval."};
   gsnav_eval::add_world_options(app, o);
   app.add_flag("--draw", draw,
-               "draw what the agent sees at each step; ranks of a machine take its GPUs in turn");
+               "draw what the agent sees at each step; the ranks of a machine share its GPUs");
   CLI11_PARSE(app, argc, argv);
   Status s;
   try {
