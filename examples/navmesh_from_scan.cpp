@@ -28,7 +28,7 @@ int main(int argc, char** argv) try {
   // [/snippet]
 
   // [snippet: map]
-  // Cells of 0.05 m at the height of the start: black is blocked, white is island 0, grey another one.
+  // Cells of 0.05 m at the height of the start. Black is blocked, white is island 0, grey is another.
   auto map = mesh.top_down_map(start.position.y, 0.05).value();
   std::vector<std::uint8_t> pixels;
   for (std::int32_t island : map.islands) {

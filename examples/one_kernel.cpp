@@ -11,14 +11,14 @@ int main() {
   using gsnav::Vec3d;
 
   // [snippet: sh]
-  // Spherical harmonics of degree 1: the colour of a Gaussian seen along +z.
+  // Spherical harmonics of degree 1 give the colour of a Gaussian seen along +z.
   const Vec3d sh[4] = {{1, 1, 1}, {0, 0, 0}, {0.5, 0, -0.5}, {0, 0, 0}};
   const Vec3d color = gsnav::sh_color(1, Vec3d{0, 0, 1}, [&](int k) { return sh[k]; });
   std::printf("color %.4f %.4f %.4f\n", color.x, color.y, color.z);
   // [/snippet]
 
   // [snippet: sweep]
-  // A capsule sweep: an agent walks 2 m along x toward a pillar.
+  // A capsule sweep finds when an agent, walking 2 m along x, meets a pillar.
   const gsnav::Capsule<double> start{{0, 0.2, 0}, {0, 1.6, 0}, 0.2}, end{{2, 0.2, 0}, {2, 1.6, 0}, 0.2};
   const gsnav::Capsule<double> pillar{{1, 0, 0}, {1, 2, 0}, 0.3};
   const gsnav::MovingCapsule<double> agent{start, end}, obstacle{pillar, pillar};
@@ -27,7 +27,7 @@ int main() {
   // [/snippet]
 
   // [snippet: skin]
-  // Linear blend skinning: two joints share a Gaussian; one of them turns by 90 degrees about z.
+  // Linear blend skinning moves a Gaussian that two joints share; one turns by 90 degrees about z.
   const gsnav::Affine3<double> joints[2] = {
       {}, {gsnav::rotation_matrix(gsnav::axis_angle(Vec3d{0, 0, 1}, 1.5707963267948966)), {}}};
   const gsnav::SkinRow<4> row{{0, 1}, {32768, 32767}, {1, 0, 0}, {1, 0, 0, 0}};

@@ -16,8 +16,8 @@ int main(int argc, char** argv) {
   auto view = gsnav::default_scene_views()[0];
   auto camera = gsnav::Camera::look_at(view.eye, view.target, {0, 1, 0}, 96, 96, 90);
 
-  // Done once per scene: find what is seen from each place at the camera's height. For scenes in files,
-  // gsnav-navmesh --visible-sets does the same.
+  // Done once per scene: find the Gaussians that are seen from each place at the camera's height. For
+  // scenes in files, gsnav-navmesh --visible-sets does the same.
   gsnav::VisibleSettings settings{.cell = 1.0, .margin = 0.5};
   settings.serve(camera);
   const double heights[] = {view.eye.y};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// crowd: four ways through a crowd in the embedded flat, as a table and as pictures.
+// crowd: compares four policies in a crowd, as a table and as images.
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <cstdio>
@@ -19,11 +19,11 @@ using namespace gsnav;
 using gsnav_tools::Canvas;
 using gsnav_tools::Rgb;
 
-constexpr double kPixels = 32;  // a metre
+constexpr double kPixels = 32;  // per metre
 constexpr Rgb kPaper{0.97f, 0.97f, 0.96f}, kFloor{0.86f, 0.88f, 0.90f}, kPeople{0.85f, 0.45f, 0.25f},
     kAgent{0.10f, 0.35f, 0.75f}, kGoal{0.15f, 0.60f, 0.30f}, kInk{0.2f, 0.2f, 0.2f};
 
-/// What one policy did until a tick, from above.
+/// Draws the run of one policy up to a tick, seen from above.
 void draw(Canvas& canvas, const NavMesh& mesh, const crowd::Episode& e, const crowd::Outcome& o,
           std::size_t tick, double x0, double y0) {
   const Vec3d low = mesh.bounds().low;
@@ -51,8 +51,8 @@ Status save(const std::filesystem::path& path, const Canvas& c) {
   return io::save_png_rgb8(path, c.bytes(), c.width(), c.height());
 }
 
-/// Rows are policies in the order of the table, columns times; and a frame a tick with all four side by
-/// side.
+/// Writes a strip with one row per policy and one column per time, and, on request, one frame
+/// per tick with all policies side by side.
 Status pictures(const std::filesystem::path& folder, const NavMesh& mesh, const crowd::Episode& e,
                 const std::vector<crowd::Outcome>& outcomes, bool frames) {
   const Vec3d size = mesh.bounds().high - mesh.bounds().low;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The navigation loop: a scene of Gaussians, people walking in it, an agent that looks and finds its
-// way.
+// nav_loop: an agent with cameras follows its goal among people who walk through a scene of Gaussians.
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
@@ -48,7 +47,7 @@ Status run(const Options& options) {
   std::vector<EpisodeRecord> records;
   Timings& t = setup.timings;
 
-  // Physics first, picture second, so that each is timed alone.
+  // Step without rendering, then render, so that each is timed alone.
   const auto observe = [&]() -> gsnav::Result<gsnav::Observations> {
     const auto from = Clock::now();
     auto obs = sim.observe();
