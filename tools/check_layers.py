@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks that no include points up or sideways (CONTRIBUTING.md, "Layout of the repository"). Examples, tools
-and the report may use public headers and names only: no header under detail/ or src/, and no `detail::`.
+"""Checks that no include points up or sideways (CONTRIBUTING.md, "Layout of the repository"). Examples,
+tools and the report may use public headers and names only: nothing of detail/ or src/, and no `detail::`.
 
 usage: check_layers.py [root]      check a source tree (default: this one)
        check_layers.py --self-test plant violations in a scratch tree and expect to find each

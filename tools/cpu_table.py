@@ -7,10 +7,10 @@
     tools/cpu_table.py --build build/dev --scene flat=flat.ply:cameras.json --baseline NAME=BINARY
 
 A scene is any file that gsnav-convert reads; all renderers get the same PLY. A baseline is a binary or a
-C++ source. It is called as `CAMERAS=cameras.json BINARY SCENE.ply WIDTH HEIGHT THREADS REPEATS` and prints
-`total X ms` (median over views) and `RSS X MB`. Baselines and gsnav take turns for each size. Scenes,
-binaries and float64 references are kept in --cache. Times are medians over all views of the fastest turn;
-errors are those of the worst of four views.
+C++ source. It is called as `CAMERAS=cameras.json BINARY SCENE.ply WIDTH HEIGHT THREADS REPEATS`, and
+prints `total X ms` (median over views) and `RSS X MB`. Baselines and gsnav take turns for each size.
+Scenes, binaries and float64 references are kept in --cache. Times are medians over all views of the
+fastest turn; errors are those of the worst of four views.
 """
 import argparse
 import collections
@@ -301,8 +301,10 @@ def parse_options():
     parser.add_argument("--rounds", type=int, default=2, help="turns of each renderer; the fastest counts")
     parser.add_argument("--quiet", type=float, default=30, metavar="S",
                         help="seconds to wait for an idle machine before each size")
-    parser.add_argument("--cache", type=pathlib.Path, help="folder for scenes, binaries and references (default: BUILD/cpu_table)")
-    parser.add_argument("--out", type=pathlib.Path, help="Markdown file, with JSON next to it (default: CACHE/table.md)")
+    parser.add_argument("--cache", type=pathlib.Path,
+                        help="folder for scenes, binaries and references (default: BUILD/cpu_table)")
+    parser.add_argument("--out", type=pathlib.Path,
+                        help="Markdown file, with JSON next to it (default: CACHE/table.md)")
     parser.add_argument("--page", action="store_true", help="replace the marked block of docs/benchmarks.md")
     options = parser.parse_args()
     options.build = options.build.resolve()

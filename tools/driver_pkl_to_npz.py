@@ -3,10 +3,10 @@
 """Converts the driver.pkl of Habitat-GS to a driver.npz, which gsnav reads.
 
 usage: driver_pkl_to_npz.py driver.pkl driver.npz
-       driver_pkl_to_npz.py --self-test            convert a driver and check that hostile pickles are refused
+       driver_pkl_to_npz.py --self-test            check a conversion and that hostile pickles are refused
 
-A pickle can make its reader call any function. This reader allows only the functions that NumPy needs to
-rebuild arrays and numbers. Strings and numbers become arrays of one element. Nested values are refused.
+A pickle can make its reader call any function. This reader allows only the functions that NumPy needs
+to rebuild arrays and numbers. Strings and numbers become arrays of one element. Nested values are refused.
 """
 import io
 import os

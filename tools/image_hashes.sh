@@ -7,7 +7,7 @@
 #   tools/image_hashes.sh FILE           builds both tests and writes FILE, one line per image
 #   tools/image_hashes.sh FILE BEFORE    does the same, and fails if a line differs from the file BEFORE
 #
-# Run it before and after a change that must keep every bit. The first run takes ten minutes on two cores.
+# Run it before and after a change that must keep every bit. A first run takes ten minutes on two cores.
 #
 # GSNAV_JOBS=N   compile N files at a time (default: see tools/build_jobs.sh)
 set -euo pipefail

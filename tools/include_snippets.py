@@ -1,19 +1,19 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Copies code from compiled sources into Markdown pages, so that a page shows only code that a test has run.
+"""Copies code from compiled sources into Markdown pages, so that pages show only code that tests have run.
 
-A page names the source, and a region of it or none for the whole file, in a comment before a code block:
+A page names the source in a comment before a code block, and optionally a region of it:
 
     <!-- snippet: examples/render_scan.cpp render -->
     ```cpp
     ...
     ```
 
-A C++ source marks a region with `// [snippet: render]` and `// [/snippet]`, each alone on its line; a Python or shell
-source with `# [snippet: render]`. The whole file is shown without its licence line and its markers.
+A C++ source marks a region with the lines `// [snippet: render]` and `// [/snippet]`, a Python or shell
+source with `# [snippet: render]`. Whole files are shown without their licence line and their markers.
 
 usage: include_snippets.py                rewrite the code blocks of README.md and docs/**/*.md
-       include_snippets.py --check        name each block that differs from its source; exit status 1 if any does
+       include_snippets.py --check        name each block that differs; exit status 1 if there is any
        include_snippets.py --self-test    check a scratch tree with known faults and expect to find each
        --root DIR                         a source tree (default: this one)
 """
@@ -64,7 +64,7 @@ def pages(root):
 
 
 def rewritten(root, page):
-    """The page with all code blocks taken from their sources, and lines 'page:line: what differs'."""
+    """Returns the page with all code blocks taken from their sources, and a message for each difference."""
     text, wrong = page.read_text(encoding="utf-8"), []
     name = page.relative_to(root)
 
@@ -91,7 +91,7 @@ def rewritten(root, page):
 
 
 def run(root, check):
-    """Number of blocks, and what is wrong. Without `check` differing blocks are written, and are not wrong."""
+    """Returns the number of blocks and the messages. Without `check` it mends differing blocks."""
     blocks, all_wrong = 0, []
     for page in pages(root):
         text, wrong = rewritten(root, page)
