@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A Gaussian avatar of a rigged mesh. usage: avatar_from_gltf RIGGED.glb [device]
-// Writes avatar.npz and avatar.png.
+// Makes a Gaussian avatar from a rigged mesh and renders it.
+// usage: avatar_from_gltf RIGGED.glb [DEVICE]; writes avatar.npz and avatar.png
 #include <cstdio>
 #include <memory>
 
@@ -9,20 +9,25 @@
 #include "gsnav/rigging.hpp"
 
 int main(int argc, char** argv) try {
-  if (argc < 2) return std::puts("usage: avatar_from_gltf RIGGED.glb [device]"), 2;
+  if (argc < 2) return std::puts("usage: avatar_from_gltf RIGGED.glb [DEVICE]"), 2;
   auto device = gsnav::Device::parse(argc > 2 ? argv[2] : "best").value();
+  // [snippet: make]
   auto file = gsnav::io::load_gltf_skin(argv[1]).value();
   auto made = gsnav::make_mesh_avatar(file.mesh, {.gaussians = 20000}).value();
 
-  // Capsules that hold it as the file shows it: give the poses of a clip for a body that moves.
+  // [/snippet]
+  // [snippet: capsules]
+  // Capsules that cover the body in the pose of the file. Pass the poses of a clip to cover a motion.
   std::vector<gsnav::Affine3<double>> pose;
   gsnav::forward_kinematics(made.asset.skeleton, file.pose, pose);
   auto fit = gsnav::fit_body_capsules(made.asset, {pose}).value();
   gsnav::io::save_avatar("avatar.npz", made.asset).throw_if_error();
+  // [/snippet]
   std::printf("%zu Gaussians, %zu joints, %zu capsules\n", made.asset.cloud.size(),
               made.asset.skeleton.size(), fit.capsules);
 
-  // It stands at the origin, faces -Z and is seen one second into its first clip.
+  // [snippet: render]
+  // The avatar stands at the origin and faces -Z. The image shows it one second into its first clip.
   std::shared_ptr<const gsnav::MotionSource> motion;
   if (!file.clips.empty()) motion = std::make_shared<gsnav::MotionClip>(file.clips[0].clip);
   auto asset = std::make_shared<const gsnav::AvatarAsset>(std::move(made.asset));
@@ -32,6 +37,7 @@ int main(int argc, char** argv) try {
   auto renderer = gsnav::Renderer::create(device, scene).value();
   auto frames = renderer.render({&camera, 1}, 1.0).value();
   gsnav::io::save_png_rgb("avatar.png", frames.rgb, 240, 320).throw_if_error();
+  // [/snippet]
 } catch (const std::exception& e) {
   return std::fprintf(stderr, "%s\n", e.what()), 1;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A backend of your own: six members. Its images have the bits of the serial one.
+// A backend with six members, and a check that its images have the bits of SerialBackend.
+// usage: custom_backend
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -10,7 +11,8 @@
 #include "gsnav/demo.hpp"
 #include "gsnav/scene/basic_renderer.hpp"
 
-/// Four threads, started anew for each region.
+// [snippet: backend]
+/// Runs each parallel region on four new threads.
 struct MyBackend {
   using memory_space = gsnav::HostSpace;
   void* allocate(std::size_t bytes, std::size_t align) {
@@ -30,8 +32,10 @@ struct MyBackend {
   gsnav::Status synchronize() { return {}; }
 };
 static_assert(gsnav::Backend<MyBackend>);
+// [/snippet]
 
 int main() {
+  // [snippet: use]
   const auto scene = gsnav::make_default_scene(0.1).value();
   const auto view = gsnav::default_scene_views()[0];
   const auto camera = gsnav::Camera::look_at(view.eye, view.target, {0, 1, 0}, 160, 120, 90);
@@ -41,6 +45,7 @@ int main() {
   gsnav::BasicRenderer reference(serial);
   const bool same = renderer.render(scene.cloud.set(), camera).value().rgb ==
                     reference.render(scene.cloud.set(), camera).value().rgb;
+  // [/snippet]
   std::puts(same ? "the same bits" : "other bits");
   return same ? 0 : 1;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images that a GPU draws and keeps. usage: on_gpu [device]
+// Renders sixteen environments and leaves their images in the memory of the GPU.
+// usage: on_gpu [DEVICE]
 #include <cstdio>
 #include <memory>
 
@@ -7,14 +8,17 @@
 #include "gsnav/device/simulator.hpp"
 
 int main(int argc, char** argv) {
+  // [snippet: device]
   auto device = gsnav::Device::parse(argc > 1 ? argv[1] : "cuda");
-  if (!device) {  // names the devices of this build on this machine
+  if (!device) {  // the message lists the devices of this build and machine
     std::printf("skipped: %s\n", device.message().c_str());
     return 77;
   }
+  // [/snippet]
   auto scene =
       std::make_shared<const gsnav::SimulatorScene>(gsnav::default_simulator_scene(3, 1, 0.2).value());
   auto episodes = gsnav::generate_episodes(*scene->navmesh, 16, 1).value();
+  // [snippet: batch]
   gsnav::BatchConfig config;
   config.sensors = gsnav::rgbd_sensors(64, 64);
   config.images = gsnav::ImageMemory::backend;
@@ -25,8 +29,9 @@ int main(int argc, char** argv) {
     std::vector<gsnav::Action> actions(sim.environments(), gsnav::Action::turn_left);
     out = sim.step(actions).value();
   }
-  // [16][64][64][3] floats: in GPU memory, for a learner on the same GPU; those of a CPU in rgb.data.
+  // [16][64][64][3] floats: rgb.on_backend points to GPU memory; on a CPU the images are in rgb.data.
   const gsnav::BatchObservation& rgb = out["rgb"];
+  // [/snippet]
   std::printf("%s: %zu images, %s\n", device->description().c_str(), rgb.environments,
               rgb.on_backend != nullptr ? "in the device's memory" : "in host memory");
   return (rgb.on_backend != nullptr) == (device->kind() == gsnav::DeviceKind::cuda) ? 0 : 1;

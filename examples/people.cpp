@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// People who walk through the flat, seen from a corner. usage: people [device]; writes people_0.png, ...
+// Renders eight images of people who walk through the embedded flat.
+// usage: people [DEVICE]; writes people_0.png to people_7.png
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -9,13 +10,14 @@
 #include "gsnav/io.hpp"
 
 int main(int argc, char** argv) {
+  // [snippet: people]
   auto device = gsnav::Device::parse(argc > 1 ? argv[1] : "best").value();
   auto scene =
       std::make_shared<const gsnav::SimulatorScene>(gsnav::default_simulator_scene(5, 1, 0.2).value());
   auto view = gsnav::default_scene_views()[0];
   auto camera = gsnav::Camera::look_at(view.eye, view.target, {0, 1, 0}, 320, 240, 90);
   auto renderer = gsnav::Renderer::create(device, scene).value();
-  gsnav::Frames<float> frames;  // its memory is used again
+  gsnav::Frames<float> frames;  // reused, so that later frames allocate nothing
   for (int k = 0; k < 8; ++k) {
     const double time = 0.5 * k;  // seconds on the scene's clock
     renderer.render({&camera, 1}, frames, time).throw_if_error();
@@ -27,4 +29,5 @@ int main(int argc, char** argv) {
     }
     std::printf("\n");
   }
+  // [/snippet]
 }

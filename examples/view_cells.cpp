@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Draws only what can be seen from where an agent is. usage: view_cells [device]
+// Renders only the Gaussians that can be seen from the camera's cell, and measures the difference.
+// usage: view_cells [DEVICE]
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -15,7 +16,8 @@ int main(int argc, char** argv) {
   auto view = gsnav::default_scene_views()[0];
   auto camera = gsnav::Camera::look_at(view.eye, view.target, {0, 1, 0}, 96, 96, 90);
 
-  // Once a scene: look around from everywhere at the camera's height. gsnav-navmesh does it for files.
+  // Done once per scene: find the Gaussians that are seen from each place at the camera's height. For
+  // scenes in files, gsnav-navmesh --visible-sets does the same.
   gsnav::VisibleSettings settings{.cell = 1.0, .margin = 0.5};
   settings.serve(camera);
   const double heights[] = {view.eye.y};

@@ -1,8 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks that no include points up or sideways, and that examples, tools and the report use public headers and names
-alone (docs/architecture.md, "Layers"): no header under detail/, src/ or a backend's src/, by whichever path, and no
-`detail::`.
+"""Checks that no include points up or sideways (CONTRIBUTING.md, "Layout of the repository"). Examples,
+tools and the report may use public headers and names only: nothing of detail/ or src/, and no `detail::`.
 
 usage: check_layers.py [root]      check a source tree (default: this one)
        check_layers.py --self-test plant violations in a scratch tree and expect to find each

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks that no source file has more than 350 lines and no function or macro more than 80. In tests/ a file has at
-most 650 lines, and a TEST_CASE, which is read from top to bottom and called by nobody, at most 120.
+"""Checks sizes of sources: at most 350 lines per file and 80 per function or macro. In tests/ a file has
+at most 650 lines and a TEST_CASE at most 120.
 
 usage: check_sizes.py              check this source tree
        check_sizes.py --self-test  check that long functions are found

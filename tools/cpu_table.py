@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Makes the README's table of CPU renderers: gsnav and the baselines, timed in one run, with error and memory.
+"""Makes the table of CPU renderers in docs/benchmarks.md: time, error and memory of gsnav and baselines.
 
-    tools/cpu_table.py --build build/dev            # what there is beside the data: flats, LaCadiere, two baselines
-    tools/cpu_table.py --build build/dev --readme   # and puts it into README.md
+    tools/cpu_table.py --build build/dev            # scenes and baselines next to GSNAV_DATA_DIR
+    tools/cpu_table.py --build build/dev --page     # writes the table into docs/benchmarks.md
     tools/cpu_table.py --build build/dev --scene flat=flat.ply:cameras.json --baseline NAME=BINARY
 
-A scene is what gsnav-convert reads; all renderers get the same PLY. A baseline is a binary, or a C++ source that is
-compiled, called as `CAMERAS=cameras.json BINARY SCENE.ply WIDTH HEIGHT THREADS REPEATS`, which prints `total X ms` (a
-median over views) and `RSS X MB`. Baselines and gsnav take turns, size by size. Scenes, binaries and float64
-references stay in --cache. Times are medians over all views, of the fastest of the turns; errors the worst of
-four views.
+A scene is any file that gsnav-convert reads; all renderers get the same PLY. A baseline is a binary or a
+C++ source. It is called as `CAMERAS=cameras.json BINARY SCENE.ply WIDTH HEIGHT THREADS REPEATS`, and
+prints `total X ms` (median over views) and `RSS X MB`. Baselines and gsnav take turns for each size.
+Scenes, binaries and float64 references are kept in --cache. Times are medians over all views of the
+fastest turn; errors are those of the worst of four views.
 """
 import argparse
 import collections
@@ -277,13 +277,13 @@ def summary(rows, threads, baselines):
     return "\n".join(lines)
 
 
-def put_into_readme(text):
-    readme = ROOT / "README.md"
-    old = readme.read_text()
+def put_into_page(text):
+    page = ROOT / "docs/benchmarks.md"
+    old = page.read_text()
     if old.count(MARKS[0]) != 1 or old.count(MARKS[1]) != 1:
-        stop(f"README.md lacks the lines {MARKS[0]} and {MARKS[1]}")
+        stop(f"docs/benchmarks.md lacks the lines {MARKS[0]} and {MARKS[1]}")
     head, rest = old.split(MARKS[0])
-    readme.write_text(head + MARKS[0] + "\n" + text + "\n" + MARKS[1] + rest.split(MARKS[1])[1])
+    page.write_text(head + MARKS[0] + "\n" + text + "\n" + MARKS[1] + rest.split(MARKS[1])[1])
 
 
 def parse_options():
@@ -293,17 +293,19 @@ def parse_options():
     parser.add_argument("--scene", action="append", default=[], metavar="NAME=PATH:CAMERAS.json")
     parser.add_argument("--only", default="", metavar="TEXT", help="only scenes with this in their name")
     parser.add_argument("--baseline", action="append", default=[], metavar="NAME=BINARY",
-                        help="or NAME=SOURCE.cpp")
+                        help="baseline; NAME=SOURCE.cpp compiles it")
     parser.add_argument("--no-baselines", action="store_true")
-    parser.add_argument("--sizes", default="256x256,640x480,1920x1080", help="of those that bench_render has")
-    parser.add_argument("--threads", default="1,2", help="of those that bench_render has")
-    parser.add_argument("--repeats", type=int, default=1, help="frames of each view")
-    parser.add_argument("--rounds", type=int, default=2, help="turns of all renderers, of which the fastest count")
+    parser.add_argument("--sizes", default="256x256,640x480,1920x1080", help="sizes that bench_render has")
+    parser.add_argument("--threads", default="1,2", help="thread counts that bench_render has")
+    parser.add_argument("--repeats", type=int, default=1, help="frames per view")
+    parser.add_argument("--rounds", type=int, default=2, help="turns of each renderer; the fastest counts")
     parser.add_argument("--quiet", type=float, default=30, metavar="S",
-                        help="wait so long, size by size, for other programs to end")
-    parser.add_argument("--cache", type=pathlib.Path, help="default: BUILD/cpu_table")
-    parser.add_argument("--out", type=pathlib.Path, help="Markdown file; JSON beside it; default: CACHE/table.md")
-    parser.add_argument("--readme", action="store_true", help="replace the marked block of README.md")
+                        help="seconds to wait for an idle machine before each size")
+    parser.add_argument("--cache", type=pathlib.Path,
+                        help="folder for scenes, binaries and references (default: BUILD/cpu_table)")
+    parser.add_argument("--out", type=pathlib.Path,
+                        help="Markdown file, with JSON next to it (default: CACHE/table.md)")
+    parser.add_argument("--page", action="store_true", help="replace the marked block of docs/benchmarks.md")
     options = parser.parse_args()
     options.build = options.build.resolve()
     if not (options.build / "CMakeCache.txt").exists():
@@ -333,8 +335,8 @@ def main():
     options.out.write_text(text + "\n")
     options.out.with_suffix(".json").write_text(json.dumps(rows, indent=1) + "\n")
     print(text + "\n\n" + summary(rows, options.threads, names))
-    if options.readme:
-        put_into_readme(text)
+    if options.page:
+        put_into_page(text)
 
 
 if __name__ == "__main__":

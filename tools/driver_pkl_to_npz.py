@@ -1,13 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Turns Habitat-GS's driver.pkl into the driver.npz that gsnav reads.
+"""Converts the driver.pkl of Habitat-GS to a driver.npz, which gsnav reads.
 
 usage: driver_pkl_to_npz.py driver.pkl driver.npz
-       driver_pkl_to_npz.py --self-test            convert a driver, expect hostile pickles to be refused
+       driver_pkl_to_npz.py --self-test            check a conversion and that hostile pickles are refused
 
-A pickle can name any function for its reader to call. This one admits what NumPy needs to rebuild arrays
-and numbers; everything else in a pickle is dict, list, tuple, str, bytes, bool, int, float or None, which
-need no names. Strings and numbers become arrays of one element, nested values are refused.
+A pickle can make its reader call any function. This reader allows only the functions that NumPy needs
+to rebuild arrays and numbers. Strings and numbers become arrays of one element. Nested values are refused.
 """
 import io
 import os
@@ -30,7 +29,7 @@ def latin1(text, encoding):
 
 
 def allowed():
-    """Names a pickle may ask for: {(module, name): object}."""
+    """Functions that a pickle may call, by (module, name)."""
     arrays = numpy.empty(0)
     rebuild = arrays.__reduce__()[0]  # where it lives differs between versions of NumPy
     scalar = numpy.float64(0).__reduce__()[0]

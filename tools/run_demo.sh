@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# Installs what is missing, builds and runs the navigation loop example. All arguments go to it:
+# Installs missing packages, then builds and runs the example nav_loop. All arguments go to it:
 #   tools/run_demo.sh --help
-# The GPU's code is compiled where --device cuda or cuda:NUMBER asks for it, and for the GPU that is here.
+# With --device cuda or cuda:NUMBER, code for the GPU of this machine is compiled too.
 #
 # GSNAV_NO_APT=1   never call apt-get
-# GSNAV_JOBS=N     compile N files at a time (default: one per processor, no more than memory carries)
+# GSNAV_JOBS=N     compile N files at a time (default: see tools/build_jobs.sh)
 # GSNAV_PRESET     configure preset (default: demo)
 set -euo pipefail
 
@@ -15,7 +15,7 @@ preset=${GSNAV_PRESET:-demo}
 build=$root/build/$preset
 help=$root/examples/nav_loop/help.txt  # what nav_loop --help prints; a test compares them
 
-# What can be answered is answered before anything is built.
+# Answer --help and unknown options before anything is built.
 device=
 previous=
 for argument in "$@"; do
@@ -45,7 +45,7 @@ if [[ $device == cuda* ]]; then
   fi
   cuda=ON
 elif grep -qs '^GSNAV_CUDA:STRING=ON' "$build/CMakeCache.txt"; then
-  cuda=ON  # what was built for an earlier run is kept
+  cuda=ON  # keep the CUDA build of an earlier run
 fi
 
 "$root/tools/install_deps.sh" demo >&2

@@ -1,19 +1,18 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# Installs what is missing, builds everything and runs all tests. Arguments go to ctest:
+# Installs missing packages, builds everything and runs all tests. Arguments go to ctest:
 #   tools/run_tests.sh [--cuda] [-R render ...]
-# The last lines are ctest's, its exit status is the script's. The GPU's code is compiled where there is a GPU, for that
-# GPU, and where --cuda asks for it; then, without a GPU, for the oldest one.
+# The exit status is that of ctest. Code for GPUs is compiled if there is a GPU (for that GPU), or with
+# --cuda (without a GPU, for the oldest architecture). ccache is used if it is installed.
 #
 # GSNAV_NO_APT=1      never call apt-get
-# GSNAV_DEPS          set of packages: demo, tests, ci (default: what the preset needs); see tools/install_deps.sh
+# GSNAV_DEPS          set of packages: demo, tests or ci (default: by preset); see tools/install_deps.sh
 # GSNAV_PRESET        configure preset (default: tests, which compiles fastest)
-# GSNAV_CUDA          AUTO: where nvcc is found; ON: as --cuda; OFF: not even where there is a GPU
+# GSNAV_CUDA          AUTO (if nvcc is found), ON (as --cuda) or OFF
 # GSNAV_JOBS=N        compile N files and run N tests at a time (default: see tools/build_jobs.sh)
-# GSNAV_WERROR=ON     warnings are errors (default: as the preset says)
-# GSNAV_DATA_DIR=DIR  folder of real scenes; tests that want them skip where it is absent
-# ccache is used where it is there.
+# GSNAV_WERROR=ON     treat warnings as errors (default: as in the preset)
+# GSNAV_DATA_DIR=DIR  folder of real scenes; tests that need them are skipped without it
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)

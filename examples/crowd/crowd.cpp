@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kTicks = static_cast<std::size_t>((kLimit + kHorizon) / kTick);
 constexpr SnapOptions kSnap{{0.5, 1.0, 0.5}};
 
-/// A point of a polyline, `length` metres from its begin.
+/// Point of a polyline that is `length` metres from its first point.
 Vec3d along(const std::vector<Vec3d>& points, double length) {
   for (std::size_t i = 1; i < points.size(); ++i) {
     const double leg = norm(points[i] - points[i - 1]);
@@ -42,7 +42,7 @@ Person walker(const NavMesh& mesh, Rng& rng) {
   return out;
 }
 
-/// Trunk, head, legs and arms that swing; upright and as tall as a grown-up.
+/// Capsules of an upright adult: trunk, head, and legs and arms that swing.
 void add_body(const Person& p, std::size_t tick, std::uint32_t id, std::vector<DynamicCapsule>& out) {
   const auto pose = [&](std::size_t k) {
     const Vec3d at = p.at[k], next = p.at[std::min(k + 1, p.at.size() - 1)], way = next - at;
@@ -75,7 +75,7 @@ class Agent {
   const AgentState& state() const { return state_; }
   double left() const { return field_[0].distance({state_.position, state_.poly}); }
 
-  /// Acts during a tick.
+  /// Moves the agent during one tick.
   StepResult act(std::size_t tick, double& slowest) {
     const CapsuleSet& now = episode_.ticks[tick];
     Vec3d displacement = towards_goal() * (kSpeed * kTick);
@@ -96,7 +96,7 @@ class Agent {
   }
 
  private:
-  /// The direction of the shortest path, as long as the agent may go in a tick, in ticks.
+  /// Displacement for one tick along the shortest path, in units of the agent's largest step.
   Vec3d towards_goal() const {
     const auto path = mesh_.path_between({state_.position, state_.poly},
                                          *mesh_.snap_point(episode_.goal.position, kSnap));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// crowd: four ways through a crowd in the embedded flat, as a table and as pictures.
+// crowd: compares four policies in a crowd, as a table and as images.
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <cstdio>
@@ -19,11 +19,11 @@ using namespace gsnav;
 using gsnav_tools::Canvas;
 using gsnav_tools::Rgb;
 
-constexpr double kPixels = 32;  // a metre
+constexpr double kPixels = 32;  // per metre
 constexpr Rgb kPaper{0.97f, 0.97f, 0.96f}, kFloor{0.86f, 0.88f, 0.90f}, kPeople{0.85f, 0.45f, 0.25f},
     kAgent{0.10f, 0.35f, 0.75f}, kGoal{0.15f, 0.60f, 0.30f}, kInk{0.2f, 0.2f, 0.2f};
 
-/// What one policy did until a tick, from above.
+/// Draws the run of one policy up to a tick, seen from above.
 void draw(Canvas& canvas, const NavMesh& mesh, const crowd::Episode& e, const crowd::Outcome& o,
           std::size_t tick, double x0, double y0) {
   const Vec3d low = mesh.bounds().low;
@@ -51,8 +51,8 @@ Status save(const std::filesystem::path& path, const Canvas& c) {
   return io::save_png_rgb8(path, c.bytes(), c.width(), c.height());
 }
 
-/// Rows are policies in the order of the table, columns times; and a frame a tick with all four side by
-/// side.
+/// Writes a strip with one row per policy and one column per time, and, on request, one frame
+/// per tick with all policies side by side.
 Status pictures(const std::filesystem::path& folder, const NavMesh& mesh, const crowd::Episode& e,
                 const std::vector<crowd::Outcome>& outcomes, bool frames) {
   const Vec3d size = mesh.bounds().high - mesh.bounds().low;
@@ -91,29 +91,27 @@ Status pictures(const std::filesystem::path& folder, const NavMesh& mesh, const 
 
 int main(int argc, char** argv) {
   CLI::App app{
-      "Four ways through a crowd in the embedded flat: the shortest path through everybody, the same by "
-      "the step "
-      "filter, the local planner, the planner in time. A table on standard output; with --out a strip "
-      "of "
-      "pictures of the first episode among ten people (rows: the four ways, columns: seconds), with "
-      "--frames a "
-      "picture for each quarter of a second, for a video."};
+      "Compares four policies in a crowd in the embedded flat: shortest path, step filter, local "
+      "planner and\nplanner in time. Prints a table.\nWith --out it draws the first episode among ten "
+      "people (rows: policies; columns: seconds). With --frames it\nalso draws each quarter of a "
+      "second, for a video."};
   int episodes = 50;
   std::vector<int> people{10, 30, 100};
   std::string out;
   bool frames = false;
   std::uint64_t seed = 1000000;
-  app.add_option("--episodes", episodes, "For each number of people")
+  app.add_option("--episodes", episodes, "number of episodes for each number of people")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option("--people", people, "How many walk there")
+  app.add_option("--people", people, "numbers of people to try")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  app.add_option("--seed", seed,
-                 "Of the first episode; the local planner's weights were chosen on those from 0")
+  app.add_option(
+         "--seed", seed,
+         "seed of the first episode; the weights of the local planner were chosen on seeds from 0")
       ->capture_default_str();
-  app.add_option("--out", out, "Folder for the pictures");
-  app.add_flag("--frames", frames, "A picture for each tick, too");
+  app.add_option("--out", out, "folder for the images");
+  app.add_flag("--frames", frames, "also write an image of each tick");
   if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
   if (const Status s = out.empty() ? Status() : make_output_folder(out); !s) {
     std::fprintf(stderr, "crowd: --out %s\n", s.message().c_str());

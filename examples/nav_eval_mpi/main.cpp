@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// An evaluation over ranks: mpirun -n 4 nav_eval_mpi --episodes 100. Episodes are scattered, each is
-// journalled to disk as it ends, metrics are gathered in the order of episodes: the same numbers for any
-// number of ranks. Started again, with any number of them, it plays what is missing.
+// An evaluation on several MPI ranks: mpirun -n 4 nav_eval_mpi --episodes 100.
+// Each rank plays some of the episodes and writes each to its journal when it ends. The metrics are the
+// same for any number of ranks. Run again, with any number of ranks, it plays the missing episodes.
 #include <mpi.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ namespace {
 
 using gsnav::Status;
 
-/// MPI for as long as it lives.
+/// Initialises MPI, and finalises it on destruction.
 struct Ranks {
   Ranks(int* argc, char*** argv) {
     MPI_Init(argc, argv);
@@ -37,7 +37,7 @@ struct Ranks {
   Ranks(const Ranks&) = delete;
   Ranks& operator=(const Ranks&) = delete;
 
-  /// The first rank's numbers, everywhere.
+  /// Returns the numbers of rank 0 on all ranks.
   void share(std::vector<unsigned long>& numbers) const {
     unsigned long n = numbers.size();
     MPI_Bcast(&n, 1, MPI_UNSIGNED_LONG, 0, MPI_COMM_WORLD);
@@ -45,7 +45,7 @@ struct Ranks {
     MPI_Bcast(numbers.data(), static_cast<int>(n), MPI_UNSIGNED_LONG, 0, MPI_COMM_WORLD);
   }
 
-  /// All ranks' text, in their order, at the first.
+  /// Returns the texts of all ranks, in rank order, on rank 0.
   std::string gather(const std::string& own) const {
     const int size = static_cast<int>(own.size());
     std::vector<int> sizes(static_cast<std::size_t>(count)), at(static_cast<std::size_t>(count));
@@ -57,12 +57,12 @@ struct Ranks {
     return all;
   }
 
-  int rank = 0, count = 1, on_node = 0;  // the last: among those of one machine
+  int rank = 0, count = 1, on_node = 0;  // on_node: rank among the ranks of this machine
 };
 
 using Look = std::function<Status(const gsnav::World&)>;
 
-/// What a rank draws on. Ranks of one machine take its GPUs in turn, from the one that --device names.
+/// Device of this rank. The ranks of a machine take its GPUs in turn, starting at that of --device.
 gsnav::Result<gsnav::Device> device_of(const Ranks& ranks, const gsnav::Device& named) {
   if (named.kind() != gsnav::DeviceKind::cuda) return named;
   const auto gpus = std::ranges::count_if(gsnav::Device::available(),
@@ -70,8 +70,8 @@ gsnav::Result<gsnav::Device> device_of(const Ranks& ranks, const gsnav::Device& 
   return gsnav::Device::parse("cuda:" + std::to_string((named.index() + ranks.on_node) % gpus));
 }
 
-/// Draws the agent's sensors, as for a policy that looks. The policies here do not: the numbers are the
-/// same.
+/// Renders the agent's sensors at each step, as a policy that uses images would need. The policies here
+/// do not use them, so the metrics stay the same.
 gsnav::Result<Look> looker(const Ranks& ranks, const gsnav_eval::Options& o,
                            const gsnav_eval::Stage& stage, bool draw) {
   if (!draw) return Look{};
@@ -141,11 +141,10 @@ int main(int argc, char** argv) {
   const Ranks ranks(&argc, &argv);
   gsnav_eval::Options o;
   bool draw = false;
-  CLI::App app{
-      "Evaluates a policy over MPI ranks, to the journal of gsnav-eval, which makes the page of it."};
+  CLI::App app{"Evaluates a policy on several MPI ranks and writes the journal of gsnav-eval."};
   gsnav_eval::add_world_options(app, o);
   app.add_flag("--draw", draw,
-               "draw what the agent sees at each step; ranks of a machine take its GPUs in turn");
+               "draw what the agent sees at each step; the ranks of a machine share its GPUs");
   CLI11_PARSE(app, argc, argv);
   Status s;
   try {
@@ -155,6 +154,6 @@ int main(int argc, char** argv) {
   }
   if (s) return 0;
   std::fprintf(stderr, "nav_eval_mpi, rank %d: %s\n", ranks.rank, s.message().c_str());
-  MPI_Abort(MPI_COMM_WORLD, 1);  // the others wait for what this one will not send
+  MPI_Abort(MPI_COMM_WORLD, 1);  // otherwise the other ranks wait for messages of this one
   return 1;
 }

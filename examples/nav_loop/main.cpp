@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The navigation loop: a scene of Gaussians, people walking in it, an agent that looks and finds its
-// way.
+// nav_loop: an agent with cameras follows its goal among people who walk through a scene of Gaussians.
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
@@ -48,7 +47,7 @@ Status run(const Options& options) {
   std::vector<EpisodeRecord> records;
   Timings& t = setup.timings;
 
-  // Physics first, picture second, so that each is timed alone.
+  // Step without rendering, then render, so that each is timed alone.
   const auto observe = [&]() -> gsnav::Result<gsnav::Observations> {
     const auto from = Clock::now();
     auto obs = sim.observe();
@@ -101,14 +100,13 @@ Status run(const Options& options) {
 int main(int argc, char** argv) try {
   nav_loop::Options o;
   CLI::App app{
-      "Runs PointNav episodes in a scene of Gaussians with people walking in it, and writes frames, a "
-      "strip, a\n"
-      "map, metrics.json and timings.json. Without arguments: an embedded furnished flat with three "
-      "people."};
-  app.add_option("--episodes", o.episodes, "episodes to run")
+      "Runs PointNav episodes among people who walk through a scene of 3D Gaussians.\nWrites images, a "
+      "strip and a map of one episode, metrics.json and timings.json.\nWithout options: ten episodes in "
+      "the embedded flat, with three people."};
+  app.add_option("--episodes", o.episodes, "number of episodes")
       ->capture_default_str()
       ->check(CLI::Range(1, 100000));
-  app.add_option("--out", o.out, "folder for everything written; made where missing")
+  app.add_option("--out", o.out, "folder for everything that is written; made if it does not exist")
       ->capture_default_str();
   app.add_option("--width", o.width, "image width, pixels")
       ->capture_default_str()
@@ -119,17 +117,17 @@ int main(int argc, char** argv) try {
   app.add_option("--hfov", o.hfov, "horizontal field of view, degrees")
       ->capture_default_str()
       ->check(CLI::Range(10.0, 170.0));
-  app.add_option("--eye-height", o.eye_height, "camera above the floor, metres")
+  app.add_option("--eye-height", o.eye_height, "height of the camera above the floor, metres")
       ->capture_default_str()
       ->check(CLI::Range(0.05, 3.0));
-  app.add_option("--frames-every", o.frame_every, "write every k-th RGB and depth frame, 0: none")
+  app.add_option("--frames-every", o.frame_every, "write every Nth RGB and depth frame; 0 writes none")
       ->capture_default_str()
       ->check(CLI::Range(0, 100000));
   app.add_option("--show", o.shown_episode,
-                 "episode of strip.png and map.png, from 0; -1: the one that met people most closely")
+                 "episode of strip.png and map.png, from 0; -1 takes the one with the closest encounter")
       ->capture_default_str()
       ->check(CLI::Range(-1, 100000));
-  app.add_option("--max-steps", o.max_steps, "actions after which an episode is cut off")
+  app.add_option("--max-steps", o.max_steps, "number of actions after which an episode ends")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000000));
   gsnav_tools::add_scene_options(app, o);

@@ -7,15 +7,15 @@
 
 namespace nav_loop {
 
-/// What the command line asks for.
+/// Options of the command line.
 struct Options : gsnav_tools::SceneOptions {
   int episodes = 10;
   std::string out = "out";
   int width = 256, height = 256;
   double hfov = 90.0;
   double eye_height = 1.5;
-  int frame_every = 10;    ///< 0: no frames
-  int shown_episode = -1;  ///< of strip and map; -1: the one that met people most closely
+  int frame_every = 10;    ///< write every Nth frame; 0 writes none
+  int shown_episode = -1;  ///< episode of strip and map; -1: closest encounter
   int max_steps = 500;
 };
 

@@ -14,7 +14,7 @@ using gsnav_tools::Canvas;
 using gsnav_tools::MapContent;
 using gsnav_tools::Shot;
 
-constexpr std::size_t kMostShots = 64;  // kept in memory for the strip
+constexpr std::size_t kMostShots = 64;  // frames kept in memory for the strip
 
 }  // namespace
 
@@ -67,7 +67,7 @@ gsnav::Status Recorder::add(const gsnav::World& world, const gsnav::Observations
   if (keep) {
     std::vector<Shot>& shots = current_.shots;
     shots.push_back(std::move(shot));
-    if (shots.size() > kMostShots) {  // long episodes are kept at half the rate
+    if (shots.size() > kMostShots) {  // drop every second frame of long episodes
       for (std::size_t i = 1; 2 * i < shots.size(); ++i) shots[i] = std::move(shots[2 * i]);
       shots.resize((shots.size() + 1) / 2);
       stride_ *= 2;

@@ -12,16 +12,16 @@
 
 namespace nav_loop {
 
-/// Writes the pictures of a run: sampled frames, and of one episode a strip and a map.
+/// Writes images of a run: sampled frames, and a strip and a map of one episode.
 class Recorder {
  public:
   explicit Recorder(const Options& options) : options_(options) {}
 
-  /// Makes the folders. Errors: file_not_found naming the folder.
+  /// Makes the folders. Errors: file_not_found, with the folder.
   gsnav::Status open();
   void begin(const gsnav::World& world, int episode);
   gsnav::Status add(const gsnav::World& world, const gsnav::Observations& obs);
-  /// Keeps the episode that ended if it is the one to show so far.
+  /// Ends an episode, and keeps it if it is the best candidate for strip and map so far.
   void end(const gsnav::World& world, const std::vector<gsnav::AvatarActor>& avatars);
   /// Writes strip.png and map.png.
   gsnav::Status finish(const gsnav::SimulatorScene& scene);

@@ -10,20 +10,20 @@
 
 namespace nav_loop {
 
-/// Wall-clock seconds of the parts of a run.
+/// Wall-clock time of the parts of a run, seconds.
 struct Timings {
   double load = 0, navmesh = 0;                ///< once
   double physics = 0, render = 0, policy = 0;  ///< summed over steps
   std::size_t steps = 0, renders = 0;
 };
 
-/// What the report says about where the run took place.
+/// Facts about the scene for the report.
 struct SceneFacts {
   std::string name;
   std::string navmesh_source;
   std::size_t gaussians = 0, avatars = 0, avatar_gaussians = 0;
   std::size_t navmesh_polygons = 0, islands = 0;
-  double area = 0, island_area = 0;  ///< square metres: all, and the largest island
+  double area = 0, island_area = 0;  ///< walkable area: all islands, and the largest; square metres
 };
 
 struct EpisodeRecord {
@@ -32,7 +32,7 @@ struct EpisodeRecord {
   bool pushed = false;  ///< an avatar walked into the agent
 };
 
-/// Shows how far the run is: one line that is rewritten on a terminal, one line an episode elsewhere.
+/// Prints progress: one line that is rewritten on a terminal, else one line per episode.
 class Progress {
  public:
   explicit Progress(int episodes);
@@ -47,11 +47,11 @@ class Progress {
 void print_table(const Options& options, const SceneFacts& facts,
                  const std::vector<EpisodeRecord>& records, const Timings& timings);
 
-/// Writes metrics.json: equal bytes for equal runs, on any number of threads. Errors: file_not_found
-/// naming the path.
+/// Writes metrics.json. Equal runs write equal bytes, on any number of threads. Errors: file_not_found,
+/// with the path.
 gsnav::Status write_json(const std::string& path, const Options& options, const SceneFacts& facts,
                          const std::vector<EpisodeRecord>& records);
-/// Writes timings.json: the device, seconds and milliseconds of this run. Errors likewise.
+/// Writes timings.json: the device, and the times of this run. Errors: as write_json.
 gsnav::Status write_timings(const std::string& path, const gsnav::Device& device,
                             const Timings& timings);
 

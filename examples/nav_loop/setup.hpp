@@ -9,7 +9,7 @@
 
 namespace nav_loop {
 
-/// Everything that a run needs before the first episode.
+/// Everything that a run needs before its first episode.
 struct Setup {
   std::shared_ptr<const gsnav::SimulatorScene> scene;
   gsnav::DetailChoice detail;
@@ -17,13 +17,13 @@ struct Setup {
   Timings timings;
 };
 
-/// The agent's cameras.
+/// RGB and depth camera of the agent.
 std::vector<gsnav::SensorSpec> sensors_of(const Options& options);
 
-/// Opens the scene, with a NavMesh and people on their ways. Errors name the file or option.
+/// Opens the scene with its NavMesh and its people. Errors name the file or the option.
 gsnav::Result<Setup> prepare(const Options& options);
 
-/// Episodes that begin at a moment when no avatar is within 0.6 m of the start.
+/// Generates episodes that start at a time when no avatar is within 0.6 m of the start position.
 gsnav::Result<std::vector<gsnav::PointNavEpisode>> make_episodes(const Options& options,
                                                                  const gsnav::SimulatorScene& scene,
                                                                  const gsnav::TaskConfig& task);

@@ -172,7 +172,7 @@ TEST_CASE("avatar tool: somebody walks around a wall") {
             .says("walls another 0.25 m"));
 
   CHECK(run(folder, common + " --from 1,0,2 --to 30,0,8").says("floor.navmesh"));
-  CHECK(run(folder, common + " --from 1,0 --to 3,0,8").says("'1,0' is no point"));
+  CHECK(run(folder, common + " --from 1,0 --to 3,0,8").says("'1,0' is not a point"));
   CHECK(run(folder, common + " --from 1,0,2 --to 3,0,8 --first-key 50 --keys 20").says("no cycle"));
   CHECK(run(folder,
             "walk --avatar none.npz --navmesh none --clip none.bvh --from 0,0,0 --to 1,0,0 --out x.npz")

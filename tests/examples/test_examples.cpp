@@ -9,6 +9,7 @@
 
 #include "gsnav/demo.hpp"
 #include "gsnav/io.hpp"
+#include "gsnav/nav.hpp"
 #include "io/gltf_builder.hpp"
 #include "support/command.hpp"
 #include "support/files.hpp"
@@ -89,6 +90,41 @@ TEST_CASE("render_scan: a scan becomes an image and a depth map") {
   CHECK_FALSE(missing.ok);
   CHECK(missing.says("no_such.ply"));
   CHECK(run_command(EXAMPLE_RENDER_SCAN, "flat.ply gpu", folder.path()).says("serial"));
+}
+
+TEST_CASE("navmesh_from_scan: area, path and map agree with the triangles of the same flat") {
+  const TempFolder folder("example_navmesh_from_scan");
+  const DefaultScene flat = make_default_scene(0.3).value();
+  io::save_scene(folder / "flat.ply", flat.cloud).throw_if_error();
+  const Outcome made = run_command(EXAMPLE_NAVMESH_FROM_SCAN, "flat.ply", folder.path());
+  INFO(made.text);
+  REQUIRE(made.ok);
+  NavMeshSettings settings = gaussian_navmesh_settings();
+  settings.agent_radius = 0.2;
+  const NavMesh truth = NavMesh::build(settings, flat.vertices, flat.triangles).value();
+  const NavMesh mesh = load_navmesh(folder / "scan.navmesh").value();
+  CHECK(mesh.settings().agent_radius == doctest::Approx(0.2));
+  CHECK(mesh.island_area(0) == doctest::Approx(truth.island_area(0)).epsilon(0.1));
+
+  // No path is shorter than the straight line, or than the shortest path in the rooms themselves by more
+  // than the cells that the two NavMeshes may differ by at each corner.
+  std::vector<Vec3d> points;
+  double length = 0;
+  for (std::size_t at = made.text.find('('); at != std::string::npos; at = made.text.find('(', at + 1)) {
+    Vec3d p;
+    REQUIRE(std::sscanf(made.text.c_str() + at, "(%lf, %lf, %lf)", &p.x, &p.y, &p.z) == 3);
+    points.push_back(p);
+  }
+  REQUIRE(points.size() >= 2);
+  REQUIRE(std::sscanf(made.text.c_str() + made.text.find("length"), "length %lf", &length) == 1);
+  CHECK(length >= norm(points.back() - points.front()) - 0.01);
+  CHECK(length == doctest::Approx(truth.geodesic_distance(points.front(), points.back())).epsilon(0.1));
+
+  // A white pixel is a cell of 0.05 m of the largest island.
+  const auto map = io::load_png(folder / "map.png").value();
+  std::size_t white = 0;
+  for (std::size_t i = 0; i < map.samples.size(); i += 3) white += map.samples[i] == 255 ? 1 : 0;
+  CHECK(static_cast<double>(white) * 0.05 * 0.05 == doctest::Approx(mesh.island_area(0)).epsilon(0.02));
 }
 
 TEST_CASE("one_kernel: numbers of closed forms") {

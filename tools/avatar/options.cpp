@@ -12,10 +12,9 @@ namespace gsnav_avatar {
 namespace {
 
 const char kDescription[] =
-    "Makes Gaussian avatars from rigged meshes, lets them walk and draws them. Lengths in metres, Y up. "
-    "Exit status: 0, or 1 with "
-    "one "
-    "line that says what is wrong.";
+    "Makes Gaussian avatars from rigged meshes, plans their walks and draws them.\nLengths are metres, "
+    "Y points up.\nExit status: 0 success; 1 failure, with a message on one line; 2 invalid "
+    "options.\nExample: gsnav-avatar from-gltf human.glb --clip Walk --out human.npz --driver walk.npz";
 
 bool parse_point(const std::string& text, gsnav::Vec3d& out) {
   const char *at = text.data(), *end = text.data() + text.size();
@@ -40,42 +39,43 @@ bool parse_target(const std::string& text, std::pair<std::string, double>& out) 
 void add_clip(CLI::App& app, ClipSource& c) {
   app.add_option(
       "--clip", c.clip,
-      "Motion: a .bvh, .amc, .glb or .gltf file (FILE:NAME for one of its clips; joints are found by "
-      "the names of "
-      "nodes where it has no skin) or a driver's .npz; or the name of a clip of INPUT itself");
-  app.add_option("--asf", c.asf, "Skeleton of an .amc");
-  app.add_option("--clip-scale", c.scale,
-                 "Metres a unit of the clip's file; 0: what the .asf says, for glTF --scale, else 1")
+      "motion: a .bvh, .amc, .glb, .gltf or driver (.npz) file, FILE:NAME for one clip of a glTF file, "
+      "or the name of a clip of INPUT; without a skin, joints are found by the names of nodes");
+  app.add_option("--asf", c.asf, "skeleton of an .amc file");
+  app.add_option(
+         "--clip-scale", c.scale,
+         "metres per unit of the clip file; 0 takes the unit of the .asf file, --scale for glTF, else 1")
       ->check(CLI::NonNegativeNumber);
-  app.add_flag("--clip-z-up", c.z_up, "The .bvh's or .amc's Z points up");
+  app.add_flag("--clip-z-up", c.z_up, "Z points up in the .bvh or .amc file");
 }
 
 void add_mesh(CLI::App& app, MeshCommand& m, bool makehuman) {
   app.add_option("input", m.input,
                  makehuman ? "MakeHuman base mesh (.obj)" : "Rigged glTF 2.0 (.glb, .gltf)")
       ->required();
-  app.add_option("--out", m.out, "Avatar to write (.npz, Habitat-GS's keys)")->required();
+  app.add_option("--out", m.out, "avatar file to write (.npz with the keys of Habitat-GS)")->required();
   if (makehuman) m.scale = 0.1;
-  app.add_option("--scale", m.scale, "Metres a unit of INPUT: 0.01 for a rig in centimetres")
+  app.add_option("--scale", m.scale, "metres per unit of INPUT; 0.01 for a rig in centimetres")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   if (!makehuman) {
     app.add_option("--skin", m.skins,
-                   "Name or index of a skin to read, any number on one rig; by default all (an error "
-                   "where they have "
-                   "several rigs)");
+                   "name or index of a skin to read; may be repeated for skins of one rig; default: all "
+                   "skins, which must share a rig");
   }
   app.add_option("--driver", m.driver,
-                 "Driver to write (.npz): the clip at 40 frames a second with its capsules");
-  app.add_option("--gaussians", m.gaussians, "About so many")->capture_default_str();
-  app.add_option("--seed", m.seed, "Of the places")->capture_default_str();
+                 "driver file to write (.npz): the clip at 40 frames per second, with its capsules");
+  app.add_option("--gaussians", m.gaussians, "approximate number of Gaussians")->capture_default_str();
+  app.add_option("--seed", m.seed, "seed of the positions of the Gaussians")->capture_default_str();
   app.add_option("--influences", m.influences,
-                 "Weights kept a Gaussian: 4, 8 or 0: by their error, 0.2 mm")
+                 "number of skinning weights per Gaussian: 4 or 8; 0 takes 4 if that moves no Gaussian "
+                 "by more than 0.2 mm, else 8")
       ->check(CLI::IsMember({0, 4, 8}))
       ->capture_default_str();
-  app.add_option("--percentile", m.percentile, "Share of a part's Gaussians that its capsule holds")
+  app.add_option("--percentile", m.percentile,
+                 "share of the Gaussians of a body part that its capsule must hold")
       ->capture_default_str();
-  app.add_option("--shade", m.shade, "Share of the light that surfaces lose which look down, 0 to 1")
+  app.add_option("--shade", m.shade, "share of light that downward surfaces lose, 0 to 1")
       ->capture_default_str();
   app.add_option("--skinning", m.skinning,
                  "linear, stretched (shapes follow the skin) or dual-quaternion")
@@ -86,59 +86,69 @@ void add_mesh(CLI::App& app, MeshCommand& m, bool makehuman) {
 
 CLI::App* add_walk(CLI::App& app, WalkCommand& walk, std::string& from, std::string& to,
                    std::vector<std::string>& via) {
-  CLI::App* walks = app.add_subcommand("walk", "A driver that walks a path on a NavMesh");
+  CLI::App* walks =
+      app.add_subcommand("walk", "plan a path on a NavMesh and write a driver that walks along it");
   walks->add_option("--avatar", walk.avatar, "Avatar (.npz)")->required();
   CLI::Option* mesh = walks->add_option("--navmesh", walk.navmesh, "NavMesh (.navmesh, .bin)");
-  walks->add_flag("--flat", walk.flat, "The generated flat, for an agent of 0.25 m radius")
+  walks
+      ->add_flag("--flat", walk.flat,
+                 "walk in the embedded flat, with a NavMesh for an agent of 0.25 m radius")
       ->excludes(mesh);
-  walks->add_option("--from", from, "Start: X,Y,Z")->required();
-  walks->add_option("--to", to, "End: X,Y,Z")->required();
-  walks->add_option("--via", via, "On the way, in order: X,Y,Z; any number");
+  walks->add_option("--from", from, "start: X,Y,Z")->required();
+  walks->add_option("--to", to, "end: X,Y,Z")->required();
+  walks->add_option("--via", via, "point on the way: X,Y,Z; may be repeated, in order");
   walks->add_option("--out", walk.out, "Driver to write (.npz)")->required();
-  walks->add_option("--speed", walk.speed, "Metres a second; 0: the clip's own")
+  walks
+      ->add_option("--speed", walk.speed,
+                   "walking speed, metres per second; 0 takes the speed of the clip")
       ->check(CLI::NonNegativeNumber);
   walks
       ->add_option("--clearance", walk.clearance,
-                   "Metres to keep from the NavMesh's edges where there is room; 0: the shortest path")
+                   "distance to keep from the edges of the NavMesh where there is room, metres; 0 takes "
+                   "the shortest path")
       ->check(CLI::Range(0.0, 10.0))
       ->capture_default_str();
-  walks->add_option("--fps", walk.frame_rate, "Frames a second")
+  walks->add_option("--fps", walk.frame_rate, "frames per second of the driver")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  walks->add_option("--first-key", walk.first_key, "Where the clip's cycle of two steps begins");
-  walks->add_option("--keys", walk.keys, "How many keys the cycle has; 0: found");
+  walks->add_option("--first-key", walk.first_key, "key at which the cycle of two steps begins");
+  walks->add_option("--keys", walk.keys, "number of keys of the cycle; 0 finds it");
   walks->add_flag("--lock-feet,!--no-lock-feet", walk.lock_feet,
-                  "Hold feet where they come down (default)");
+                  "hold feet in place while they are on the ground (default)");
   add_clip(*walks, walk.clip);
   walks->get_option("--clip")->required();
   return walks;
 }
 
 CLI::App* add_strip(CLI::App& app, StripCommand& strip, std::string& eye, std::string& target) {
-  CLI::App* strips = app.add_subcommand("strip", "Pictures of a walk from one camera, side by side");
+  CLI::App* strips = app.add_subcommand("strip", "draw images of a walk from one camera, side by side");
   strips->add_option("--avatar", strip.avatar, "Avatar (.npz)")->required();
   strips->add_option("--driver", strip.driver, "Driver (.npz)")->required();
-  CLI::Option* scene = strips->add_option("--scene", strip.scene,
-                                          "Gaussians around it: .ply, .sog, a SOG folder, DIR/2_0,2_1");
-  strips->add_flag("--flat", strip.flat, "The generated flat around it")->excludes(scene);
-  strips->add_flag("--z-up", strip.z_up, "The scene's Z points up");
-  strips->add_option("--eye", eye, "Camera: X,Y,Z")->required();
-  strips->add_option("--target", target, "What it looks at: X,Y,Z")->required();
-  strips->add_option("--frames", strip.frames, "Pictures")
+  CLI::Option* scene = strips->add_option(
+      "--scene", strip.scene,
+      "scene of Gaussians to draw around the person: .ply, .sog, a SOG folder, DIR/2_0,2_1");
+  strips->add_flag("--flat", strip.flat, "draw the embedded flat around the person")->excludes(scene);
+  strips->add_flag("--z-up", strip.z_up, "Z points up in the scene");
+  strips->add_option("--eye", eye, "position of the camera: X,Y,Z")->required();
+  strips->add_option("--target", target, "point that the camera looks at: X,Y,Z")->required();
+  strips->add_option("--frames", strip.frames, "number of images")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
-  strips->add_option("--width", strip.width, "Of a picture")
+  strips->add_option("--width", strip.width, "width of one image, pixels")
       ->check(CLI::Range(16, 1024))
       ->capture_default_str();
-  strips->add_option("--height", strip.height, "Of a picture")
+  strips->add_option("--height", strip.height, "height of one image, pixels")
       ->check(CLI::Range(16, 4096))
       ->capture_default_str();
-  strips->add_option("--fov", strip.fov, "Degrees across a picture")
+  strips->add_option("--fov", strip.fov, "horizontal field of view, degrees")
       ->check(CLI::Range(5.0, 150.0))
       ->capture_default_str();
-  strips->add_option("--begin", strip.begin, "Seconds into the driver")->check(CLI::NonNegativeNumber);
-  strips->add_option("--end", strip.end, "Seconds; 0: the driver's end")->check(CLI::NonNegativeNumber);
-  strips->add_option("--out", strip.out, "Picture to write (.png)")->required();
+  strips->add_option("--begin", strip.begin, "time of the first image, seconds into the driver")
+      ->check(CLI::NonNegativeNumber);
+  strips
+      ->add_option("--end", strip.end, "time of the last image, seconds; 0 takes the end of the driver")
+      ->check(CLI::NonNegativeNumber);
+  strips->add_option("--out", strip.out, "image file to write (.png)")->required();
   return strips;
 }
 
@@ -153,15 +163,16 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   std::string from, to, eye, target;
   CLI::App app{kDescription};
   app.require_subcommand(1);
-  CLI::App* from_gltf = app.add_subcommand("from-gltf", "An avatar from a rigged glTF file");
+  CLI::App* from_gltf = app.add_subcommand("from-gltf", "make an avatar from a rigged glTF file");
   add_mesh(*from_gltf, gltf, false);
   CLI::App* from_makehuman =
-      app.add_subcommand("from-makehuman", "An avatar from MakeHuman's base mesh and rig");
+      app.add_subcommand("from-makehuman", "make an avatar from the base mesh and a rig of MakeHuman");
   add_mesh(*from_makehuman, human, true);
-  from_makehuman->add_option("--skeleton", human.skeleton, "Rig (.mhskel)")->required();
+  from_makehuman->add_option("--skeleton", human.skeleton, "rig (.mhskel)")->required();
   from_makehuman->add_option("--weights", human.weights,
-                             "Weights (.mhw); by default those that the rig names");
-  from_makehuman->add_option("--target", targets, "Shape (.target), FILE or FILE=AMOUNT; any number");
+                             "weights (.mhw); default: the file that the rig names");
+  from_makehuman->add_option("--target", targets,
+                             "shape (.target), FILE or FILE=AMOUNT; may be repeated");
   CLI::App* walks = add_walk(app, walk, from, to, via);
   CLI::App* strips = add_strip(app, strip, eye, target);
   if (const auto status = gsnav_tools::parse_options(app, argc, argv)) {
@@ -169,12 +180,12 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     return std::nullopt;
   }
   const auto bad = [&](const std::string& text, const char* what) {
-    std::fprintf(stderr, "gsnav-avatar: '%s' is no %s\n", gsnav::printable(text).c_str(), what);
+    std::fprintf(stderr, "gsnav-avatar: '%s' is not a %s\n", gsnav::printable(text).c_str(), what);
     exit_code = gsnav_tools::kUsage;
     return std::nullopt;
   };
   for (const std::string& t : targets) {
-    if (!parse_target(t, human.targets.emplace_back())) return bad(t, "FILE or FILE=AMOUNT");
+    if (!parse_target(t, human.targets.emplace_back())) return bad(t, "target (FILE or FILE=AMOUNT)");
   }
   for (const std::string& t : via) {
     if (!parse_point(t, walk.via.emplace_back())) return bad(t, "point X,Y,Z");

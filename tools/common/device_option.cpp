@@ -17,8 +17,8 @@ void add_device_option(CLI::App& app, gsnav::Device& device, bool* float64) {
     device = *found;
   };
   std::string what =
-      "what renders: best (a GPU if there is one, else cpu), cpu, cpu:THREADS, cuda, cuda:NUMBER, "
-      "serial";
+      "device to render on: best (a GPU if there is one, else cpu), cpu, cpu:THREADS, cuda, "
+      "cuda:NUMBER, serial";
   if (float64 != nullptr) what += ", serial64 (the float64 reference)";
   app.add_option_function<std::string>("--device", read, what)->default_str("best")->force_callback();
 }

@@ -18,28 +18,28 @@ constexpr const char* kGroup = "Scene";
 
 void add_file_options(CLI::App& app, SceneOptions& o) {
   app.add_option("--scene", o.scene,
-                 "default (the embedded flat), a file of Gaussians (.ply, .sog, .spz, .splat, .ksplat, "
-                 ".glb), a folder, tiles (DIR/2_0,2_1), triangles (.glb, .obj), or a Habitat scene "
-                 "(SET.scene_dataset_config.json#NAME, NAME.stage_config.json)")
+                 "scene to open: default (the embedded flat); a file of Gaussians (.ply, .sog, .spz, "
+                 ".splat, .ksplat, .glb); a folder; tiles (DIR/2_0,2_1); triangles (.glb, .obj); or a "
+                 "Habitat scene (SET.scene_dataset_config.json#NAME, NAME.stage_config.json)")
       ->capture_default_str()
       ->type_name("SCENE")
       ->group(kGroup);
-  app.add_option(
-         "--up", o.up,
-         "axis of the file that points up: x, y, z, -x, -y or -z; auto: guessed from the ground; "
-         "keep: the file's axes stay")
+  app.add_option("--up", o.up,
+                 "axis of the file that points up: x, y, z, -x, -y or -z; auto guesses it from the "
+                 "ground; keep leaves the axes of the file")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "keep", "x", "y", "z", "+x", "+y", "+z", "-x", "-y", "-z"}))
       ->type_name("AXIS")
       ->group(kGroup);
-  app.add_option("--time", o.time, "moment of a scene that moves (4D Gaussians), seconds")
+  app.add_option("--time", o.time, "time to show of a scene that moves (4D Gaussians), seconds")
       ->capture_default_str()
       ->group(kGroup);
 }
 
 void add_storage_option(CLI::App& app, SceneOptions& o) {
   app.add_option("--storage", o.storage,
-                 "full; compact: SH in half of the memory; packed: all in a third (docs/formats.md)")
+                 "storage in memory: full (float32), compact (half the memory for SH) or packed (a "
+                 "third for everything)")
       ->check(CLI::IsMember({"full", "compact", "packed"}))
       ->capture_default_str()
       ->group(kGroup);
@@ -47,39 +47,38 @@ void add_storage_option(CLI::App& app, SceneOptions& o) {
 
 void add_drawing_options(CLI::App& app, SceneOptions& o) {
   app.add_option("--profile", o.profile,
-                 "accuracy: exact, fast (docs/accuracy.md), or lod: a level of detail for each part of "
-                 "the scene (docs/lod.md)")
+                 "quality: exact (rounding only), fast (a cheaper exponential) or lod (a level of "
+                 "detail for each part of the scene)")
       ->check(CLI::IsMember({"exact", "fast", "lod"}))
       ->capture_default_str()
       ->group(kGroup);
   app.add_option("--lod-error", o.lod_error,
-                 "of the profile lod: how far merged Gaussians may be off, pixels")
+                 "with --profile lod: largest error of merged Gaussians, pixels")
       ->check(CLI::Range(0.01, 100.0))
       ->capture_default_str()
       ->group(kGroup);
   app.add_option("--lod-levels", o.lod_levels,
-                 "of the profile lod: shipped, those that a streamed set has, where it has any; built: "
-                 "from its finest level. What was built is kept beside the scene's file")
+                 "with --profile lod: shipped uses the levels of a streamed set, if it has any; built "
+                 "makes them from its finest level and stores them next to the scene file")
       ->check(CLI::IsMember({"shipped", "built"}))
       ->capture_default_str()
       ->group(kGroup);
   app.add_option("--visible-sets", o.visible_sets,
-                 "of the profiles fast and lod: draw only what is seen from where the camera is; a file "
-                 "(gsnav-navmesh writes it), or auto: found for places on the NavMesh, and kept beside "
-                 "the scene's file")
+                 "with --profile fast or lod: draw only what the cell of the camera sees; a file from "
+                 "gsnav-navmesh, or auto to compute the sets and store them next to the scene file")
       ->type_name("FILE")
       ->group(kGroup);
   app.add_option("--mesh", o.meshes,
-                 "triangle meshes among the Gaussians (.gltf and .glb with colours and textures; .obj "
-                 "and .ply grey), in the axes of the scene's file (docs/composition.md)")
+                 "triangle meshes to draw among the Gaussians (.gltf, .glb with colours and textures; "
+                 ".obj, .ply in grey), in the axes of the scene file")
       ->type_name("FILE")
       ->group(kGroup);
 }
 
 void add_navmesh_options(CLI::App& app, SceneOptions& o) {
   app.add_option("--navmesh", o.navmesh,
-                 "a file (.navmesh, .bin); auto: the one beside the scene's file, else built; built of "
-                 "gaussians, or mesh (triangles); none")
+                 "NavMesh: a file (.navmesh, .bin); auto (the file next to the scene file, else built); "
+                 "gaussians or mesh (built from these); or none")
       ->capture_default_str()
       ->type_name("FILE")
       ->check([](const std::string& v) {
@@ -95,15 +94,15 @@ void add_navmesh_options(CLI::App& app, SceneOptions& o) {
 
 void add_people_options(CLI::App& app, SceneOptions& o) {
   app.add_option("--avatars", o.avatars,
-                 "people walking about; 0: those of a Habitat data set, where it has any")
+                 "number of people who walk about; 0 takes those of a Habitat data set, if it has any")
       ->capture_default_str()
       ->check(CLI::Range(0, 64))
       ->group(kGroup);
-  app.add_option("--seed", o.seed,
-                 "decides people, episodes and random policies; the same gives the same run")
+  app.add_option("--seed", o.seed, "seed of people, episodes and random policies")
       ->capture_default_str()
       ->group(kGroup);
-  app.add_option("--density", o.density, "of the embedded flat's Gaussians and of people's")
+  app.add_option("--density", o.density,
+                 "density of Gaussians in the embedded flat and in people, relative to the default")
       ->capture_default_str()
       ->check(CLI::Range(0.05, 20.0))
       ->group(kGroup);

@@ -8,11 +8,12 @@ namespace gsnav_tools {
 void add_voxel_options(CLI::App& app, double& cell_size, std::vector<double>& crop,
                        const std::string& group) {
   app.add_option("--cell-size", cell_size,
-                 "voxel edge of the NavMesh, metres; from Gaussians its height too, if 0.05 or more")
+                 "width of the voxels that the NavMesh is built from, metres; for Gaussians their "
+                 "height too, if it is 0.05 or more")
       ->capture_default_str()
       ->group(group);
   app.add_option("--crop", crop,
-                 "build the NavMesh in this box only: X0 Y0 Z0 X1 Y1 Z1, metres in the world (Y up)")
+                 "build the NavMesh in this box only: X0 Y0 Z0 X1 Y1 Z1, metres, world frame (Y up)")
       ->expected(6)
       ->group(group);
 }

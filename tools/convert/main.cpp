@@ -189,45 +189,46 @@ Status compare(const GaussianCloud& source, const std::vector<std::uint32_t>& ro
 int main(int argc, char** argv) {
   Options o;
   CLI::App app{
-      "Converts scenes of 3D Gaussians. Several inputs are merged. The output's name says its format: "
-      ".ply, "
-      ".compressed.ply, .splat, .spz, .sog, DIR/meta.json or .glb. Prints what was read and, where "
-      "images or fields "
-      "changed, by how much."};
-  app.add_option("paths", o.paths,
-                 "IN... OUT; an input is a file, a folder of a SOG or of a streamed set, or sibling "
-                 "tiles: DIR/2_0,2_1")
+      "Converts scenes of 3D Gaussians. Several inputs are merged.\nThe extension of OUT chooses the "
+      "format: .ply, .compressed.ply, .splat, .spz, .sog, DIR/meta.json or .glb.\nReads the file back "
+      "and prints the largest error of each field and of images.\nExample: gsnav-convert apartment.ply "
+      "room.spz --crop -4 -3 -4 4 0 4"};
+  app.add_option(
+         "paths", o.paths,
+         "IN... OUT; an input is a file, a folder of a SOG or a streamed set, or tiles: DIR/2_0,2_1")
       ->required()
       ->expected(2, -1);
-  app.add_option("--level", o.level, "Level of streamed LOD sets, 0 is the finest");
-  app.add_option("--time", o.time, "Moment of a scene that moves (4D Gaussians), seconds");
-  app.add_option("--crop", o.crop, "Keep means inside X0 Y0 Z0 X1 Y1 Z1, metres, axes of the input")
+  app.add_option("--level", o.level, "level of streamed sets; 0 is the finest");
+  app.add_option("--time", o.time, "time of a scene that moves (4D Gaussians), seconds");
+  app.add_option("--crop", o.crop,
+                 "keep Gaussians with their centre in X0 Y0 Z0 X1 Y1 Z1, metres, axes of the input")
       ->expected(6);
-  app.add_option("--min-opacity", o.min_opacity, "Drop Gaussians below this opacity")
+  app.add_option("--min-opacity", o.min_opacity, "drop Gaussians with a lower opacity")
       ->check(CLI::Range(0.0, 1.0));
-  app.add_option("--max-scale", o.max_scale, "Drop Gaussians with a larger standard deviation, metres");
-  app.add_option("--sh", o.degree, "Keep SH bands up to this degree")
+  app.add_option("--max-scale", o.max_scale, "drop Gaussians with a larger standard deviation, metres");
+  app.add_option("--sh", o.degree, "keep SH bands up to this degree")
       ->check(CLI::Range(0, kMaxShDegree));
   app.add_option("--up", o.up,
-                 "Turn the scene so that this axis points to +Y: x, y, z, -x, -y or -z; auto: as the "
-                 "ground says")
+                 "turn the scene so that this axis becomes +Y: x, y, z, -x, -y or -z; auto guesses it "
+                 "from the ground")
       ->check(CLI::IsMember({"keep", "auto", "x", "y", "z", "+x", "+y", "+z", "-x", "-y", "-z"}))
       ->capture_default_str();
-  app.add_option("--rotate", o.rotate, "Then turn about the axis X Y Z by DEGREES")->expected(4);
-  app.add_option("--scale", o.scale, "Then scale by this factor")->check(CLI::PositiveNumber);
-  app.add_option("--translate", o.translate, "Then move by X Y Z metres")->expected(3);
-  app.add_option("--order", o.order,
-                 "Of the rows in the file: read, as they were read, which decides ties of depth; space, "
-                 "along a curve "
-                 "through space: smaller .sog and .spz files. A .compressed.ply always has the latter")
+  app.add_option("--rotate", o.rotate, "then turn about the axis X Y Z by DEGREES")->expected(4);
+  app.add_option("--scale", o.scale, "then scale by this factor")->check(CLI::PositiveNumber);
+  app.add_option("--translate", o.translate, "then move by X Y Z metres")->expected(3);
+  app.add_option(
+         "--order", o.order,
+         "order of the Gaussians in the file: read keeps the order of the input, which decides ties of "
+         "depth; space makes smaller .sog and .spz files; .compressed.ply is always ordered by space")
       ->check(CLI::IsMember({"read", "space"}))
       ->capture_default_str();
   app.add_option("--cameras", o.cameras,
-                 "INRIA cameras.json for the comparison, instead of views around the scene");
-  app.add_option("--views", o.views, "Number of generated views; 0 leaves the images out")
+                 "INRIA cameras.json for the comparison; default: views around the scene");
+  app.add_option("--views", o.views, "number of views around the scene; 0 compares no images")
       ->check(CLI::Range(0, 1000));
-  app.add_option("--width", o.width, "Pixels of the compared images")->check(CLI::Range(1, 8192));
-  app.add_option("--height", o.height)->check(CLI::Range(1, 8192));
+  app.add_option("--width", o.width, "width of the compared images, pixels")->check(CLI::Range(1, 8192));
+  app.add_option("--height", o.height, "height of the compared images, pixels")
+      ->check(CLI::Range(1, 8192));
   if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
 
   const std::string out = o.paths.back();

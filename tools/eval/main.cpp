@@ -138,17 +138,16 @@ int main(int argc, char** argv) try {
   gsnav_eval::Options o;
   int pictures = -1;
   CLI::App app{
-      "Evaluates a policy and writes episodes.json.gz, journal.jsonl (a line for each episode as it "
-      "ends, its actions with\n"
-      "it), metrics.json, timings.json and index.html, one page with metrics, pictures and maps. "
-      "Started again it plays\n"
-      "what is missing, if options and the contents of scene, NavMesh, people and episodes are those of "
-      "the journal."};
+      "Plays PointNav episodes with a policy and measures it.\nWrites episodes.json.gz, journal.jsonl "
+      "(one line per episode), metrics.json, timings.json and\nindex.html (metrics, images and "
+      "maps).\nRun again, it plays the episodes that are missing. It refuses to do so if an option has "
+      "changed, or the\ncontent of the scene, the NavMesh, the people or the episodes.\nExample: "
+      "gsnav-eval --scene apartment.ply --avatars 5 --episodes 100 --out eval"};
   gsnav_eval::add_world_options(app, o);
-  app.add_option("--pictures", pictures, "so many episodes have pictures on the page; -1: all")
+  app.add_option("--pictures", pictures, "number of episodes with images on the page; -1 shows all")
       ->capture_default_str();
   bool restart = false;
-  app.add_flag("--restart", restart, "remove the evaluation that --out has, and begin anew");
+  app.add_flag("--restart", restart, "remove the evaluation in --out and begin again");
   if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
   const gsnav::Status s = gsnav_eval::run(o, pictures, restart);
   if (!s) std::fprintf(stderr, "gsnav-eval: %s\n", s.message().c_str());

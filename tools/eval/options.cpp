@@ -106,13 +106,14 @@ bool names_navmesh(const Options& o) {
 }
 
 void add_scene_options(CLI::App& app, Options& o) {
-  app.add_option("--episodes", o.episodes, "episodes to generate")
+  app.add_option("--episodes", o.episodes, "number of episodes to generate")
       ->capture_default_str()
       ->check(CLI::Range(1, 100000));
   app.add_option("--episode-file", o.episode_file,
-                 "Habitat-Lab's .json or .json.gz, instead of generated ones");
+                 "episodes of Habitat-Lab (.json, .json.gz) instead of generated ones");
   app.add_option("--preset", o.preset,
-                 "body and rules: v1, v2 (PointNav challenges), avatar (v1 with people charged)")
+                 "body and rules: v1 or v2 (PointNav challenges), or avatar (v1, with a reward that "
+                 "charges contact with people)")
       ->capture_default_str()
       ->check(CLI::IsMember({"v1", "v2", "avatar"}));
   app.add_option("--width", o.width, "image width, pixels")
@@ -124,7 +125,7 @@ void add_scene_options(CLI::App& app, Options& o) {
   app.add_option("--hfov", o.hfov, "horizontal field of view, degrees")
       ->capture_default_str()
       ->check(CLI::Range(10.0, 170.0));
-  app.add_option("--eye-height", o.eye_height, "camera above the floor, metres")
+  app.add_option("--eye-height", o.eye_height, "height of the camera above the floor, metres")
       ->capture_default_str()
       ->check(CLI::Range(0.05, 3.0));
   gsnav_tools::add_scene_options(app, o);
@@ -133,10 +134,11 @@ void add_scene_options(CLI::App& app, Options& o) {
 void add_world_options(CLI::App& app, Options& o) {
   o.out = "eval";
   add_scene_options(app, o);
-  app.add_option("--policy", o.policy, "follower (gives way), greedy (sees walls only), random")
+  app.add_option("--policy", o.policy,
+                 "follower (shortest path, waits for people), greedy (ignores people) or random")
       ->capture_default_str()
       ->check(CLI::IsMember({"follower", "greedy", "random"}));
-  app.add_option("--max-steps", o.max_steps, "actions after which an episode is cut off")
+  app.add_option("--max-steps", o.max_steps, "number of actions after which an episode ends")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000000));
   app.add_option("--out", o.out, "folder of the evaluation")->capture_default_str();

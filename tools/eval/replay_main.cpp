@@ -186,20 +186,23 @@ int main(int argc, char** argv) try {
   gsnav_eval::Options o;
   gsnav_eval::ReplayOptions r;
   CLI::App app{
-      "Plays an episode of an evaluation once more, by its recorded actions, and writes what a camera "
-      "sees as PNG files\n"
-      "and where everything was as track.npz. Options of the evaluation come from its journal (--out): "
-      "what happens\n"
-      "cannot be another; files may be given where they lie now, and the camera's options may differ."};
+      "Plays an episode of an evaluation again, by its recorded actions.\nWrites images from any camera "
+      "as PNG files, and all positions as track.npz.\nThe journal in --out supplies the options of the "
+      "evaluation. Files may have moved, and camera options may\ndiffer; options that would change what "
+      "happens are refused.\nExample: gsnav-replay --out eval --episode 3 --eye 5 2.5 4 --target 5 0 4 "
+      "--frames above"};
   gsnav_eval::add_world_options(app, o);
-  app.add_option("--episode", r.episode, "its number, from 0")->capture_default_str();
-  app.add_option("--eye", r.eye, "camera that stands, x y z in metres; without: the agent's own")
+  app.add_option("--episode", r.episode, "number of the episode, from 0")->capture_default_str();
+  app.add_option("--eye", r.eye,
+                 "position of a fixed camera: X Y Z metres; default: the camera of the agent")
       ->expected(3);
-  app.add_option("--target", r.target, "where that camera looks")->expected(3)->needs("--eye");
+  app.add_option("--target", r.target, "point that the camera of --eye looks at: X Y Z metres")
+      ->expected(3)
+      ->needs("--eye");
   app.get_option("--eye")->needs("--target");
-  app.add_option("--frames", r.frames, "folder for pictures and track")->capture_default_str();
-  app.add_option("--video", r.video, "an .mp4 in place of PNG files, by ffmpeg");
-  app.add_option("--every", r.every, "every so many actions a frame")
+  app.add_option("--frames", r.frames, "folder for images and track.npz")->capture_default_str();
+  app.add_option("--video", r.video, "video file to write instead of PNG files (.mp4, needs ffmpeg)");
+  app.add_option("--every", r.every, "draw one frame per this number of actions")
       ->capture_default_str()
       ->check(CLI::Range(1, 100000));
   if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;

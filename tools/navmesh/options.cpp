@@ -19,13 +19,12 @@ namespace gsnav_navmesh {
 namespace {
 
 const char kDescription[] =
-    "Builds, inspects, converts and draws NavMeshes. INPUT is read as a NavMesh where it ends in "
-    ".navmesh or .bin "
-    "(Habitat's and RecastDemo's MSET files), a NavMesh is built from its triangles where it ends in "
-    ".obj, .glb or .gltf (a glTF of Gaussians has those), and from "
-    "its Gaussians otherwise. What it is made of is printed; --out, --obj and --png write it. Lengths "
-    "in metres, "
-    "Y up. Exit status: 0; 1 with one line that says what is wrong; 2 where the command line cannot be.";
+    "Builds, inspects, converts and draws NavMeshes.\nINPUT is a NavMesh (.navmesh, .bin: MSET files of "
+    "Habitat and RecastDemo), triangles (.obj, .glb,\n.gltf) or Gaussians (all other files, and glTF "
+    "files that hold Gaussians).\nPrints islands and storeys; --out, --obj and --png write files. "
+    "Lengths are metres, Y points up.\nExit status: 0 success; 1 failure, with a message on one line; 2 "
+    "invalid options.\nExample: gsnav-navmesh apartment.ply --agent-radius 0.2 --out apartment.navmesh "
+    "--png map.png";
 
 /// FILE[@X,Y,Z[,YAW[,SCALE]]]; none where what follows the @ is something else.
 std::optional<StaticObject> parse_object(const std::string& text) {
@@ -59,47 +58,48 @@ struct Given {
 void add_input(CLI::App& app, Options& o, Given& given) {
   app.add_option("input", o.input,
                  "NavMesh (.navmesh, .bin), triangles (.obj, .glb, .gltf) or Gaussians (.ply, .sog, "
-                 ".spz, .splat, "
-                 ".ksplat, a SOG "
-                 "folder, or sibling tiles: DIR/2_0,2_1)")
+                 ".spz, .splat, .ksplat, a SOG folder, or tiles: DIR/2_0,2_1)")
       ->required();
   given.up = app.add_option("--up", o.up,
-                            "Axis of the input that points up; auto: of Gaussians guessed from the "
-                            "ground, of triangles y; not for a NavMesh")
+                            "axis of the input that points up; auto guesses it from the ground for "
+                            "Gaussians and takes y for triangles; not for a NavMesh")
                  ->check(CLI::IsMember({"auto", "x", "y", "z", "+x", "+y", "+z", "-x", "-y", "-z"}))
                  ->capture_default_str();
-  given.scale = app.add_option("--scale", o.scale, "Metres a unit of the input; not for a NavMesh")
+  given.scale = app.add_option("--scale", o.scale, "metres per unit of the input; not for a NavMesh")
                     ->check(CLI::PositiveNumber)
                     ->capture_default_str();
 }
 
 void add_outputs(CLI::App& app, Options& o) {
   const char* write = "Write";
-  auto* out = app.add_option("--out", o.out, "NavMesh file (MSET, as Habitat reads it)")->group(write);
-  app.add_option("--mset-version", o.mset_version, "Of --out: 2, or 1, which has no settings")
+  auto* out =
+      app.add_option("--out", o.out, "NavMesh file to write (MSET, which Habitat reads)")->group(write);
+  app.add_option("--mset-version", o.mset_version,
+                 "version of the file of --out: 2, or 1, which holds no settings")
       ->check(CLI::IsMember({1, 2}))
       ->needs(out)
       ->capture_default_str()
       ->group(write);
-  app.add_option("--settings-out", o.settings_out, "Its settings (.json), as Habitat reads them")
+  app.add_option("--settings-out", o.settings_out, "settings file to write (.json, which Habitat reads)")
       ->group(write);
-  app.add_option("--obj", o.obj, "The surface as triangles, one group an island")->group(write);
-  app.add_option("--png", o.png, "The surface from above, islands by colour")->group(write);
+  app.add_option("--obj", o.obj, "file for the surface as triangles, one group per island")
+      ->group(write);
+  app.add_option("--png", o.png, "image of the surface from above, one colour per island")->group(write);
   auto* height =
-      app.add_option("--height", o.height, "Draw what is walkable near this height")->group(write);
+      app.add_option("--height", o.height, "draw the surface near this height, metres")->group(write);
   app.add_option("--level", o.level,
-                 "Draw this storey, 0 is the lowest; the one with the most surface by default")
+                 "draw this storey, 0 is the lowest; default: the storey with the largest surface")
       ->excludes(height)
       ->group(write);
   app.add_option("--metres-per-pixel", o.metres_per_pixel,
-                 "Of the picture; 0: 1200 pixels for the longer side")
+                 "scale of the image; 0 makes its longer side 1200 pixels")
       ->check(CLI::NonNegativeNumber)
       ->group(write);
 }
 
 void add_build(CLI::App& app, Options& o, Given& given) {
   gsnav::NavMeshSettings& s = o.settings;
-  const char* build = "Build (names and defaults are Habitat's)";
+  const char* build = "Build (names and defaults as in Habitat)";
   given.settings = app.add_option_function<std::string>(
                           "--settings",
                           [&s](const std::string& file) {
@@ -107,43 +107,49 @@ void add_build(CLI::App& app, Options& o, Given& given) {
                             if (!read) throw CLI::ValidationError("--settings", read.message());
                             s = *read;
                           },
-                          "Settings (.json) as Habitat writes them; options beside it come after it")
+                          "settings file of Habitat (.json); options after it override it")
                        ->trigger_on_parse()
                        ->group(build);
-  given.object =
-      app.add_option(
-             "--object", given.objects,
-             "Triangles of an object that stands in the scene for good, at X Y Z metres of the world, "
-             "turned by YAW degrees about Y and enlarged by SCALE; for each object once more")
-          ->type_name("FILE[@X,Y,Z[,YAW[,SCALE]]]")
-          ->group(build);
+  given.object = app.add_option("--object", given.objects,
+                                "triangles of a static object, placed at X Y Z metres (world frame), "
+                                "turned by YAW degrees about Y and scaled by SCALE; may be repeated")
+                     ->type_name("FILE[@X,Y,Z[,YAW[,SCALE]]]")
+                     ->group(build);
   const auto number = [&](const char* name, double& value, const char* text) {
     app.add_option(name, value, text)->capture_default_str()->group(build);
   };
   gsnav_tools::add_voxel_options(app, s.cell_size, o.crop, build);
-  given.cell_height = app.add_option("--cell-height", s.cell_height, "Voxel height; 0.05 for Gaussians")
-                          ->capture_default_str()
-                          ->group(build);
-  number("--agent-height", s.agent_height, "Clearance that the agent needs");
-  number("--agent-radius", s.agent_radius, "The surface ends this far from walls");
-  number("--agent-max-climb", s.agent_max_climb, "Highest step");
-  number("--agent-max-slope", s.agent_max_slope, "Steepest walkable triangle, degrees");
-  number("--region-min-size", s.region_min_size, "Regions below this many cells squared are dropped");
-  number("--region-merge-size", s.region_merge_size, "Regions below this many cells squared are merged");
-  number("--edge-max-len", s.edge_max_len, "Longest boundary edge");
-  number("--edge-max-error", s.edge_max_error, "How far a boundary may leave the cells, in cells");
-  app.add_option("--verts-per-poly", s.verts_per_poly, "3 to 6")->capture_default_str()->group(build);
+  given.cell_height =
+      app.add_option("--cell-height", s.cell_height, "height of a voxel; 0.05 for Gaussians")
+          ->capture_default_str()
+          ->group(build);
+  number("--agent-height", s.agent_height,
+         "height of the agent: free space that it needs above the floor");
+  number("--agent-radius", s.agent_radius, "radius of the agent: the surface ends this far from walls");
+  number("--agent-max-climb", s.agent_max_climb, "highest step that the agent climbs");
+  number("--agent-max-slope", s.agent_max_slope,
+         "steepest triangle that the agent can walk on, degrees");
+  number("--region-min-size", s.region_min_size,
+         "drop regions with fewer cells than the square of this");
+  number("--region-merge-size", s.region_merge_size,
+         "merge regions with fewer cells than the square of this");
+  number("--edge-max-len", s.edge_max_len, "longest edge of the boundary");
+  number("--edge-max-error", s.edge_max_error,
+         "largest distance of the boundary from the cells, in cells");
+  app.add_option("--verts-per-poly", s.verts_per_poly, "largest number of vertices of a polygon, 3 to 6")
+      ->capture_default_str()
+      ->group(build);
   number("--detail-sample-dist", s.detail_sample_dist,
-         "Spacing of height samples, in cells; below 0.9: none");
+         "distance between height samples, in cells; below 0.9 takes none");
   number("--detail-sample-max-error", s.detail_sample_max_error,
-         "Height error of the surface, in cell heights");
-  given.tile_size = app.add_option("--tile-size", s.tile_size,
-                                   "Build in tiles of so many cells a side, in parallel; 0: one tile, "
-                                   "as Habitat does (Gaussians "
-                                   "over 2^22 columns: 512)")
-                        ->capture_default_str()
-                        ->group(build);
-  app.add_option("--threads", o.threads, "That share out the tiles; 0: one a core")
+         "largest height error of the surface, in cell heights");
+  given.tile_size =
+      app.add_option("--tile-size", s.tile_size,
+                     "build in tiles with this many cells per side, in parallel; 0 builds one tile, as "
+                     "Habitat does (Gaussians with more than 2^22 columns: 512)")
+          ->capture_default_str()
+          ->group(build);
+  app.add_option("--threads", o.threads, "number of threads that build tiles; 0 uses all cores")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str()
       ->group(build);
@@ -153,10 +159,10 @@ void add_build(CLI::App& app, Options& o, Given& given) {
         ->group(build);
   };
   without("--no-filter-low-hanging-obstacles", s.filter_low_hanging_obstacles,
-          "Low obstacles are not stepped over");
-  without("--no-filter-ledge-spans", s.filter_ledge_spans, "Edges of drops stay walkable");
+          "do not step over low obstacles");
+  without("--no-filter-ledge-spans", s.filter_ledge_spans, "keep the edges of drops walkable");
   without("--no-filter-walkable-low-height-spans", s.filter_walkable_low_height_spans,
-          "Low rooms stay walkable");
+          "keep low rooms walkable");
 }
 
 void add_gaussians(CLI::App& app, Options& o, Given& given) {
@@ -166,52 +172,53 @@ void add_gaussians(CLI::App& app, Options& o, Given& given) {
     app.add_option(name, value, text)->capture_default_str()->group(from);
   };
   given.mesh = app.add_option("--mesh", o.mesh,
-                              "Triangles (.obj, .glb, .gltf) of the same scene: what stands in either "
-                              "is in the way, the floor of "
-                              "either is walked on")
+                              "triangles (.obj, .glb, .gltf) of the same scene; both kinds are "
+                              "obstacles and both can be floor")
                    ->group(from);
-  option("--min-opacity", g.min_opacity, "Fainter Gaussians are ignored");
-  option("--sigmas", g.sigmas, "How far out a Gaussian is solid, in standard deviations");
-  option("--solid-alpha", g.solid_alpha, "Share of light that a solid voxel blocks");
-  option("--min-support", g.min_support, "Connected solid voxels below this count are floaters");
-  option("--max-hole", g.max_hole, "Gaps in the floor up to this wide are closed");
-  option("--floor-band", g.floor_band, "The surface stays within this of the floor's height");
-  option("--min-island-area", g.min_island_area, "Smaller pieces of floor are dropped, square metres");
+  option("--min-opacity", g.min_opacity, "ignore Gaussians with a lower opacity");
+  option("--sigmas", g.sigmas, "size of a solid Gaussian, in standard deviations");
+  option("--solid-alpha", g.solid_alpha, "share of light that a voxel must block to be solid");
+  option("--min-support", g.min_support, "drop groups of fewer connected solid voxels (floaters)");
+  option("--max-hole", g.max_hole, "close gaps in the floor up to this width");
+  option("--floor-band", g.floor_band, "largest distance of the surface from the height of the floor");
+  option("--min-island-area", g.min_island_area, "drop smaller pieces of floor, square metres");
   app.add_flag_callback(
          "--keep-uncovered", [&g] { g.drop_uncovered = false; },
-         "Keep floor and storeys that have no ceiling above them")
+         "keep floors and storeys that have no ceiling above them")
       ->group(from);
   app.add_flag_callback(
          "--keep-underside", [&g] { g.refuse_underside = false; },
-         "Take open ground for the floor even where nearly everything hangs below it")
+         "accept open ground as floor even if nearly everything hangs below it")
       ->group(from);
 }
 
 void add_visible_sets(CLI::App& app, Options& o, Given& given) {
   gsnav::VisibleSettings& v = o.visible;
   const char* seen = "Visible sets of Gaussians";
-  given.visible_sets = app.add_option("--visible-sets", o.visible_sets,
-                                      "File to write: what is seen from each cell of the NavMesh "
-                                      "that eyes can be in (gsnav-render reads it)")
-                           ->group(seen);
-  app.add_option("--eye-heights", o.eye_heights, "Of cameras, metres above the floor")
+  given.visible_sets =
+      app.add_option("--visible-sets", o.visible_sets,
+                     "file to write: the Gaussians that are seen from each cell of the NavMesh that "
+                     "cameras can be in; gsnav-render --visible-sets reads it")
+          ->group(seen);
+  app.add_option("--eye-heights", o.eye_heights, "heights of the cameras above the floor, metres")
       ->capture_default_str()
       ->group(seen);
   const auto setting = [&](const char* name, auto& value, const char* text) {
     app.add_option(name, value, text)->capture_default_str()->group(seen);
   };
-  setting("--visible-cell", v.cell,
-          "Side of a cell, metres; places that are looked from are half of it apart");
+  setting("--visible-cell", v.cell, "side of a cell, metres; viewpoints are half a side apart");
   setting("--visible-weight", v.min_weight,
-          "Gaussians are seen where one that lies with them has more of a pixel than this");
+          "least share of a pixel that a Gaussian must have to count as seen");
   setting("--visible-rows", v.rows,
-          "How many neighbouring Gaussians are seen or not together, up to 32; 0: a whole chunk of 256");
+          "number of neighbouring Gaussians that are kept or left out together, 1 to 32; 0 takes chunks "
+          "of 256");
   setting("--visible-face", v.face,
-          "Pixels that span 90 degrees: for cameras of no larger focal length");
+          "pixels per 90 degrees that the sets are made for; cameras need this focal length or a "
+          "shorter one");
   setting(
       "--visible-most", v.most_share,
-      "Write no file where cells of a sample see more than this share: nothing is gained (1: write it)");
-  setting("--near-plane", v.near_plane, "Of cameras, at most; metres");
+      "write no file if sampled cells see a larger share of the scene than this; 1 always writes it");
+  setting("--near-plane", v.near_plane, "largest near plane of the cameras, metres");
 }
 
 }  // namespace

@@ -28,59 +28,63 @@ std::optional<DepthChoice> parse_depth(const std::string& text) {
 
 void add_cameras(CLI::App& app, Options& o) {
   const char* group = "Cameras";
-  auto* cameras = app.add_option("--cameras", o.cameras,
-                                 "INRIA cameras.json (camera-to-world, OpenCV axes), in the axes of the "
-                                 "scene's file")
-                      ->type_name("FILE")
-                      ->group(group);
+  auto* cameras =
+      app.add_option("--cameras", o.cameras,
+                     "INRIA cameras.json (camera-to-world, OpenCV axes), in the axes of the scene file")
+          ->type_name("FILE")
+          ->group(group);
   auto* eye = app.add_option("--eye", o.eye,
-                             "where a single camera stands, X Y Z metres in the world (the file's axes "
-                             "with --up keep)")
+                             "position of a single camera: X Y Z metres, world frame (the axes of the "
+                             "file with --up keep)")
                   ->expected(3)
                   ->excludes(cameras)
                   ->group(group);
-  app.add_option("--target", o.target, "what it looks at, X Y Z")->expected(3)->needs(eye)->group(group);
-  app.add_option("--hfov", o.hfov, "horizontal field of view where no --cameras are given, degrees")
+  app.add_option("--target", o.target, "point that the camera of --eye looks at: X Y Z metres")
+      ->expected(3)
+      ->needs(eye)
+      ->group(group);
+  app.add_option("--hfov", o.hfov, "horizontal field of view without --cameras, degrees")
       ->check(CLI::Range(1.0, 170.0))
       ->capture_default_str()
       ->group(group);
-  app.add_option("--orbit", o.orbit,
-                 "number of views around the scene where no --cameras and no --eye are given")
+  app.add_option("--orbit", o.orbit, "number of views around the scene, without --cameras and --eye")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str()
       ->group(group);
   app.add_option("--width", o.width,
-                 "image width, 640 where the cameras have none; with --height, focal lengths of "
-                 "--cameras scale by it")
+                 "image width, pixels; default: that of the cameras, else 640; with --height it scales "
+                 "the focal lengths of --cameras")
       ->check(CLI::Range(1, kMaxImageSide))
       ->group(group);
-  app.add_option("--height", o.height, "image height, 480 where the cameras have none")
+  app.add_option("--height", o.height, "image height, pixels; default: that of the cameras, else 480")
       ->check(CLI::Range(1, kMaxImageSide))
       ->group(group);
-  app.add_option("--near", o.near_plane,
-                 "Gaussians whose centre is not beyond this are not drawn, metres")
+  app.add_option("--near", o.near_plane, "skip Gaussians whose centre is nearer than this, metres")
       ->check(CLI::PositiveNumber)
       ->capture_default_str()
       ->group(group);
 }
 
 void add_images(CLI::App& app, Options& o) {
-  app.add_option("--out", o.out, "folder for the images; made where it does not exist")->required();
-  app.add_flag("--npy", o.npy, "write NPY arrays");
-  app.add_flag("--png", o.png, "write PNG pictures (both are written where neither flag is given)");
-  app.add_option("--depth", o.depth, "median, expected, accumulated, first or first:TAU")
+  app.add_option("--out", o.out, "folder for the images; made if it does not exist")->required();
+  app.add_flag("--npy", o.npy, "write NPY arrays only (default: NPY and PNG)");
+  app.add_flag("--png", o.png, "write PNG images only (default: NPY and PNG)");
+  app.add_option("--depth", o.depth,
+                 "kind of depth: median, expected, accumulated, first, or first:TAU with 0 < TAU < 1")
       ->capture_default_str();
-  app.add_option("--depth-near", o.depth_near, "depth picture: nearest metre of the colour scale");
+  app.add_option("--depth-near", o.depth_near, "depth PNG: distance of the brightest colour, metres");
   app.add_option("--depth-far", o.depth_far,
-                 "depth picture: farthest; 0: the image's own range (2nd to 98th percentile)");
+                 "depth PNG: distance of the darkest colour, metres; 0 uses the range of each image "
+                 "(2nd to 98th percentile)");
   app.add_option("--max-alpha", o.max_alpha, "largest alpha of one Gaussian at a pixel")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
-  app.add_option("--composite", o.composite, "merged, or hard_depth: Habitat-GS's rule, to compare with")
+  app.add_option("--composite", o.composite,
+                 "how meshes and Gaussians are combined: merged (by depth at each pixel), or hard_depth "
+                 "(the rule of Habitat-GS, for comparison)")
       ->check(CLI::IsMember({"merged", "hard_depth"}))
       ->capture_default_str();
-  app.add_flag("--ledger", o.ledger,
-               "print what each frame skipped, merged, limited and rounded, and by how much");
+  app.add_flag("--ledger", o.ledger, "print what each frame skipped, merged, limited and rounded");
 }
 
 /// Why the options do not go together, or nothing.
@@ -99,10 +103,11 @@ int fail(const std::string& message) { return gsnav_tools::fail("gsnav-render", 
 
 std::optional<int> parse_options(int argc, char** argv, Options& o) {
   CLI::App app{
-      "Renders a scene from the cameras of an INRIA cameras.json, from one place, or from around it.\n"
-      "Writes NNNN.rgb.npy (H, W, 3 float32, unclamped), NNNN.depth.npy and NNNN.alpha.npy (H, W "
-      "float32; "
-      "metres, 0 = no return) and PNG pictures."};
+      "Renders RGB, depth and alpha images of a scene of 3D Gaussians.\nChoose cameras by --cameras, by "
+      "--eye and --target, or by --orbit (views around the scene).\nWrites NNNN.rgb.npy ([H][W][3] "
+      "float32, unclamped), NNNN.depth.npy and NNNN.alpha.npy\n([H][W] float32; metres, 0 = no return), "
+      "and the same as PNG.\nExample: gsnav-render --scene apartment.ply --cameras cameras.json --out "
+      "views"};
   o.navmesh = "none";
   o.avatars = 0;
   add_images(app, o);

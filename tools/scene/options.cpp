@@ -10,33 +10,32 @@ namespace gsnav_scene {
 namespace {
 
 const char kDescription[] =
-    "Makes scenes and people by code alone, to run benchmarks, examples and tests on. Lengths in "
-    "metres, "
-    "Y up, floors at y = 0. The same options give the same files. Exit status: 0, 1 with one line that "
-    "says what is wrong, 2 for options that cannot be used.";
+    "Makes scenes and people from code, for benchmarks, examples and tests.\nLengths are metres, Y "
+    "points up, floors are at y = 0. The same options give the same files.\nExit status: 0 success; 1 "
+    "failure, with a message on one line; 2 invalid options.\nExample: gsnav-scene default --out flat";
 
 constexpr std::size_t kLeastGaussians = 10'000;
 
 void add_outputs(CLI::App& app, SceneCommand& c) {
-  app.add_option("--mesh", c.out.mesh, "Its surfaces as triangles to write (.obj)");
-  app.add_option("--cameras", c.out.cameras, "Views inside the rooms to write (INRIA cameras.json)");
-  app.add_option("--views", c.views.count, "Number of views")
+  app.add_option("--mesh", c.out.mesh, "file for the surfaces as triangles (.obj)");
+  app.add_option("--cameras", c.out.cameras, "file for views inside the rooms (INRIA cameras.json)");
+  app.add_option("--views", c.views.count, "number of views")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
-  app.add_option("--width", c.views.width, "Of a view, pixels")
+  app.add_option("--width", c.views.width, "width of a view, pixels")
       ->check(CLI::Range(1, 16384))
       ->capture_default_str();
-  app.add_option("--height", c.views.height, "Of a view, pixels")
+  app.add_option("--height", c.views.height, "height of a view, pixels")
       ->check(CLI::Range(1, 16384))
       ->capture_default_str();
-  app.add_option("--hfov", c.views.hfov, "Horizontal field of view, degrees")
+  app.add_option("--hfov", c.views.hfov, "horizontal field of view, degrees")
       ->check(CLI::Range(10.0, 150.0))
       ->capture_default_str();
 }
 
 void add_scene_file(CLI::App& app, SceneCommand& c) {
   app.add_option("--out", c.out.scene,
-                 "Scene to write: .ply, .compressed.ply, .splat, .spz, .sog or .glb")
+                 "scene file to write: .ply, .compressed.ply, .splat, .spz, .sog or .glb")
       ->required();
 }
 
@@ -46,32 +45,35 @@ CLI::Option* add_gaussians(CLI::App& app, SceneCommand& c, const char* what) {
 }
 
 CLI::App* add_flat(CLI::App& app, SceneCommand& c) {
-  CLI::App* flat =
-      app.add_subcommand("flat", "The benchmark flat: four furnished rooms, in any number of Gaussians");
+  CLI::App* flat = app.add_subcommand(
+      "flat", "the benchmark flat: four furnished rooms with any number of Gaussians");
   c.sampling.gaussians = 1'000'000;
   add_scene_file(*flat, c);
-  add_gaussians(*flat, c, "Exactly so many")->capture_default_str();
+  add_gaussians(*flat, c, "exact number of Gaussians")->capture_default_str();
   add_outputs(*flat, c);
-  flat->add_option("--seed", c.views.seed, "Of the views")->capture_default_str();
+  flat->add_option("--seed", c.views.seed, "seed of the views")->capture_default_str();
   return flat;
 }
 
 CLI::App* add_rooms(CLI::App& app, SceneCommand& c) {
   CLI::App* rooms = app.add_subcommand(
-      "rooms", "A flat of its own for each seed: rooms, doors, windows, furniture and colours vary");
+      "rooms", "a different flat for each seed: rooms, doors, windows, furniture and colours vary");
   c.rooms = true;
   add_scene_file(*rooms, c);
-  rooms->add_option("--seed", c.plan.seed, "Of all that varies")->capture_default_str();
-  rooms->add_option("--rooms", c.plan.rooms, "Number of rooms")
+  rooms->add_option("--seed", c.plan.seed, "seed of the flat and the views")->capture_default_str();
+  rooms->add_option("--rooms", c.plan.rooms, "number of rooms")
       ->check(CLI::Range(1, gsnav::kMostRooms))
       ->capture_default_str();
   rooms
       ->add_option("--clearance", c.plan.clearance,
-                   "Radius of a disc that reaches all of the floor between the furniture")
+                   "radius of a disc that can reach all floor between the furniture, metres")
       ->check(CLI::Range(0.1, 0.35))
       ->capture_default_str();
-  CLI::Option* count = add_gaussians(*rooms, c, "Exactly so many; without it --density says it");
-  rooms->add_option("--density", c.sampling.density, "Of Gaussians: 1 gives about 100,000 a room")
+  CLI::Option* count =
+      add_gaussians(*rooms, c, "exact number of Gaussians; without it, --density decides");
+  rooms
+      ->add_option("--density", c.sampling.density,
+                   "density of the Gaussians; 1 gives about 100,000 per room")
       ->check(CLI::Range(0.05, 20.0))
       ->excludes(count)
       ->capture_default_str();
@@ -80,30 +82,29 @@ CLI::App* add_rooms(CLI::App& app, SceneCommand& c) {
 }
 
 CLI::App* add_default(CLI::App& app, SceneCommand& c) {
-  CLI::App* flat = app.add_subcommand(
-      "default", "The flat that is used where no scene is given, as it is embedded in the library");
-  flat->add_option(
-          "--out", c.out.scene,
-          "Folder for flat.ply, flat.obj and cameras.json, made where it does not exist; or the "
-          "scene alone, by its extension")
+  CLI::App* flat =
+      app.add_subcommand("default", "the embedded flat, which programs open as --scene default");
+  flat->add_option("--out", c.out.scene,
+                   "folder for flat.ply, flat.obj and cameras.json, made if it does not exist; or a "
+                   "scene file, by its extension")
       ->required();
   add_outputs(*flat, c);
   return flat;
 }
 
 CLI::App* add_humanoid(CLI::App& app, HumanoidCommand& c) {
-  CLI::App* person = app.add_subcommand(
-      "humanoid", "The person of the demo: Gaussians, skeleton, skinning weights and capsules");
+  CLI::App* person =
+      app.add_subcommand("humanoid", "a person: Gaussians, skeleton, skinning weights and capsules");
   person
       ->add_option("--out", c.out,
-                   "Avatar to write (.npz, Habitat-GS's keys); a scene's extension gives its Gaussians "
-                   "alone, as it stands")
+                   "avatar file to write (.npz with the keys of Habitat-GS); the extension of a scene "
+                   "file writes the Gaussians of the standing person only")
       ->required();
   person
       ->add_option("--seed", c.seed,
-                   "Another height, build, hair and clothes for each; 0: the person of the demo")
+                   "seed of height, build, hair and clothes; 0 is the person of the demo")
       ->capture_default_str();
-  person->add_option("--gaussians", c.gaussians, "About so many")
+  person->add_option("--gaussians", c.gaussians, "approximate number of Gaussians")
       ->check(CLI::Range(2000, 400000))
       ->capture_default_str();
   return person;

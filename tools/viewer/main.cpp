@@ -110,30 +110,30 @@ int main(int argc, char** argv) try {
   o.height = 336;
   where.port = 7007;
   CLI::App app{
-      "Walks a scene in the browser: open the address that it prints (from elsewhere: ssh -L "
-      "7007:127.0.0.1:7007 HOST).\n"
-      "Colour, depth and map side by side, people, capsules and NavMesh, metrics. Ends with Ctrl-C."};
+      "Shows a scene in the browser and lets you walk in it: colour, depth, map, people and "
+      "metrics.\nOpen the address that it prints. From another machine: ssh -L 7007:127.0.0.1:7007 "
+      "HOST.\nCtrl-C ends it."};
   gsnav_eval::add_scene_options(app, o);
-  app.add_option("--port", where.port, "port to listen at; 0: any that is free")
+  app.add_option("--port", where.port, "port to listen on; 0 takes any free port")
       ->capture_default_str()
       ->check(CLI::Range(0, 65535));
   app.add_option("--bind", where.address,
-                 "IPv4 address to listen at; whoever reaches it can look and steer")
+                 "IPv4 address to listen on; everyone who can reach it can look and steer")
       ->capture_default_str();
   app.add_option("--allow-host", where.allowed_hosts,
-                 "host name by which browsers may call the viewer, beside addresses and localhost; may "
+                 "host name that browsers may use for the viewer, besides addresses and localhost; may "
                  "be repeated")
       ->type_name("NAME");
-  app.add_option("--rate", how.rate, "frames a second at most")
+  app.add_option("--rate", how.rate, "largest number of frames per second")
       ->capture_default_str()
       ->check(CLI::Range(1.0, 120.0));
-  app.add_option("--speed", how.speed, "of walking, m/s")
+  app.add_option("--speed", how.speed, "walking speed, metres per second")
       ->capture_default_str()
       ->check(CLI::Range(0.05, 20.0));
-  app.add_option("--quality", how.quality, "of JPEG images")
+  app.add_option("--quality", how.quality, "quality of JPEG images")
       ->capture_default_str()
       ->check(CLI::Range(1, 100));
-  app.add_flag("--paused", how.paused, "time stands still at first");
+  app.add_flag("--paused", how.paused, "begin with time stopped");
   if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
   const gsnav::Status s = gsnav_viewer::run(o, how, where);
   if (!s) std::fprintf(stderr, "gsnav-viewer: %s\n", s.message().c_str());
