@@ -38,8 +38,9 @@ void add_file_options(CLI::App& app, SceneOptions& o) {
 }
 
 void add_storage_option(CLI::App& app, SceneOptions& o) {
-  app.add_option("--storage", o.storage,
-                 "full; compact: SH in half of the memory; packed: all in a third (docs/formats.md)")
+  app.add_option(
+         "--storage", o.storage,
+         "full; compact: SH in half of the memory; packed: all in a third (docs/reference/formats.md)")
       ->check(CLI::IsMember({"full", "compact", "packed"}))
       ->capture_default_str()
       ->group(kGroup);
@@ -47,8 +48,9 @@ void add_storage_option(CLI::App& app, SceneOptions& o) {
 
 void add_drawing_options(CLI::App& app, SceneOptions& o) {
   app.add_option("--profile", o.profile,
-                 "accuracy: exact, fast (docs/accuracy.md), or lod: a level of detail for each part of "
-                 "the scene (docs/lod.md)")
+                 "accuracy: exact, fast (docs/reference/image_contract.md), or lod: a level of detail "
+                 "for each part of "
+                 "the scene (docs/concepts/scene.md)")
       ->check(CLI::IsMember({"exact", "fast", "lod"}))
       ->capture_default_str()
       ->group(kGroup);
@@ -71,7 +73,7 @@ void add_drawing_options(CLI::App& app, SceneOptions& o) {
       ->group(kGroup);
   app.add_option("--mesh", o.meshes,
                  "triangle meshes among the Gaussians (.gltf and .glb with colours and textures; .obj "
-                 "and .ply grey), in the axes of the scene's file (docs/composition.md)")
+                 "and .ply grey), in the axes of the scene's file (docs/reference/composition.md)")
       ->type_name("FILE")
       ->group(kGroup);
 }

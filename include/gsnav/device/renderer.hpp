@@ -29,7 +29,7 @@ struct RenderOptions {
 /// device's memory and keeps its scratch between calls. Images have the bits of BasicRenderer<float, B>,
 /// where B is the device's backend. It may be moved; one that was moved from answers with
 /// invalid_argument. Calls of one renderer must not overlap. Nothing that it is given must outlive a
-/// call (docs/ownership.md).
+/// call (docs/reference/ownership.md).
 ///
 ///     auto device = gsnav::Device::parse("best").value();
 ///     auto renderer = gsnav::Renderer::create(device, cloud).value();

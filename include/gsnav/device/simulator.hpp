@@ -35,9 +35,9 @@ class SimulatorEngine;
 ///     auto metrics = sim.metrics();
 class Simulator {
  public:
-  /// Shares the scene (docs/ownership.md). Errors: invalid_argument naming the field, sensor or asset;
-  /// unsupported where the device is not there; out_of_memory; backend_failure. `others` adds bodies to
-  /// the scene's avatars, numbered behind them.
+  /// Shares the scene (docs/reference/ownership.md). Errors: invalid_argument naming the field, sensor
+  /// or asset; unsupported where the device is not there; out_of_memory; backend_failure. `others` adds
+  /// bodies to the scene's avatars, numbered behind them.
   static Result<Simulator> create(const Device& device, std::shared_ptr<const SimulatorScene> scene,
                                   SimulatorConfig config, World::BodySource others = {});
   /// Owns the scene. Errors: the same as above.

@@ -6,7 +6,7 @@
 namespace gsnav {
 
 /// Another renderer whose rules of footprint, stop and depth a frame follows. Everything but `none` is
-/// for parity tests (docs/accuracy.md, "Compat modes").
+/// for parity tests (docs/reference/image_contract.md, "Compat modes").
 enum class Compat : std::uint8_t {
   none,    ///< the contract
   inria,   ///< 3-sigma square of 16-pixel tiles, exclusive stop, depth of the centre

@@ -16,7 +16,7 @@
 namespace gsnav {
 
 /// Settings of a frame: what the image is, how exact it is, how it is computed. The defaults are the
-/// contract's (docs/accuracy.md).
+/// contract's (docs/reference/image_contract.md).
 struct RenderConfig {
   /// Images to make. Calls that are given a FrameImages make those that it points to, and do not read
   /// this.

@@ -33,7 +33,7 @@ namespace gsnav {
 ///     auto frames = renderer.render(cloud.set(), camera).value();   // frames.rgb, ...
 ///
 /// It keeps a pointer to the backend and views of the meshes; sets and cameras are read during a call
-/// only (docs/ownership.md).
+/// only (docs/reference/ownership.md).
 template <class S, Backend B>
 class BasicRenderer {
  public:
@@ -43,9 +43,9 @@ class BasicRenderer {
   const RenderConfig& config() const noexcept { return config_; }
   void set_config(const RenderConfig& config) { config_ = config; }
 
-  /// Meshes that the frames from now on show among the Gaussians (docs/composition.md); none: an empty
-  /// span. Their arrays are in the backend's memory, and must stay there. To move one, set them again:
-  /// nothing is copied but views.
+  /// Meshes that the frames from now on show among the Gaussians (docs/reference/composition.md); none:
+  /// an empty span. Their arrays are in the backend's memory, and must stay there. To move one, set them
+  /// again: nothing is copied but views.
   void set_meshes(std::span<const MeshInstance> meshes, const MeshLight& light = {}) {
     meshes_.assign(meshes.begin(), meshes.end());
     light_ = light;

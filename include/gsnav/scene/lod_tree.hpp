@@ -31,10 +31,10 @@ struct LodBox {
   std::uint32_t shown = 0;  ///< Gaussians of the cloud that it stands for
 };
 
-/// A cloud at every level of detail (docs/lod.md): a binary tree over the chunks of a cloud in spatial
-/// order. Leaves are those chunks, as they are; a node above shows what its two children show in half as
-/// many Gaussians, at most kProjectChunk. Any cut through the tree shows each Gaussian of the cloud
-/// once.
+/// A cloud at every level of detail (docs/concepts/scene.md): a binary tree over the chunks of a cloud
+/// in spatial order. Leaves are those chunks, as they are; a node above shows what its two children show
+/// in half as many Gaussians, at most kProjectChunk. Any cut through the tree shows each Gaussian of the
+/// cloud once.
 ///
 /// Or a forest of the levels that a set ships: `boxes` and `roots` are not empty then. Nodes are boxes
 /// of the set, each at one level, and have as many chunks as they need; a cut takes one level of each

@@ -208,7 +208,7 @@ class MeshScene {
 };
 
 /// A mesh's arrays in a backend's own memory. On host backends nothing is copied: what `mesh` views must
-/// outlive it (docs/ownership.md).
+/// outlive it (docs/reference/ownership.md).
 template <Backend B>
 class MeshArrays {
  public:

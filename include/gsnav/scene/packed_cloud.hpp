@@ -21,7 +21,8 @@ namespace gsnav {
 /// What packing may cost. Beyond a bound the planes stay as exact as it asks for.
 struct PackLimits {
   /// How far any mean may move, in its Gaussian's largest standard deviations; else float32. 16 bits of
-  /// a chunk's box save 6 bytes, but Gaussians at nearly one depth may change places (docs/formats.md).
+  /// a chunk's box save 6 bytes, but Gaussians at nearly one depth may change places
+  /// (docs/reference/formats.md).
   double mean = 0;
   double sh =
       2e-3;  ///< root mean square error by 8 bits of a coefficient of bands from 1 on; else binary16

@@ -27,8 +27,8 @@ namespace gsnav {
 
 /// What of a cloud can be seen from where cameras go: what stands behind walls need not be looked at.
 /// Sampled: chunks, and of these rows, of which nobody saw anything from viewpoints in and around a cell
-/// are left out for cameras in it. An approximation, for the profiles `fast` and `lod`; docs/lod.md has
-/// its error.
+/// are left out for cameras in it. An approximation, for the profiles `fast` and `lod`;
+/// docs/concepts/scene.md has its error.
 struct VisibleSets {
   using Key = std::array<std::int32_t, 3>;
 

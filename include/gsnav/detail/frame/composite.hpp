@@ -8,7 +8,8 @@
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/image/mesh_layer.hpp"
 
-// Gaussians and meshes in one image (docs/composition.md). Frames without a mesh run none of this.
+// Gaussians and meshes in one image (docs/reference/composition.md). Frames without a mesh run none of
+// this.
 
 namespace gsnav {
 

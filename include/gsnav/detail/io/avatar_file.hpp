@@ -49,10 +49,10 @@ struct LoadedAvatar {
 ///
 /// Four or eight weights a Gaussian are kept as `options.weights` say; what that costs is in `weights`.
 ///
-/// A file of GART's parameters is read as well (docs/avatars.md): _xyz, _rotation (w, x, y, z), _scaling
-/// (scale = min_scale + sigmoid (max_scale - min_scale), 0 to 0.1 where the file does not say), _opacity
-/// (logit), _features_dc [N,3], _features_rest [N,3(K-1)] (coefficient, then colour), beside lbs_weights
-/// and joints_inv_bind_matrix.
+/// A file of GART's parameters is read as well (docs/concepts/avatar.md): _xyz, _rotation (w, x, y, z),
+/// _scaling (scale = min_scale + sigmoid (max_scale - min_scale), 0 to 0.1 where the file does not say),
+/// _opacity (logit), _features_dc [N,3], _features_rest [N,3(K-1)] (coefficient, then colour), beside
+/// lbs_weights and joints_inv_bind_matrix.
 ///
 /// gsnav's own files may add `capsules` [C,7] (both ends in the bind frame of a joint and the radius,
 /// metres) and `capsule_joints` [C], and `skinning` (0 linear, 1 linear with stretch, whose gradients

@@ -11,7 +11,7 @@
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/math/vec.hpp"
 
-// Triangle meshes as kernels read them. How they are drawn: docs/composition.md.
+// Triangle meshes as kernels read them. How they are drawn: docs/reference/composition.md.
 
 namespace gsnav {
 

@@ -7,7 +7,8 @@
 #include "gsnav/math/functions.hpp"
 #include "gsnav/math/vec.hpp"
 
-// From camera axes to the lattice of 2^-14 px on which coverage is decided exactly: docs/composition.md.
+// From camera axes to the lattice of 2^-14 px on which coverage is decided exactly:
+// docs/reference/composition.md.
 
 namespace gsnav {
 

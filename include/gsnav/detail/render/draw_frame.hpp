@@ -17,7 +17,7 @@ struct MeshFrame {
 };
 
 /// Draws the images of one camera: of Gaussians alone by render_camera, else with meshes among them
-/// (docs/composition.md). `sets` may be empty. Errors: those of render_camera and draw_meshes;
+/// (docs/reference/composition.md). `sets` may be empty. Errors: those of render_camera and draw_meshes;
 /// unsupported, where Composite::hard_depth meets a mesh that is seen through.
 template <class S, Backend B>
 Status draw_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,

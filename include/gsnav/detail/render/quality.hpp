@@ -14,8 +14,8 @@ enum class Exponential {
   fast,   ///< a cubic: alpha within 1.0e-4 relative; on a GPU its own instruction, within 2e-7
 };
 
-/// The part of RenderConfig that trades error for speed. docs/accuracy.md has the error budgets against
-/// the float64 contract image.
+/// The part of RenderConfig that trades error for speed. docs/reference/image_contract.md has the error
+/// budgets against the float64 contract image.
 struct Quality {
   /// Frames with meshes use Exponential::exact whatever is set here.
   Exponential exponential = Exponential::exact;

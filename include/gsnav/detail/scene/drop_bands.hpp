@@ -49,7 +49,7 @@ inline std::size_t limit_sh_degree(PackedCloud& cloud, int degree) {
 
 /// Lets go of the bands of a cloud (GaussianCloud or PackedCloud) that no chunk needs (scene_bands).
 /// `needed` fits the cloud as before, and says how many bytes that were. Bands that some chunks need are
-/// held for all: docs/lod.md has what storage by chunk would save.
+/// held for all: docs/notes/lod.md has what storage by chunk would save.
 template <class Cloud>
 void drop_bands(Cloud& cloud, SceneBands& needed) {
   needed.bytes_let_go +=

@@ -18,7 +18,7 @@ namespace gsnav {
 /// A cloud's arrays in a backend's own memory. On host backends nothing is copied: the cloud, and the
 /// bands where they are given, must outlive it. Other backends get a copy, and packed clouds become
 /// floats there. The same code is right on each: a cloud or bands that are temporaries do not compile on
-/// any (docs/ownership.md). The backend must outlive it.
+/// any (docs/reference/ownership.md). The backend must outlive it.
 template <Backend B>
 class GaussianArrays {
  public:
