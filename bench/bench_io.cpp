@@ -118,7 +118,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("--load", load, "Also time loading in spatial order, as scenes are rendered");
   app.add_option("--views", views, "Images of 640x480 for the PSNR");
-  app.add_flag("--markdown", markdown, "Print the table as docs/formats.md has it");
+  app.add_flag("--markdown", markdown, "Print the table as docs/notes/speed.md has it");
   CLI11_PARSE(app, argc, argv);
   const auto loaded = gsnav_bench::cloud_or_flat(scene);
   if (!loaded) {

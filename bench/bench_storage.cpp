@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // bench_storage [--scene FILE] [--cameras FILE] [--threads N]: compares the ways of keeping a scene in
 // memory. A row each: bytes, time of a frame (RGB, median over views and repeats), and how much images
-// change. Then what each packed plane changes by itself (docs/formats.md).
+// change. Then what each packed plane changes by itself (docs/notes/speed.md).
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>

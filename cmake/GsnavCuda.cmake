@@ -2,7 +2,7 @@
 # Decides whether gsnav::cuda is built (GSNAV_CUDA=AUTO|ON|OFF|EMULATED) and enables the language where it is.
 # Inside another project the default is OFF. AUTO wants an nvcc of CUDA 12 or later (C++20); ON stops where
 # there is none.
-# EMULATED runs device code on the host, for tests: a C++ compiler reads it, no toolkit is needed (docs/cuda.md).
+# EMULATED runs device code on the host, for tests: a C++ compiler reads it, no toolkit is needed (docs/notes/cuda.md).
 set(_default OFF)
 if(PROJECT_IS_TOP_LEVEL)
   set(_default AUTO)

@@ -3,7 +3,7 @@
 #
 # Checks the layout of text: C++ and CUDA sources are as clang-format 14 writes them (105 columns, literals may be
 # longer), no line of prose in Markdown is longer than 105 columns (tables, code and links may be;
-# docs/approximations.md is generated), and no line of Python, shell or CMake, nor any of C++ with its literals, is
+# docs/notes/approximations.md is generated), and no line of Python, shell or CMake, nor any of C++ with its literals, is
 # longer than 120.
 #
 #   tools/check_format.sh          names what is wrong; exit status 1 where anything is
@@ -25,7 +25,7 @@ if ! command -v clang-format > /dev/null; then
 fi
 failed=0
 git ls-files -z '*.hpp' '*.cpp' '*.cu' '*.cuh' | xargs -0 -n 64 -P "$(nproc)" clang-format "${options[@]}" || failed=1
-git ls-files -z '*.md' | { grep -zvx docs/approximations.md || true; } | xargs -0 awk '
+git ls-files -z '*.md' | { grep -zvx docs/notes/approximations.md || true; } | xargs -0 awk '
   FNR == 1 { code = 0 }
   /^ *```/ { code = !code }
   length($0) > 105 && !code && !/^ *\|/ && !/^    / && !/^[^ ]*$/ {

@@ -168,14 +168,16 @@ std::string approximations_page(const Table& table, const std::string& command) 
       ". Scenes: " + plain(table.distinct("scene")) + ".\n\n";
   out +=
       "Each error is `mean / worst` over scenes, views and resolutions, against the oracle named "
-      "(docs/accuracy.md). Time, pairs and evaluations are geometric means of the ratio to the `exact` "
+      "(docs/reference/image_contract.md). Time, pairs and evaluations are geometric means of the ratio "
+      "to the `exact` "
       "profile on "
       "the same view and backend: below 1 is what the approximation buys. 1 LSB is 1/255.\n\n";
   out += "## Profiles\n\n" + profile_part(table);
   out += "\n## Budgets\n\n" + budget_part(table);
   out += "\n## Targets\n\n";
   out +=
-      "What is to be reached on large scenes (docs/lod.md), of each scene, size and backend, over the "
+      "What is to be reached on large scenes (docs/notes/lod.md), of each scene, size and backend, over "
+      "the "
       "views that have "
       "both of the rows that are compared.\n\n"
       "- *lod*: rows of the profile lod beside fast on the same view, both judged by photo4, the image "

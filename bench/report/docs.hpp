@@ -9,7 +9,7 @@
 
 namespace gsnav_report {
 
-/// docs/approximations.md: each approximation, its knob, its measured error and what it buys, as
+/// docs/notes/approximations.md: each approximation, its knob, its measured error and what it buys, as
 /// Markdown. `command` is what made it, for its first line.
 std::string approximations_page(const Table& table, const std::string& command);
 

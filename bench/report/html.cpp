@@ -101,7 +101,7 @@ std::string html_page(const Table& table, bool acceptance) {
   }
   return out +
          "</main>\n<footer><div>Every error names the oracle that it was measured against; "
-         "docs/accuracy.md "
+         "docs/reference/image_contract.md "
          "defines them. SSIM: Wang et al. 2004. FLIP: Andersson et al. 2020, 67 pixels per "
          "degree.</div></footer>\n"
          "</body>\n</html>\n";

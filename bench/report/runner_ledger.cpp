@@ -47,7 +47,8 @@ std::vector<Row> ledger_rows() {
   const double rounding = static_cast<double>(std::numeric_limits<float>::epsilon()) / 2;
   std::vector<Row> rows{
       entry("exact", "float32 arithmetic", "", rounding, "relative, a rounding",
-            "all kernels; forms that do not cancel, means projected in float64 (docs/accuracy.md)"),
+            "all kernels; forms that do not cancel, means projected in float64 "
+            "(docs/reference/image_contract.md)"),
       entry("exact", "exp2 by a polynomial of degree 5", "", exp2_error<Exp2::degree5>(),
             "relative, of alpha", "rounding; measured over the exponents that pass the alpha cut"),
       entry("exact", "sort by the float32 key", "key_bits", rounding, "relative, of depth",
@@ -61,7 +62,7 @@ std::vector<Row> ledger_rows() {
       entry("fast", "SH bands left out", "", kUnseenColor, "colour, a Gaussian",
             "bands of a chunk that change none of its colours by more, seen from anywhere; in tools "
             "that profile a "
-            "scene (docs/lod.md)"),
+            "scene (docs/notes/lod.md)"),
       entry(
           "lod", "merged Gaussians", "", LodChoice{}.pixels, "pixels, root mean square",
           "what was merged lies no farther from where it is shown, on this sensor; all else as in fast"),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Meshes among Gaussians: docs/composition.md.
+// Meshes among Gaussians: docs/reference/composition.md.
 #include <doctest/doctest.h>
 
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Surfaces that are seen through, and holes in others, among Gaussians: docs/composition.md.
+// Surfaces that are seen through, and holes in others, among Gaussians: docs/reference/composition.md.
 #include <doctest/doctest.h>
 
 #include <algorithm>

@@ -74,7 +74,7 @@ TEST_CASE("images: every storage and selection of rows draws the same bits on ev
       if (there.config().quality.exponential == Exponential::exact) {
         check_same_bits(single, reference);
       } else if (!reference.rgb
-                      .empty()) {  // the device has an exponential of its own there (docs/cuda.md)
+                      .empty()) {  // the device has an exponential of its own there (docs/notes/cuda.md)
         CHECK(image_error(single.rgb, reference.rgb, 3).psnr > 80);
       }
       if (scene.in_batches) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// docs/ownership.md: what would view a temporary does not compile; types are deduced from the backend.
+// docs/reference/ownership.md: what would view a temporary does not compile; types are deduced from the
+// backend.
 #include <doctest/doctest.h>
 
 #include <concepts>

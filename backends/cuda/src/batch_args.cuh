@@ -11,7 +11,7 @@
 #include "gsnav/detail/frame/tiles.hpp"
 #include "search.cuh"
 
-// What the kernels of a batch read and write (docs/cuda.md).
+// What the kernels of a batch read and write (docs/notes/cuda.md).
 
 namespace gsnav::cuda {
 

@@ -6,8 +6,8 @@
 
 #include "batch_args.cuh"
 
-// The order of a tile's list, found as far as it is read (docs/cuda.md). All threads of a block call
-// every function together; before a call they are done with what they were lent.
+// The order of a tile's list, found as far as it is read (docs/notes/cuda.md). All threads of a block
+// call every function together; before a call they are done with what they were lent.
 
 namespace gsnav::cuda {
 

@@ -6,8 +6,8 @@
 #include "gsnav/backends/cuda/device.cuh"
 #include "mesh_work.cuh"
 
-// Meshes on the device (docs/composition.md): a thread a vertex, a triangle or a pixel. There are no
-// tile lists: an atomic maximum of PixelWord finds the triangle that a pixel shows.
+// Meshes on the device (docs/reference/composition.md): a thread a vertex, a triangle or a pixel. There
+// are no tile lists: an atomic maximum of PixelWord finds the triangle that a pixel shows.
 
 namespace gsnav {
 

@@ -229,7 +229,7 @@ class NavMesh {
   // are symmetric and obey the triangle inequality. The surface is that of the height triangles; a
   // polygon that is level to a millimetre counts as flat. The first distance asked for prepares the
   // others, once a mesh: tenths of a second and tens of megabytes for hundreds of polygons, at most 95
-  // MiB; seconds and up to 64 MiB on large hills (docs/navigation.md).
+  // MiB; seconds and up to 64 MiB on large hills (docs/notes/navigation.md).
   /// Whether find_path finds a path: every search ends, so this needs none.
   PathStatus path_status(const Vec3d& start, const Vec3d& goal,
                          const SnapOptions& options = {}) const noexcept;

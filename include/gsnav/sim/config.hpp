@@ -27,9 +27,9 @@ struct SimulatorConfig {
   /// How sensors draw. They choose `outputs`, and the scene's first asset chooses `sort_order`: a value
   /// that is neither the default nor theirs is an error.
   RenderConfig render{};
-  /// Draws the assets by levels of detail: the profile lod (docs/lod.md), with Exponential::fast
-  /// whatever render.quality has. Each needs its tree (SceneAsset::lod). No hysteresis: an image depends
-  /// on its camera, not on what was seen before.
+  /// Draws the assets by levels of detail: the profile lod (docs/concepts/scene.md), with
+  /// Exponential::fast whatever render.quality has. Each needs its tree (SceneAsset::lod). No
+  /// hysteresis: an image depends on its camera, not on what was seen before.
   std::optional<LodChoice> lod{};
   /// Draws of the assets only what is seen from where a camera is, by the rules of the profile fast
   /// (VisibleSets). Each needs its sets (SceneAsset::visible); from where these know nothing, all is

@@ -40,7 +40,7 @@ struct SceneAsset {
 };
 
 /// A surface of triangles and how it stands in the world; seen among the Gaussians
-/// (docs/composition.md).
+/// (docs/reference/composition.md).
 struct SceneMesh {
   std::shared_ptr<const PlacedMeshes> surface;
   Similarity world_from_surface{};

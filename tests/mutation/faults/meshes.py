@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Naive ways of drawing meshes, and of putting them among Gaussians (docs/composition.md)."""
+"""Naive ways of drawing meshes, and of putting them among Gaussians (docs/reference/composition.md)."""
 from . import fault
 
 MESH = "tests/ops/test_mesh.cpp"

@@ -9,7 +9,7 @@
 #include <utility>
 
 // Blocks of threads on the host: what device code finds around it when a C++ compiler has compiled it
-// (docs/cuda.md).
+// (docs/notes/cuda.md).
 
 struct CUstream_st;
 

@@ -40,7 +40,8 @@ struct CudaSpace {};
 
 /// Runs on one NVIDIA GPU, by the same kernels as the CPU: keys and footprints, and float32 images of
 /// the profile `exact`, have the CPU's bits; images of `fast` differ by the CPU's exponential
-/// (docs/cuda.md). Work goes to one stream in order. Link gsnav::cuda; the header itself needs no CUDA.
+/// (docs/notes/cuda.md). Work goes to one stream in order. Link gsnav::cuda; the header itself needs no
+/// CUDA.
 ///
 /// A call that the driver refuses is remembered and reported by the next `synchronize()`; what was asked
 /// for after it is not done.

@@ -16,7 +16,7 @@ namespace gsnav::eval {
 
 /// What the image of a set of Gaussians is taken to be. An error figure names the kind it is against.
 enum class OracleKind : std::uint8_t {
-  contract,     ///< docs/accuracy.md, "The image"
+  contract,     ///< docs/reference/image_contract.md, "The image"
   untruncated,  ///< the contract without alpha_min and transmittance_min; max_alpha stays
   ray,          ///< maximum response along each pixel's ray: the model error of EWA. Near rules stay
 };
@@ -68,8 +68,8 @@ struct OracleConfig {
   /// `untruncated` with boxes leaves alpha < kNegligibleAlpha out.
   bool boxed = true;
   PixelRect crop{};  ///< what to render of the camera's image; all 0: everything
-  /// Hides the Gaussians behind it and closes its pixels (docs/composition.md). Null: none. Must outlive
-  /// the call.
+  /// Hides the Gaussians behind it and closes its pixels (docs/reference/composition.md). Null: none.
+  /// Must outlive the call.
   const OracleMesh* mesh = nullptr;
 };
 

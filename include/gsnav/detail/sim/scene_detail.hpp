@@ -13,8 +13,8 @@
 
 namespace gsnav {
 
-/// How a scene's assets are drawn by levels of detail (docs/lod.md), by what is seen from where the
-/// camera is, or both.
+/// How a scene's assets are drawn by levels of detail (docs/concepts/scene.md), by what is seen from
+/// where the camera is, or both.
 struct SceneDetail {
   struct Asset {
     const LodTree* tree;  ///< null: all of the cloud, or what of it is seen

@@ -16,7 +16,7 @@ struct BatchCamera {
   /// Indices into the call's sets, each at most once; blended as one list, ties by place in this list.
   /// Empty: all sets, in order. Read during the call only.
   std::span<const std::uint32_t> sets;
-  /// Meshes among these Gaussians (docs/composition.md), arrays on the device.
+  /// Meshes among these Gaussians (docs/reference/composition.md), arrays on the device.
   MeshFrame meshes{};
   /// Selection::seen of each of `sets` (of all sets, where that is empty) for this camera:
   /// cameras that look at one set from several places still share it. Empty: those of the sets. Read
@@ -35,7 +35,7 @@ struct BatchImages {
 /// What a batch was made of; all cameras together.
 struct BatchStats {
   std::uint64_t tile_intersections =
-      0;  ///< (tile, Gaussian) pairs; docs/cuda.md says how large tiles are
+      0;  ///< (tile, Gaussian) pairs; docs/notes/cuda.md says how large tiles are
   std::uint64_t parts_read =
       0;  ///< kChunkPart rows each, that may be in view, counted once for 32 cameras
   std::uint64_t scratch_bytes = 0;  ///< held on the device, without scene and images
@@ -44,7 +44,7 @@ struct BatchStats {
   MeshStats meshes;
 };
 
-/// Draws many cameras in one call on one GPU; docs/cuda.md says how. Images have the bits that
+/// Draws many cameras in one call on one GPU; docs/notes/cuda.md says how. Images have the bits that
 /// `BasicRenderer<float, CudaBackend>` gives each camera alone, whatever the batch.
 ///
 ///     gsnav::CudaBatchRenderer batch(cuda, config);
