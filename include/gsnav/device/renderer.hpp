@@ -28,9 +28,10 @@ struct RenderOptions {
 /// Renders a scene on any device: Gaussians, meshes and avatars in one image.
 ///
 /// The renderer keeps the scene in the device's memory, and its scratch memory between calls. It owns or
-/// shares all that it needs, so arguments need not outlive a call (docs/ownership.md). Images have the
-/// same bits as those of `BasicRenderer<float, B>`, where B is the device's backend. Not thread-safe:
-/// calls of one renderer must not overlap. After a move, the old object returns invalid_argument.
+/// shares all that it needs, so arguments need not outlive a call (docs/reference/ownership.md). Images
+/// have the same bits as those of `BasicRenderer<float, B>`, where B is the device's backend. Not
+/// thread-safe: calls of one renderer must not overlap. After a move, the old object returns
+/// invalid_argument.
 ///
 /// @code
 /// auto device = gsnav::Device::parse("best").value();

@@ -37,7 +37,7 @@ class SimulatorEngine;
 /// @endcode
 class Simulator {
  public:
-  /// Creates a simulator that shares `scene` (docs/ownership.md).
+  /// Creates a simulator that shares `scene` (docs/reference/ownership.md).
   /// @param others further bodies, numbered after the scene's avatars
   /// @return invalid_argument naming the field, sensor or asset; unsupported if the device is not
   ///   available; out_of_memory; backend_failure.

@@ -6,8 +6,8 @@
 namespace gsnav {
 
 /// Renderer whose rules for footprint, early stop and depth a frame follows. All values but `none` are
-/// for parity tests (docs/accuracy.md, "Compat modes"). "Exclusive stop" means that the Gaussian that
-/// closes a pixel is not blended.
+/// for parity tests (docs/reference/image_contract.md, "Compat modes"). "Exclusive stop" means that the
+/// Gaussian that closes a pixel is not blended.
 enum class Compat : std::uint8_t {
   none,    ///< gsnav's own rules: the image contract
   inria,   ///< Footprint: square of 3 standard deviations, extended to 16-pixel tiles. Exclusive stop,

@@ -16,7 +16,7 @@
 namespace gsnav {
 
 /// Settings of one frame: images to make, image quality, and how the frame is computed. The defaults
-/// follow the image contract (docs/accuracy.md).
+/// follow the image contract (docs/reference/image_contract.md).
 struct RenderConfig {
   /// Images to make, a bitmask of kRgb, kAlpha, kMedianDepth, ... Ignored by calls that take a
   /// FrameImages: those make the images it points to.
@@ -32,7 +32,7 @@ struct RenderConfig {
   Vec3d background{0, 0, 0};                ///< colour behind everything, in blend_space
   Composite composite = Composite::merged;  ///< Rule by which Gaussians and meshes are combined in
                                             ///< frames that have both.
-  Quality quality{};                        ///< error budget: exact, fast, ... (docs/accuracy.md)
+  Quality quality{};             ///< error budget: exact, fast, ... (docs/reference/image_contract.md)
   Tuning tuning{};               ///< Settings that affect speed only. They change no bit of the image.
   Compat compat = Compat::none;  ///< another renderer's rules, for parity tests
 

@@ -32,8 +32,8 @@ namespace gsnav {
 /// calls, so that a second frame of the same size allocates only what the caller's vectors need.
 ///
 /// The backend must outlive the renderer. So must the arrays of the meshes that are set; sets and
-/// cameras are read during a call only (docs/ownership.md). A moved-from renderer keeps its settings,
-/// has no meshes and no scratch, and may render again.
+/// cameras are read during a call only (docs/reference/ownership.md). A moved-from renderer keeps its
+/// settings, has no meshes and no scratch, and may render again.
 ///
 /// Floating-point arithmetic must round to nearest (`fegetround() == FE_TONEAREST`, the default of a
 /// program); other modes give other bits. Flushing denormals to zero changes none.
@@ -49,9 +49,9 @@ class BasicRenderer {
   /// Replaces the settings. They are checked when a frame is rendered.
   void set_config(const RenderConfig& config) { config_ = config; }
 
-  /// Sets the meshes that the coming frames draw among the Gaussians (docs/composition.md), and their
-  /// light. An empty span removes them. Only views are copied: the arrays must be in the backend's
-  /// memory and stay valid while frames use them. To move a mesh, set all of them again.
+  /// Sets the meshes that the coming frames draw among the Gaussians (docs/reference/composition.md),
+  /// and their light. An empty span removes them. Only views are copied: the arrays must be in the
+  /// backend's memory and stay valid while frames use them. To move a mesh, set all of them again.
   void set_meshes(std::span<const MeshInstance> meshes, const MeshLight& light = {}) {
     meshes_.assign(meshes.begin(), meshes.end());
     light_ = light;

@@ -35,7 +35,7 @@ struct LodBox {
   std::uint32_t shown = 0;  ///< Gaussians of the cloud that the node stands for.
 };
 
-/// A cloud at every level of detail (docs/lod.md). There are two forms.
+/// A cloud at every level of detail (docs/concepts/scene.md). There are two forms.
 ///
 /// A tree: a binary tree over the chunks of a cloud in spatial order. Leaves are the chunks of the
 /// cloud. A node above them shows what its two children show with half the Gaussians, at most

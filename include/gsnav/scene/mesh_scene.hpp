@@ -222,7 +222,7 @@ class MeshScene {
 
 /// The arrays of a mesh in a backend's memory. Other backends than host backends get a copy. On host
 /// backends nothing is copied, and the arrays that `mesh` views must outlive this object
-/// (docs/ownership.md).
+/// (docs/reference/ownership.md).
 template <Backend B>
 class MeshArrays {
  public:

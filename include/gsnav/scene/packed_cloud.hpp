@@ -22,7 +22,7 @@ namespace gsnav {
 struct PackLimits {
   /// Largest movement of a mean, in the Gaussian's largest standard deviations; above it means stay
   /// float32. 16 bits within a chunk's box save 6 bytes for each Gaussian, but Gaussians at nearly one
-  /// depth may change places (docs/formats.md).
+  /// depth may change places (docs/reference/formats.md).
   double mean = 0;
   double sh = 2e-3;  ///< Largest root mean square error of SH coefficients of bands 1 to 3 with 8 bits;
                      ///< above it they become binary16.

@@ -28,7 +28,7 @@ namespace gsnav {
 /// For each cell of space, the chunks and rows of a cloud that can be seen from it, so that renderers
 /// can skip Gaussians behind walls. The sets are sampled: for cameras in a cell, chunks and rows are
 /// left out that were not visible from any viewpoint in or near the cell. They are an approximation, for
-/// the profiles `fast` and `lod`; docs/lod.md gives the error.
+/// the profiles `fast` and `lod`; docs/concepts/scene.md gives the error.
 struct VisibleSets {
   /// Index of a cell along x, y and z.
   using Key = std::array<std::int32_t, 3>;

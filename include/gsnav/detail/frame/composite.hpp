@@ -8,7 +8,8 @@
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/image/mesh_layer.hpp"
 
-// Composites Gaussians and meshes (docs/composition.md). Frames without a mesh do not run this code.
+// Composites Gaussians and meshes (docs/reference/composition.md). Frames without a mesh do not run this
+// code.
 
 namespace gsnav {
 

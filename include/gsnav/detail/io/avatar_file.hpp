@@ -57,10 +57,10 @@ struct LoadedAvatar {
 /// Four or eight weights are kept for each Gaussian (`options.weights`). `LoadedAvatar::weights` reports
 /// the error of that.
 ///
-/// A file with GART's parameters is read too (docs/avatars.md): _xyz, _rotation (w, x, y, z), _scaling,
-/// _opacity (logit), _features_dc [N,3], _features_rest [N,3(K-1)] (coefficient, then colour), with
-/// lbs_weights and joints_inv_bind_matrix. A scale is min_scale + sigmoid (max_scale - min_scale), with
-/// limits 0 and 0.1 if the file has none.
+/// A file with GART's parameters is read too (docs/concepts/avatar.md): _xyz, _rotation (w, x, y, z),
+/// _scaling, _opacity (logit), _features_dc [N,3], _features_rest [N,3(K-1)] (coefficient, then colour),
+/// with lbs_weights and joints_inv_bind_matrix. A scale is min_scale + sigmoid (max_scale - min_scale),
+/// with limits 0 and 0.1 if the file has none.
 ///
 /// gsnav's own files may add `capsules` [C,7] (both ends in the bind frame of a joint, and the radius,
 /// metres), `capsule_joints` [C], and `skinning` (Skinning: 0 linear, 1 linear with stretch, whose

@@ -11,8 +11,8 @@
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/math/vec.hpp"
 
-// Triangle meshes in the form in which kernels read them. docs/composition.md describes how they are
-// drawn.
+// Triangle meshes in the form in which kernels read them. docs/reference/composition.md describes how
+// they are drawn.
 
 namespace gsnav {
 

@@ -8,7 +8,7 @@
 #include "gsnav/math/vec.hpp"
 
 // Clipping, and projection to the lattice of 2^-14 px on which coverage is decided exactly
-// (docs/composition.md).
+// (docs/reference/composition.md).
 
 namespace gsnav {
 

@@ -17,7 +17,7 @@ struct MeshFrame {
 };
 
 /// Draws the images of one camera. Without meshes it calls render_camera; otherwise meshes and Gaussians
-/// are composited (docs/composition.md). `sets` may be empty.
+/// are composited (docs/reference/composition.md). `sets` may be empty.
 /// @return the errors of render_camera and draw_meshes; unsupported for Composite::hard_depth with a
 ///   see-through mesh.
 template <class S, Backend B>

@@ -14,8 +14,8 @@ enum class Exponential {
   fast,   ///< A cubic: alpha within 1.0e-4 relative. On a GPU the hardware instruction, within 2e-7.
 };
 
-/// The settings of RenderConfig that trade accuracy for speed. docs/accuracy.md has the error budgets,
-/// measured against the float64 contract image.
+/// The settings of RenderConfig that trade accuracy for speed. docs/reference/image_contract.md has the
+/// error budgets, measured against the float64 contract image.
 struct Quality {
   /// Frames with meshes always use Exponential::exact.
   Exponential exponential = Exponential::exact;

@@ -50,7 +50,8 @@ inline std::size_t limit_sh_degree(PackedCloud& cloud, int degree) {
 
 /// Drops the bands of a cloud (GaussianCloud or PackedCloud) that no chunk needs. `needed` is the result
 /// of scene_bands for this cloud; it still fits afterwards, and gets the number of bytes dropped. Bands
-/// that only some chunks need are kept for all (docs/lod.md has what storage by chunk would save).
+/// that only some chunks need are kept for all (docs/concepts/scene.md has what storage by chunk would
+/// save).
 template <class Cloud>
 void drop_bands(Cloud& cloud, SceneBands& needed) {
   needed.bytes_let_go +=

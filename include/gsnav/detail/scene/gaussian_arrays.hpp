@@ -18,7 +18,7 @@ namespace gsnav {
 /// The arrays of a cloud in a backend's memory. On host backends nothing is copied, and the cloud (and
 /// `bands`, if given) must outlive this object. Other backends get a copy, in which a packed cloud
 /// becomes floats. Temporaries do not compile on any backend, so that code which is right on one is
-/// right on all (docs/ownership.md). The backend must outlive this object.
+/// right on all (docs/reference/ownership.md). The backend must outlive this object.
 template <Backend B>
 class GaussianArrays {
  public:
