@@ -94,7 +94,7 @@ DEVICES = {
                 r"(?<!is )(?<!are )\bused to (?:be|have|take|do|give|go|make)\b", r"\bin earlier versions\b"],
 }
 DEVICES = {rule: [re.compile(p) for p in patterns] for rule, patterns in DEVICES.items()}
-ABBREVIATION = re.compile(r"(?:\b(?:e\.g|i\.e|vs|etc|cf|Fig|Eq|Sec|No|approx|al|resp|incl|max|min|St)|^\W*\d+|\b[A-Z])$")
+ABBREVIATION = re.compile(r"(?:\b(?:e\.g|i\.e|vs|etc|cf|Fig|Eq|Sec|No|approx|al|resp|incl|max|min)|^\W*\d+|\b[A-Z])$")
 SENTENCE_END = re.compile(r"[.!?][\"')\]*_]*\s+")
 INLINE_CODE = re.compile(r"(`+)(?!`).*?(?<!`)\1(?!`)|(?<!\w)\"[^\"]{1,60}\"(?!\w)")
 LINK = re.compile(r"\]\([^)\s]*(?: \"[^\"]*\")?\)|<?https?://[^\s>)]+>?")
@@ -157,7 +157,7 @@ def markdown(lines):
             code_before = current is None
             if not (found and found[-1].kind == "item"):
                 continue
-        if blank or line.lstrip().startswith(("<!--", "<", "[")) and re.match(r"\s*(<!--.*|<[^>]*>|\[[^]]*\]:.*)$", line):
+        if blank or re.match(r"\s*(<!--.*|<[^>]*>|\[[^]]*\]:.*)$", line):
             current = None
             continue
         if line.lstrip().startswith("|"):
@@ -311,6 +311,9 @@ def colons(text):
     return len(re.findall(r"(?<![\d:]):(?=\s|$)|(?<=\d):(?=\s)", text))
 
 
+MOST_WORDS_OF = {"page": MOST_WORDS, "item": MOST_WORDS, "cell": MOST_WORDS, "comment": MOST_WORDS_OF_COMMENT}
+
+
 def check_paragraph(p, goal):
     """(offset, rule, text) of each finding."""
     text = plain(p.text())
@@ -320,7 +323,7 @@ def check_paragraph(p, goal):
         body = sentence.lstrip("\"'( ")
         shift = offset + len(sentence) - len(body)
         words = count_words(sentence)
-        most = {"page": MOST_WORDS, "item": MOST_WORDS, "cell": MOST_WORDS, "comment": MOST_WORDS_OF_COMMENT}.get(p.kind)
+        most = MOST_WORDS_OF.get(p.kind)
         if most and words > most:
             yield offset, "sentence", f"{words} words: {sentence[:60]}"
         elif most and goal and words > GOAL_WORDS:

@@ -33,6 +33,8 @@ GROUPS = (("render", "Scenes and rendering", "render", ("render", "image", "fram
           ("math", "Mathematics", None, ("math",)),
           ("backends", "Serial, OpenMP and CUDA", None, ("backends",)),
           ("interop", "Eigen, GLM and DLPack", None, ("interop",)))
+# Launch sizes of the CUDA kernels. Only changes of the backend read them.
+NOT_FOR_USERS = {"policy.hpp"}
 # Folders of pages, in the order of the menu.
 SECTIONS = (("Guide", "docs/guide"), ("Concepts", "docs/concepts"), ("Reference", "docs/reference"),
             ("Topics", "docs"), ("Notes", "docs/notes"))
@@ -50,8 +52,10 @@ def headers():
             for name in re.findall(r'#include "(gsnav/[^"]+)"', text):
                 found.setdefault(ROOT / "include" / name, group)
     public = [p for p in (ROOT / "include/gsnav").rglob("*.hpp") if "detail" not in p.parts]
-    for path in public + [p for p in ROOT.glob("backends/*/gsnav/**/*") if p.suffix in {".hpp", ".cuh"}]:
-        part = path.relative_to(ROOT / "include/gsnav").parts[0] if path.is_relative_to(ROOT / "include") else "backends"
+    for path in public + [
+            p for p in ROOT.glob("backends/*/gsnav/**/*.hpp") if p.name not in NOT_FOR_USERS]:
+        own = path.is_relative_to(ROOT / "include")
+        part = path.relative_to(ROOT / "include/gsnav").parts[0] if own else "backends"
         for group, _, _, folders in GROUPS:
             if part in folders:
                 found.setdefault(path, group)
@@ -123,7 +127,56 @@ def header_text(path, name, group):
         text = re.sub(r"\A(.*?)\n\n", r"\1\n", text, count=1, flags=re.DOTALL)
     text = opens.sub(rf"\g<0> /** @addtogroup {group}\n@{{ */", text)
     text = re.sub(r"^\}  // namespace gsnav(?:::(?!detail)\w+)*$", r"/** @} */ \g<0>", text, flags=re.MULTILINE)
-    return text.replace("#pragma once", f"/** @file {name} */", 1)
+    text = text.replace("#pragma once", f"/** @file {name} */", 1)
+    return document_the_obvious(text)
+
+
+# Functions whose meaning the language fixes.
+OBVIOUS = ((re.compile(r"^ *(?:explicit )?(\w+)\(\1&&\)"), "Moves from the other, which is empty afterwards."),
+           (re.compile(r"^ *(?:explicit )?(\w+)\(const \1&\)"), "Copies the other."),
+           (re.compile(r"^ *\w+& operator=\(\w+&&\)"), "Moves from the other, which is empty afterwards."),
+           (re.compile(r"^ *\w+& operator=\(const \w+&\)"), "Copies the other."),
+           (re.compile(r"^ *(?:virtual )?~\w+\("), "Releases all that it holds."),
+           (re.compile(r"^ *(?:friend )?(?:constexpr )?(?:bool|auto) operator(?:==|<=>)\(.*\).* = default;"),
+            "Compares all members."),
+           (re.compile(r"^ *explicit operator bool\(\) const"), "Same as ok()."))
+FIELDS = re.compile(r"^( *)((?:static |inline |constexpr |mutable )*(?:[\w:]+(?:<[^;={}]*>)?)[*&]? )"
+                    r"(\w+(?: = [^,;]+|\{\})?(?:, \w+(?: = [^,;]+|\{\})?)+);(?:\s*///< (.*))?$")
+FUNCTION = re.compile(r"^ *(?:template .*> )?(?:GSNAV_HD |static |constexpr |virtual |inline |friend )*"
+                      r"[\w:<>,*& ]*?[ *&](\w+|operator *[^\s(]+)\(")
+
+
+def document_the_obvious(text):
+    """Gives functions that the language defines their meaning, several fields of one line its comment each, and
+    overloads directly behind a documented one a reference to it. Lines keep their numbers."""
+    lines, out, documented, above = text.split("\n"), [], "", ""
+    for line in lines:
+        bare = line.strip()
+        commented = above.startswith("///")
+        several = FIELDS.match(line)
+        if several and (several.group(4) or commented) and "(" not in several.group(3).split("=")[0]:
+            said = several.group(4) or above.lstrip("/ ")
+            names = re.split(r", (?=\w+(?: =|\{|,|$))", several.group(3))
+            first = several.group(1) + several.group(2) + names[0] + ";" + (f" ///< {said}" if not commented else "")
+            rest = " ".join(f"/** {said} */ {several.group(2)}{name};" for name in names[1:])
+            line = f"{several.group(1)}{rest} {first.strip()}" if not commented else f"{first} {rest}"
+        elif not commented:
+            for pattern, said in OBVIOUS:
+                if pattern.match(line):
+                    line = f"/** {said} */ {line}"
+                    break
+            else:
+                function = FUNCTION.match(line)
+                if function and function.group(1) == documented and "///" not in line:
+                    line = f"/** @overload */ {line}"
+        function = FUNCTION.match(line.split("*/ ", 1)[-1])
+        if function and (commented or "/**" in line or "///<" in line):
+            documented = function.group(1)
+        elif not bare or bare.endswith(("}", "{")) and not function:
+            documented = "" if not bare else documented
+        out.append(line)
+        above = bare if not bare.startswith("template") else above
+    return "\n".join(out)
 
 
 def write_inputs(out):
@@ -166,7 +219,8 @@ def write_layout(out):
                 for title, folder in SECTIONS] + [("Project", [p for p in ABOUT if p in known])]
     for title, listed in sections:
         if listed:
-            entries = "".join(f'<tab type="user" url="@ref {label(p)}" title={quoteattr(title_of(p))}/>' for p in listed)
+            entries = "".join(f'<tab type="user" url="@ref {label(p)}" title={quoteattr(title_of(p))}/>'
+                              for p in listed)
             tabs.append(f'<tab type="usergroup" visible="yes" title="{title}">{entries}</tab>')
     tabs.append('<tab type="modules" visible="yes" title="API"/>')
     tabs.append('<tab type="usergroup" visible="yes" title="Index"><tab type="classlist" visible="yes" title="Types"/>'

@@ -34,7 +34,8 @@ SENTENCES = {
               "It uses as many threads as cores."]),
     "possessive": (["0 is the default of Mip-Splatting's.", "The axes are the file's.", "It is faster than ours."],
                    ["0 is Mip-Splatting's default.", "The file's axes are kept.", "It is faster than our kernel."]),
-    "of": (["Of a chunk in view the rows are tested."], ["The rows of a chunk in view are tested.", "Of course it is."]),
+    "of": (["Of a chunk in view the rows are tested."],
+           ["The rows of a chunk in view are tested.", "Of course it is."]),
     "old": (["It is exact but for rounding.", "No file can be had.", "Memory is the host's or not, as the set has it."],
             ["It is exact, rounding aside.", "No file is available.", "The set says where its memory is."]),
     "history": (["Larger tiles were tried and not kept.", "Lists used to be sorted twice."],
@@ -55,8 +56,9 @@ class Rules(unittest.TestCase):
         self.assertEqual(set(SENTENCES) | {"columns", "sentence", "goal"}, set(check_words.RULES))
 
     def test_sentences_in_every_kind_of_file(self):
-        wrap = {"docs/a.md": "# Title\n\nText.\n\n{}\n", "include/a.hpp": "/// {}\nint f();\n", "src/a.cu": "int a;  // {}\n",
-                "src/b.cpp": "/* {} */\n", "tools/a.py": '"""{}"""\n', "tools/b.py": "a = 1  # {}\n", "tools/a.sh": "# {}\n",
+        wrap = {"docs/a.md": "# Title\n\nText.\n\n{}\n", "include/a.hpp": "/// {}\nint f();\n",
+                "src/a.cu": "int a;  // {}\n", "src/b.cpp": "/* {} */\n", "tools/a.py": '"""{}"""\n',
+                "tools/b.py": "a = 1  # {}\n", "tools/a.sh": "# {}\n",
                 "cmake/a.cmake": "set(a b)\n# {}\n", "CMakeLists.txt": "# {}\n"}
         for rule, (wrong, right) in SENTENCES.items():
             for name, form in wrap.items():
