@@ -40,6 +40,8 @@ SECTIONS = (("Guide", "docs/guide"), ("Concepts", "docs/concepts"), ("Reference"
             ("Topics", "docs"), ("Notes", "docs/notes"))
 ABOUT = ("CONTRIBUTING.md", "CHANGELOG.md")
 FENCE = re.compile(r"\s*(```|~~~)")
+REFERENCE = re.compile(r"\[([^\]]*)\]\(@ref [^)]*\)")
+SPAN = re.compile(r"`[^`\n]+\n[^`\n]+`")  # Doxygen takes the second line for a list where it begins with + or -
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s]+)\)")
 
 
@@ -102,18 +104,22 @@ def page_text(name, known):
             return text if "`" in text else f"`{linked}`" if text == linked else text
         return f"[{text}](@ref {label(linked, anchor)})"
 
-    for line in (ROOT / name).read_text(encoding="utf-8").splitlines():
+    source = (ROOT / name).read_text(encoding="utf-8")
+    parts = re.split(r"(^ *```.*?^ *```|^    [^\n]*)", source, flags=re.DOTALL | re.MULTILINE)
+    parts[::2] = (SPAN.sub(lambda m: m.group().replace("\n", " "), LINK.sub(link, part)) for part in parts[::2])
+    source = "".join(parts)
+    for line in source.splitlines():
         code ^= bool(FENCE.match(line))
         heading = re.match(r"(#{1,6}) (.*?)#*$", line)
         if code or line.startswith("    "):
             out.append(line)
         elif heading:
-            mark, text = heading.group(1), LINK.sub(r"\1", heading.group(2).strip())
-            own = label(name) if mark == "#" and not seen else label(name, heading.group(2))
+            mark, text = heading.group(1), REFERENCE.sub(r"\1", heading.group(2).strip())
+            own = label(name) if mark == "#" and not seen else label(name, text)
             out.append(f"{mark} {text}" + (f" {{#{own}}}" if own not in seen else ""))
             seen.add(own)
         else:
-            parts = re.split(r"(`[^`]*`|\]\(@ref [^)]*\))", LINK.sub(link, line))
+            parts = re.split(r"(`[^`]*`|\]\(@ref [^)]*\))", line)
             out.append("".join(part if k % 2 else re.sub(r"@|<(?=[\d\s=])", r"\\\g<0>", part)
                                for k, part in enumerate(parts)))
     return "\n".join(out) + "\n"
@@ -128,7 +134,19 @@ def header_text(path, name, group):
     text = opens.sub(rf"\g<0> /** @addtogroup {group}\n@{{ */", text)
     text = re.sub(r"^\}  // namespace gsnav(?:::(?!detail)\w+)*$", r"/** @} */ \g<0>", text, flags=re.MULTILINE)
     text = text.replace("#pragma once", f"/** @file {name} */", 1)
-    return document_the_obvious(text)
+    # Explicit instantiations repeat a template that is documented elsewhere.
+    text = re.sub(r"^extern template [^;]*;", lambda m: "\n" * m.group().count("\n"), text, flags=re.MULTILINE)
+    return document_the_obvious(plain_comments(text))
+
+
+def plain_comments(text):
+    """Escapes in comments what Doxygen would take for HTML or a command: Simulator<B>, \\xNN."""
+    def escape(m):
+        parts = re.split(r"(`[^`]*`)", m.group())
+        return "".join(part if k % 2 else re.sub(r"<(?=/?[A-Za-z])|\\(?=x)|(?<=\w)@(?=\w)|(?<=[\w>])::(?=create\b)", r"\\\g<0>", part)
+                       for k, part in enumerate(parts))
+
+    return re.sub(r"///<? ?(?! {4}).*", escape, text)
 
 
 # Functions whose meaning the language fixes.
@@ -141,7 +159,7 @@ OBVIOUS = ((re.compile(r"^ *(?:explicit )?(\w+)\(\1&&\)"), "Moves from the other
             "Compares all members."),
            (re.compile(r"^ *explicit operator bool\(\) const"), "Same as ok()."))
 FIELDS = re.compile(r"^( *)((?:static |inline |constexpr |mutable )*(?:[\w:]+(?:<[^;={}]*>)?)[*&]? )"
-                    r"(\w+(?: = [^,;]+|\{\})?(?:, \w+(?: = [^,;]+|\{\})?)+);(?:\s*///< (.*))?$")
+                    r"(\w+(?:\[\w+\])?(?: = [^,;]+|\{[^{}]*\})?(?:, \w+(?:\[\w+\])?(?: = [^,;]+|\{[^{}]*\})?)+);(?:\s*///< (.*))?$")
 FUNCTION = re.compile(r"^ *(?:template .*> )?(?:GSNAV_HD |static |constexpr |virtual |inline |friend )*"
                       r"[\w:<>,*& ]*?[ *&](\w+|operator *[^\s(]+)\(")
 
@@ -152,11 +170,11 @@ def document_the_obvious(text):
     lines, out, documented, above = text.split("\n"), [], "", ""
     for line in lines:
         bare = line.strip()
-        commented = above.startswith("///")
+        commented = above.startswith("///") and not above.startswith("///<")
         several = FIELDS.match(line)
         if several and (several.group(4) or commented) and "(" not in several.group(3).split("=")[0]:
             said = several.group(4) or above.lstrip("/ ")
-            names = re.split(r", (?=\w+(?: =|\{|,|$))", several.group(3))
+            names = re.split(r", (?=[A-Za-z_]\w*(?: =|\{|\[|,|$))", several.group(3))
             first = several.group(1) + several.group(2) + names[0] + ";" + (f" ///< {said}" if not commented else "")
             rest = " ".join(f"/** {said} */ {several.group(2)}{name};" for name in names[1:])
             line = f"{several.group(1)}{rest} {first.strip()}" if not commented else f"{first} {rest}"

@@ -6,6 +6,7 @@
 #if __cplusplus < 202002L
 #error "gsnav needs C++20: compile with -std=c++20 or later"
 // A header that does not exist: compilers stop here, before the errors that would follow from it.
+/// Name of a header that does not exist; it stops compilers with a clear message.
 #define GSNAV_STOP <gsnav needs -std=c++20 or later>
 #include GSNAV_STOP
 #endif

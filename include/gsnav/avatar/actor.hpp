@@ -16,6 +16,7 @@
 
 namespace gsnav {
 
+/// How an actor appears and moves.
 struct ActorOptions {
   double time_begin = 0.0;                                    ///< seconds on the scene's clock
   double time_end = std::numeric_limits<double>::infinity();  ///< it is gone after this
@@ -37,8 +38,11 @@ class AvatarActor {
                                     std::shared_ptr<const Trajectory> trajectory = nullptr,
                                     const ActorOptions& options = {});
 
+  /// The avatar that it shows.
   const std::shared_ptr<const AvatarAsset>& asset() const noexcept { return asset_; }
+  /// Where the actor stands over time.
   const Trajectory& trajectory() const noexcept { return *trajectory_; }
+  /// The settings.
   const ActorOptions& options() const noexcept { return options_; }
 
   /// Whether it is in the scene at time t (seconds on the scene's clock, as everywhere below).

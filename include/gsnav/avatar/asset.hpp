@@ -15,9 +15,9 @@ namespace gsnav {
 
 /// A capsule that moves with one joint: what navigation sees of a body.
 struct ProxyCapsule {
-  std::uint16_t joint = 0;
-  Vec3d p0{}, p1{};     ///< in the joint's bind frame, metres
-  double radius = 0.0;  ///< metres
+  std::uint16_t joint = 0;  ///< Index of the joint that the capsule moves with.
+  Vec3d p0{}, p1{};         ///< in the joint's bind frame, metres
+  double radius = 0.0;      ///< metres
 };
 
 /// How a body's Gaussians follow its joints. A captured avatar relies on what it was trained with, which
@@ -31,20 +31,21 @@ enum class Skinning : std::uint8_t {
 
 /// A body: what all actors that look alike share. Immutable once built.
 struct AvatarAsset {
-  std::string name;
-  Skeleton skeleton;
+  std::string name;                          ///< Name for messages.
+  Skeleton skeleton;                         ///< Joints and their rest pose.
   GaussianCloud cloud;                       ///< canonical pose, root frame (Y up, facing -Z), metres
   int influences = kInfluences4;             ///< K: joints that move one Gaussian, 4 or 8
   std::vector<std::uint16_t> joint_indices;  ///< [N][K], the greatest weight first
   std::vector<std::uint16_t>
-      skinning_weights;  ///< [N][K] parts of kWeightParts, which is the sum of each row
-  Skinning skinning = Skinning::linear;
+      skinning_weights;                  ///< [N][K] parts of kWeightParts, which is the sum of each row
+  Skinning skinning = Skinning::linear;  ///< How joints are blended.
   /// For linear_stretched (bake_weight_gradients): [N][K-1][3] of the second to last weight of each row,
   /// 1/metres.
   std::vector<float> weight_gradients;
-  std::vector<ProxyCapsule> capsules;
-  LocalPose idle;  ///< how it stands without a motion; empty: the rest pose
+  std::vector<ProxyCapsule> capsules;  ///< Capsules that cover the body, for contacts.
+  LocalPose idle;                      ///< how it stands without a motion; empty: the rest pose
 
+  /// Number of elements.
   std::size_t size() const noexcept { return cloud.size(); }
 
   /// Takes any k weights a Gaussian ([N][k], joint indices alongside; k = J with all joints for dense

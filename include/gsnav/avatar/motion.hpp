@@ -18,6 +18,7 @@ struct MotionInput {
   double distance = 0.0;  ///< metres walked since then
   /// Distances at which the present walk began and will end with a stop; infinite where there is none.
   double leg_begin = -std::numeric_limits<double>::infinity();
+  /// Distance at which the walk ends with a stop, metres; infinity if it does not.
   double leg_end = std::numeric_limits<double>::infinity();
   double turned = 0.0;   ///< radians turned on the spot since then, counted up whatever the direction
   double walking = 0.0;  ///< speed as a share of the walking speed, [0, 1]
@@ -44,6 +45,7 @@ class MotionSource {
 /// One pose for ever.
 class FixedPose final : public MotionSource {
  public:
+  /// Holds this pose for ever.
   explicit FixedPose(LocalPose pose) : pose_(std::move(pose)) {}
   void pose(const MotionInput&, LocalPose& out) const override { out = pose_; }
   std::size_t joint_count() const noexcept override { return pose_.rotations.size(); }
@@ -72,12 +74,13 @@ class MotionClip final : public MotionSource {
   std::vector<Quatd> rotations;         ///< [T][J] joint to parent, unit
   std::vector<Vec3d> translations;      ///< [T][J] or [J] (the same in all keys), metres
   std::vector<Vec3d> root_translation;  ///< [T] path of the whole avatar in its frame, or empty
-  ClipEnd end = ClipEnd::loop;
+  ClipEnd end = ClipEnd::loop;          ///< What happens after the last frame.
   /// Seconds from last to first key, at least one frame: smooth_wrap_time says how many nobody jumps in.
   double wrap_time = 0.0;
   double playback_rate = 1.0;  ///< seconds of the clip that go by in one second, > 0
   double start = 0.0;          ///< seconds into the clip (in its own time) at time 0
 
+  /// Number of frames.
   std::size_t frames() const noexcept { return joints == 0 ? 0 : rotations.size() / joints; }
   /// Seconds from the first key to the last.
   double duration() const noexcept;

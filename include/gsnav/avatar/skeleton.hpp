@@ -32,6 +32,7 @@ struct Skeleton {
   /// [J] root frame to joint in the bind pose, rigid. Empty: what rest_local gives.
   std::vector<Affine3<double>> inverse_binds;
 
+  /// Number of joints.
   std::size_t size() const noexcept { return parents.size(); }
 
   /// Index of the joint called `name`, or -1.
@@ -43,7 +44,7 @@ struct Skeleton {
   /// Root frame to joint in the bind pose, [J].
   std::vector<Affine3<double>> bind_inverses() const;
 
-  LocalPose rest_pose() const;
+  LocalPose rest_pose() const;  ///< The pose in which the skeleton was bound.
 
   /// invalid_argument, naming the joint, where arrays differ in length, a name is missing or doubled, a
   /// joint is its own ancestor, a parent does not come first, or a transform is not rigid (1e-3).

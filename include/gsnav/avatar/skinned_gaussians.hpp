@@ -26,6 +26,7 @@ namespace gsnav {
 template <Backend B>
 class AvatarArrays {
  public:
+  /// Copies the avatar to the backend's memory.
   AvatarArrays(B& backend, std::shared_ptr<const AvatarAsset> asset) : asset_(std::move(asset)) {
     set_ = asset_->cloud.set();
     GaussianRows& v = set_.gaussians;
@@ -51,6 +52,7 @@ class AvatarArrays {
     for (std::size_t k = 0; k < 4; ++k) args_.quats[k] = v.shape.quats[k];
   }
 
+  /// The avatar that it shows.
   const std::shared_ptr<const AvatarAsset>& asset() const noexcept { return asset_; }
   /// The canonical Gaussians; valid while this lives.
   const GaussianSet& set() const& noexcept { return set_; }
@@ -78,8 +80,10 @@ class AvatarArrays {
 template <Backend B>
 class SkinnedGaussians {
  public:
+  /// Copies the avatar to the backend's memory.
   SkinnedGaussians(B& backend, std::shared_ptr<const AvatarAsset> asset)
       : SkinnedGaussians(backend, std::make_shared<const AvatarArrays<B>>(backend, std::move(asset))) {}
+  /// Shares arrays that are already in the backend's memory.
   SkinnedGaussians(B& backend, std::shared_ptr<const AvatarArrays<B>> arrays)
       : backend_(&backend),
         arrays_(std::move(arrays)),
@@ -132,6 +136,7 @@ class SkinnedGaussians {
     if (visible_) actor.to_joint_matrices(matrices_);
     return {};
   }
+  /// Skins what prepare() found visible. Errors: as of skin().
   Status skin_prepared() { return visible_ ? skin() : Status(); }
 
   /// The posed Gaussians where the actor stands; empty before the first `pose`. Valid until the next,
@@ -143,6 +148,7 @@ class SkinnedGaussians {
   }
   GaussianSet set() const&& = delete;
 
+  /// The avatar that it shows.
   const std::shared_ptr<const AvatarAsset>& asset() const noexcept { return arrays_->asset(); }
 
  private:

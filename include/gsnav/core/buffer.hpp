@@ -19,12 +19,15 @@ class Buffer {
   static_assert(std::is_trivially_copyable_v<T>);
 
  public:
+  /// An empty buffer in the backend's memory.
   explicit Buffer(B& backend) noexcept : backend_(&backend) {}
+  /// Moves from the other, which is empty afterwards.
   Buffer(Buffer&& o) noexcept
       : backend_(o.backend_),
         data_(std::exchange(o.data_, nullptr)),
         size_(std::exchange(o.size_, 0)),
         capacity_(std::exchange(o.capacity_, 0)) {}
+  /// Moves from the other, which is empty afterwards.
   Buffer& operator=(Buffer&& o) noexcept {
     std::swap(backend_, o.backend_);
     std::swap(data_, o.data_);
@@ -52,11 +55,17 @@ class Buffer {
     if (o.capacity_ > capacity_) grow(o.capacity_, o.capacity_);
   }
 
+  /// First element, or null if there is none.
   T* data() noexcept { return data_; }
+  /// First element, or null if there is none.
   const T* data() const noexcept { return data_; }
+  /// Number of elements.
   std::size_t size() const noexcept { return size_; }
+  /// Memory that is reserved, in bytes.
   std::size_t capacity_bytes() const noexcept { return capacity_ * sizeof(T); }
+  /// A view of all elements, valid while this lives and keeps its size.
   View<T> view() noexcept { return {data_, size_}; }
+  /// A view of all elements, valid while this lives and keeps its size.
   View<const T> view() const noexcept { return {data_, size_}; }
 
   /// Copies from host memory; the size becomes n.

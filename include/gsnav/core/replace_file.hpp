@@ -173,6 +173,7 @@ class OutputFile {
     if (std::fwrite(data, 1, size, file_) != size) error_ = errno != 0 ? errno : EIO;
   }
   void write(std::string_view text) { write(text.data(), text.size()); }
+  /// Whether a write has failed.
   bool failed() const noexcept { return error_ != 0; }
 
   /// Forces the bytes to the disk, gives the file its name and forces that to the disk too; the object

@@ -11,8 +11,10 @@ namespace gsnav {
 /// numbers on every platform, and every instance is independent of all others.
 class Rng {
  public:
+  /// Starts the sequence of a seed.
   explicit Rng(std::uint64_t seed = 0) noexcept : state_(seed) {}
 
+  /// The next 64 random bits.
   std::uint64_t next() noexcept {
     state_ += 0x9e3779b97f4a7c15ull;
     std::uint64_t z = state_;

@@ -83,6 +83,7 @@ namespace stage {
 /// type: ProjectMeshVertices, CountMeshTriangles, ScanMeshTriangles, WriteMeshTriangles,
 /// RasterizeMeshTile, ShadeMeshRow, CountTileIntersections, ScatterTileIntersections, each of float.
 struct Each {
+  /// Generic form, for backends without a form of their own.
   template <Backend B, class Kernel>
   static void generic(B& backend, std::size_t n, const Kernel& kernel) {
     backend.parallel_for(n, kernel);
@@ -94,6 +95,7 @@ struct Each {
 /// is then not projected. With a Blend of its own as well, frames may be drawn in slices of depth
 /// (detail/render/depth_slices.hpp).
 struct Project {
+  /// Generic form, for backends without a form of their own.
   template <Backend B, class S>
   static void generic(B& backend, const ViewedSet<S>& args, const ProjectOutputs<S>& out) {
     backend.parallel_for(args.chunk_count(), ProjectChunk<S>{args, out});
@@ -103,6 +105,7 @@ struct Project {
 /// Counts the splats of each tile, less those that `cull` (NoCull, MeshCull) hides: fills
 /// args.tile_offsets, and args.cursors for ScatterTiles (detail/frame/tiles.hpp).
 struct CountTiles {
+  /// Generic form, for backends without a form of their own.
   template <Backend B, class S, class Cull>
   static void generic(B& backend, const BinArgs<S>& args, const Cull& cull) {
     gsnav::run(backend, Each{}, args.blocks, CountTileIntersections<S, Cull>{args, cull});
@@ -112,6 +115,7 @@ struct CountTiles {
 
 /// Fills args.tile_splats, which has room for as many as CountTiles counted.
 struct ScatterTiles {
+  /// Generic form, for backends without a form of their own.
   template <Backend B, class S, class Cull>
   static void generic(B& backend, const BinArgs<S>& args, const Cull& cull) {
     gsnav::run(backend, Each{}, args.blocks, ScatterTileIntersections<S, Cull>{args, cull});
@@ -122,6 +126,7 @@ struct ScatterTiles {
 /// ProjectsChunks must obey args.progress: it begins with the states that the slice of depth before
 /// left, leaves its own to the next, and says which cells are open. The generic form draws one slice.
 struct Blend {
+  /// Generic form, for backends without a form of their own.
   template <Backend B, class S>
   static void generic(B& backend, const RasterArgs<S>& args) {
     detail::blend_pixels<S>(backend, args);
@@ -130,6 +135,7 @@ struct Blend {
 
 /// Blends the pixels of a frame with meshes (detail/frame/composite.hpp).
 struct BlendWithMeshes {
+  /// Generic form, for backends without a form of their own.
   template <Backend B, class S>
   static void generic(B& backend, const RasterArgs<S>& args) {
     detail::blend_pixels_with_meshes<S>(backend, args);
@@ -142,6 +148,7 @@ struct RasterizeMesh {};
 
 /// Skins the Gaussians of one avatar linearly (skin/skin.hpp).
 struct Skin {
+  /// Generic form, for backends without a form of their own.
   template <Backend B, class S, class Out>
   static void generic(B& backend, const SkinningArgs<S, Out>& args) {
     backend.parallel_for(args.size(), SkinGaussian<S, Out>{args});
@@ -150,6 +157,7 @@ struct Skin {
 
 /// The same of many avatars.
 struct SkinAll {
+  /// Generic form, for backends without a form of their own.
   template <Backend B, class S, class Out>
   static void generic(B& backend, const std::span<const SkinningArgs<S, Out>>& avatars) {
     for (const SkinningArgs<S, Out>& args : avatars) gsnav::run(backend, Skin{}, args);
@@ -158,6 +166,7 @@ struct SkinAll {
 
 /// Gaps of pairs of capsules (sweep/sweep.hpp).
 struct CapsuleGaps {
+  /// Generic form, for backends without a form of their own.
   template <Backend B, class S>
   static void generic(B& backend, const CapsuleGapArgs<S>& args) {
     backend.parallel_for(args.size(), GapOfPair<S>{args});
@@ -166,6 +175,7 @@ struct CapsuleGaps {
 
 /// Sweeps of pairs of moving capsules (sweep/sweep.hpp).
 struct SweepCapsules {
+  /// Generic form, for backends without a form of their own.
   template <Backend B, class S>
   static void generic(B& backend, const SweepArgs<S>& args) {
     backend.parallel_for(args.size(), SweepPair<S>{args});

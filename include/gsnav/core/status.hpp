@@ -29,7 +29,9 @@ enum class Errc {
 /// The exception behind `.value()` and `.throw_if_error()`.
 class Error : public std::runtime_error {
  public:
+  /// An exception with the kind of error and a message.
   Error(Errc code, const std::string& message) : std::runtime_error(message), code_(code) {}
+  /// Kind of the error; Errc::ok for a success.
   Errc code() const noexcept { return code_; }
 
  private:
@@ -55,9 +57,12 @@ class [[nodiscard]] Status {
   /// `message` may hold names of files: it is kept as printable() makes it.
   Status(Errc code, const std::string& message) : code_(code), message_(printable(message)) {}
 
+  /// Whether it is a success.
   bool ok() const noexcept { return code_ == Errc::ok; }
   explicit operator bool() const noexcept { return ok(); }
+  /// Kind of the error; Errc::ok for a success.
   Errc code() const noexcept { return code_; }
+  /// Text for people; empty for a success.
   const std::string& message() const noexcept { return message_; }
   /// Throws gsnav::Error (aborts under -fno-exceptions) unless ok.
   void throw_if_error() const {
@@ -74,8 +79,9 @@ class [[nodiscard]] Status {
 ///     const BadArgument bad{"Camera."};
 ///     if (width < 1) return bad("width", width, "must be positive");
 struct BadArgument {
-  const char* subject;
+  const char* subject;  ///< What the message begins with, for example the name of a struct and a dot.
 
+  /// invalid_argument with this message behind the subject.
   Status operator()(const std::string& what) const { return {Errc::invalid_argument, subject + what}; }
   /// "`field` = `value`: `rule`".
   template <class T>
@@ -94,15 +100,21 @@ struct BadArgument {
 template <class T>
 class [[nodiscard]] Result {
  public:
+  /// A success.
   Result(T value) : content_(std::move(value)) {}
+  /// An error. The status must not be ok.
   Result(Status status) : content_(std::move(status)) {}
+  /// An error.
   Result(Errc code, const std::string& message) : content_(Status(code, message)) {}
 
+  /// Whether it is a success.
   bool ok() const noexcept { return content_.index() == 0; }
   explicit operator bool() const noexcept { return ok(); }
   /// The error, or an ok Status.
   Status status() const { return ok() ? Status() : *std::get_if<1>(&content_); }
+  /// Kind of the error; Errc::ok for a success.
   Errc code() const noexcept { return ok() ? Errc::ok : std::get_if<1>(&content_)->code(); }
+  /// Text for people; empty for a success.
   std::string message() const { return status().message(); }
 
   /// The value; throws gsnav::Error (aborts under -fno-exceptions) where there is none.
@@ -119,8 +131,10 @@ class [[nodiscard]] Result {
     require();
     return std::move(*std::get_if<0>(&content_));
   }
+  /// Member of the value. Throws Error if there is none.
   T* operator->() { return &value(); }
   const T* operator->() const { return &value(); }
+  /// The value. Throws Error if there is none.
   T& operator*() & { return value(); }
   const T& operator*() const& { return value(); }
   T operator*() && { return std::move(*this).value(); }

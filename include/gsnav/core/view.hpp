@@ -13,18 +13,23 @@ namespace gsnav {
 /// device code, where std::span does not. `View<const T>` reads only.
 template <class T>
 struct View {
-  T* data = nullptr;
-  std::size_t size = 0;
+  T* data = nullptr;     ///< First element.
+  std::size_t size = 0;  ///< Number of elements.
 
   View() = default;
+  /// A view of n elements.
   GSNAV_HD constexpr View(T* d, std::size_t n) noexcept : data(d), size(n) {}
   /// View<T> converts to View<const T>, never the other way.
   template <class U, class = std::enable_if_t<std::is_same_v<const U, T> && !std::is_const_v<U>>>
   GSNAV_HD constexpr View(const View<U>& other) noexcept : data(other.data), size(other.size) {}
 
+  /// Element i, unchecked.
   GSNAV_HD constexpr T& operator[](std::size_t i) const noexcept { return data[i]; }
+  /// Whether there are no elements.
   GSNAV_HD constexpr bool empty() const noexcept { return size == 0; }
+  /// Pointer to the first element.
   GSNAV_HD constexpr T* begin() const noexcept { return data; }
+  /// Pointer behind the last element.
   GSNAV_HD constexpr T* end() const noexcept { return data + size; }
 };
 
@@ -37,12 +42,15 @@ auto view_of(C& c) noexcept -> View<std::remove_pointer_t<decltype(c.data())>> {
 /// K arrays of one length, as kernels see them.
 template <class T, std::size_t K>
 struct Planes {
-  T* data[K]{};
+  T* data[K]{};          ///< First element of each plane.
   std::size_t size = 0;  ///< of each; kUnequal where the arrays differ
 
+  /// Size of planes whose lengths differ.
   static constexpr std::size_t kUnequal = static_cast<std::size_t>(-1);
 
+  /// Plane k.
   GSNAV_HD constexpr View<T> operator[](std::size_t k) const noexcept { return {data[k], size}; }
+  /// Whether there are no elements.
   GSNAV_HD constexpr bool empty() const noexcept { return size == 0; }
   /// Array k. The first one that is set gives the length.
   GSNAV_HD constexpr void set(std::size_t k, const View<T>& plane) noexcept {

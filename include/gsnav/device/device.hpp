@@ -10,6 +10,7 @@
 
 namespace gsnav {
 
+/// Kinds of devices.
 enum class DeviceKind : std::uint8_t {
   serial,  ///< one thread, portable code: the reference
   cpu,     ///< threads and SIMD lanes (OpenMPBackend)
@@ -38,6 +39,7 @@ class Device {
   /// "serial", "cpu", "cuda:0".
   static std::vector<std::string> available();
 
+  /// Kind of the device.
   DeviceKind kind() const noexcept { return kind_; }
   /// Of the CPU; 0: as many as OpenMP takes.
   int threads() const noexcept { return threads_; }

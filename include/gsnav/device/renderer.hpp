@@ -55,6 +55,7 @@ class Renderer {
   Result<Frames<float>> render(std::span<const Camera> cameras, double time = 0);
   Result<Frames<float>> render(const Camera& camera, double time = 0);
 
+  /// The device that it runs on.
   const Device& device() const noexcept { return device_; }
   /// The rules that frames are drawn by from now on.
   Status set_config(const RenderConfig& config);
@@ -72,6 +73,8 @@ class Renderer {
 /// a GPU by the CPU's. Errors: theirs.
 Result<LodTree> build_lod(const Device& device, const GaussianCloud& cloud,
                           const LodSettings& settings = {});
+/// Finds what can be seen of a cloud from around the viewpoints. Errors: invalid_argument, unsupported,
+/// out_of_memory.
 Result<VisibleSets> build_visible_sets(const Device& device, const GaussianCloud& cloud,
                                        std::span<const Vec3d> viewpoints,
                                        const VisibleSettings& settings,

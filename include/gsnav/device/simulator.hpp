@@ -55,18 +55,21 @@ class Simulator {
   /// Renders what the agent sees now, without acting. Errors: what rendering reports.
   Result<Observations> observe();
 
-  bool done() const noexcept;
-  EpisodeMetrics metrics() const;
+  bool done() const noexcept;      ///< Whether the episode has ended.
+  EpisodeMetrics metrics() const;  ///< Metrics of the episode so far.
   /// Seconds on the scene's clock.
   double clock() const noexcept { return world().time(); }
+  /// Where the agent is.
   const AgentPose& agent() const noexcept { return world().agent(); }
-  const World& world() const noexcept;
-  const SimulatorScene& scene() const noexcept;
-  const SimulatorConfig& config() const noexcept;
+  const World& world() const noexcept;             ///< Agent, episode and clock, without sensors.
+  const SimulatorScene& scene() const noexcept;    ///< The scene.
+  const SimulatorConfig& config() const noexcept;  ///< The settings.
+  /// The device that it runs on.
   const Device& device() const noexcept { return device_; }
 
   /// Everything that changes while it runs, and the way back to it. Errors: of World::set_state.
   const WorldState& state() const noexcept { return world().state(); }
+  /// Goes back to a state of this simulator. Errors: invalid_argument if it is another task's.
   Status set_state(const WorldState& state);
   /// Metres, radians. Errors: of World::set_agent.
   Status set_agent(const Vec3d& position, double yaw, double pitch = 0.0);
@@ -117,9 +120,11 @@ class BatchSimulator {
   BatchSimulator& operator=(BatchSimulator&&) noexcept;
   ~BatchSimulator();
 
-  std::size_t environments() const noexcept;
-  const World& world(std::size_t environment) const noexcept;
+  std::size_t environments() const noexcept;                   ///< Number of environments.
+  const World& world(std::size_t environment) const noexcept;  ///< The world of one environment.
+  /// Number of the scene that an environment is in.
   std::size_t scene_of(std::size_t environment) const noexcept;
+  /// The device that it runs on.
   const Device& device() const noexcept { return device_; }
 
   /// Begins the next episode in every environment or, with a mask [N], in those where it is not 0.
@@ -133,7 +138,8 @@ class BatchSimulator {
 
   /// Renders made so far, and how many times an avatar was skinned for them.
   std::size_t render_count() const noexcept;
-  std::size_t pose_count() const noexcept;
+  std::size_t pose_count() const noexcept;  ///< How often an avatar has been posed so far.
+  /// Turns rendering on or off. Without it, steps give physics and metrics only.
   void set_rendering(bool on) noexcept;
 
  private:

@@ -52,6 +52,7 @@ struct SeenRows {
   const std::uint32_t* words = nullptr;  ///< [kSeenRowWords]
   /// Of the 32 rows from 32 k on.
   GSNAV_HD std::uint32_t word(std::size_t k) const noexcept { return words == nullptr ? ~0u : words[k]; }
+  /// Whether a row may be visible.
   GSNAV_HD bool has(std::size_t row) const noexcept { return (word(row / 32) >> (row % 32) & 1u) != 0; }
   /// Whether any of the kChunkPart rows of a part.
   GSNAV_HD bool any_of_part(std::size_t part) const noexcept {
@@ -84,6 +85,7 @@ struct ShapeRows {
   View<const std::uint16_t> codes;
   View<const PackedChunk> chunks;  ///< what codes stand for, [ceil(N / kProjectChunk)]
 
+  /// First code plane of each quantity, and the number of planes.
   static constexpr int kScales = 0, kQuats = 3, kOpacity = 6, kMeans = 7, kCodePlanes = 10;
 
   /// Whether shapes and opacities are packed. False in device code.
@@ -133,8 +135,8 @@ struct ColorRows {
 /// A position is `origins[origin_ids[i]] + mean_i`: float32 offsets from origins on a 64 m lattice, so
 /// that scenes far from zero lose nothing.
 struct GaussianRows {
-  ShapeRows shape;
-  ColorRows color;
+  ShapeRows shape;            ///< Places, shapes and opacities.
+  ColorRows color;            ///< Colours.
   View<const Vec3d> origins;  ///< metres, asset frame; host memory; empty: one origin at zero
   /// Place of each Gaussian before rows were sorted in space, [N]: those of one depth are blended in
   /// that order. Empty: row order.
@@ -146,7 +148,9 @@ struct GaussianRows {
   /// that may be seen are touched. Empty: chunks are taken whole.
   View<const ChunkBounds> part_bounds;
 
+  /// Number of rows.
   GSNAV_HD std::size_t size() const noexcept { return shape.size; }
+  /// Number of chunks.
   GSNAV_HD std::size_t chunk_count() const noexcept { return shape.chunk_count(); }
 };
 
@@ -206,10 +210,10 @@ enum class ColorSpace : std::uint8_t {
 
 /// One set of Gaussians in the world: a scene tile, an avatar, an object.
 struct GaussianSet {
-  GaussianRows gaussians;
-  Similarity world_from_asset{};
-  Filter filter = Filter::classic;
-  float eps2d = 0.3f;                            ///< px^2 added to the diagonal of the 2D covariance
+  GaussianRows gaussians;           ///< The arrays.
+  Similarity world_from_asset{};    ///< Takes the asset's frame to the world.
+  Filter filter = Filter::classic;  ///< Screen-space filter that the Gaussians were trained with.
+  float eps2d = 0.3f;               ///< px^2 added to the diagonal of the 2D covariance
   ColorSpace color_space = ColorSpace::display;  ///< of its colours; converted to the frame's after SH
   /// px^2 that the opacities count with already, in [0, eps2d]: the mip filter makes up for the rest. 0:
   /// Mip-Splatting's.

@@ -10,11 +10,11 @@ namespace gsnav {
 /// Pinhole camera: x right, y down, z forward (OpenCV). Pixel (column j, row i) has its centre at
 /// (j + 0.5, i + 0.5); row 0 is the top. Always double: kernels get what they need in their scalar.
 struct Camera {
-  Affine3<double> viewmat{};  ///< world to camera, rigid
-  double fx = 128, fy = 128;  ///< focal lengths in pixels, > 0
-  double cx = 128, cy = 128;  ///< principal point in pixels, may be off-centre
-  int width = 256, height = 256;
-  double near_plane = 0.2;  ///< a Gaussian whose centre has z <= near_plane is not drawn; metres
+  Affine3<double> viewmat{};      ///< world to camera, rigid
+  double fx = 128, fy = 128;      ///< focal lengths in pixels, > 0
+  double cx = 128, cy = 128;      ///< principal point in pixels, may be off-centre
+  int width = 256, height = 256;  ///< Size of the image, pixels.
+  double near_plane = 0.2;        ///< a Gaussian whose centre has z <= near_plane is not drawn; metres
   /// Additionally a Gaussian is not drawn where z <= near_sigma times its extent (one sigma) along the
   /// view axis. 0 for tools; 1 for simulator sensors, whose near plane is close to zero.
   double near_sigma = 0.0;

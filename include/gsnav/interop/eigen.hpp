@@ -28,10 +28,12 @@ using EigenChannelMap =
 
 // ---- zero copy: gsnav's memory as Eigen
 
+/// Views it as an Eigen type, without a copy.
 template <class S>
 Eigen::Map<Eigen::Matrix<S, 3, 1>> as_eigen(Vec3<S>& v) noexcept {
   return Eigen::Map<Eigen::Matrix<S, 3, 1>>(&v.x);
 }
+/// Views it as an Eigen type, without a copy.
 template <class S>
 Eigen::Map<const Eigen::Matrix<S, 3, 1>> as_eigen(const Vec3<S>& v) noexcept {
   return Eigen::Map<const Eigen::Matrix<S, 3, 1>>(&v.x);
@@ -39,10 +41,12 @@ Eigen::Map<const Eigen::Matrix<S, 3, 1>> as_eigen(const Vec3<S>& v) noexcept {
 template <class S>
 void as_eigen(const Vec3<S>&& v) = delete;
 
+/// Views it as an Eigen type, without a copy.
 template <class S>
 Eigen::Map<Eigen::Matrix<S, 3, 3, Eigen::RowMajor>> as_eigen(Mat3<S>& m) noexcept {
   return Eigen::Map<Eigen::Matrix<S, 3, 3, Eigen::RowMajor>>(&m.row[0].x);
 }
+/// Views it as an Eigen type, without a copy.
 template <class S>
 Eigen::Map<const Eigen::Matrix<S, 3, 3, Eigen::RowMajor>> as_eigen(const Mat3<S>& m) noexcept {
   return Eigen::Map<const Eigen::Matrix<S, 3, 3, Eigen::RowMajor>>(&m.row[0].x);
@@ -120,10 +124,12 @@ void as_view(const Eigen::PlainObjectBase<Derived>&& m) = delete;
 
 // ---- copies
 
+/// Copies it to an Eigen type.
 template <class S>
 Eigen::Matrix<S, 3, 1> to_eigen(const Vec3<S>& v) {
   return {v.x, v.y, v.z};
 }
+/// Copies it to an Eigen type.
 template <class S>
 Eigen::Matrix<S, 3, 3> to_eigen(const Mat3<S>& m) {
   return as_eigen(m);
@@ -148,8 +154,10 @@ Eigen::Transform<S, 3, Eigen::Isometry> to_isometry(const Affine3<S>& a) {
   t.translation() = as_eigen(a.translation);
   return t;
 }
+/// Copies it to an Eigen type.
 inline Eigen::Affine3d to_eigen(const Similarity& s) { return to_eigen(affine_from(s)); }
 
+/// Copies it from an Eigen type.
 template <class Derived>
 auto from_eigen(const Eigen::MatrixBase<Derived>& m) {
   using S = typename Derived::Scalar;
@@ -162,10 +170,12 @@ auto from_eigen(const Eigen::MatrixBase<Derived>& m) {
     return Vec3<S>{m.derived().coeff(0), m.derived().coeff(1), m.derived().coeff(2)};
   }
 }
+/// Copies it from an Eigen type.
 template <class Derived>
 Quat<typename Derived::Scalar> from_eigen(const Eigen::QuaternionBase<Derived>& q) {
   return {q.w(), q.x(), q.y(), q.z()};
 }
+/// Copies it from an Eigen type.
 template <class S, int Mode, int Options>
 Affine3<S> from_eigen(const Eigen::Transform<S, 3, Mode, Options>& t) {
   static_assert(Mode != Eigen::Projective, "a projective map is not affine");

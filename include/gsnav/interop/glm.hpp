@@ -14,12 +14,16 @@
 
 namespace gsnav::interop {
 
+/// GLM's vector of three.
 template <class S>
 using GlmVec3 = glm::vec<3, S, glm::defaultp>;
+/// GLM's 3 x 3 matrix.
 template <class S>
 using GlmMat3 = glm::mat<3, 3, S, glm::defaultp>;
+/// GLM's 4 x 4 matrix.
 template <class S>
 using GlmMat4 = glm::mat<4, 4, S, glm::defaultp>;
+/// GLM's quaternion.
 template <class S>
 using GlmQuat = glm::qua<S, glm::defaultp>;
 
@@ -28,10 +32,12 @@ static_assert(sizeof(GlmVec3<float>) == sizeof(Vec3f) && sizeof(GlmVec3<double>)
 
 // ---- zero copy
 
+/// Views it as a GLM type, without a copy.
 template <class S>
 GlmVec3<S>& as_glm(Vec3<S>& v) noexcept {
   return reinterpret_cast<GlmVec3<S>&>(v);
 }
+/// Views it as a GLM type, without a copy.
 template <class S>
 const GlmVec3<S>& as_glm(const Vec3<S>& v) noexcept {
   return reinterpret_cast<const GlmVec3<S>&>(v);
@@ -60,35 +66,42 @@ View<const Vec3<S>> as_view(const GlmVec3<S>* points, std::size_t n) noexcept {
 
 // ---- copies
 
+/// Copies it to a GLM type.
 template <class S>
 GlmVec3<S> to_glm(const Vec3<S>& v) noexcept {
   return {v.x, v.y, v.z};
 }
+/// Copies it from a GLM type.
 template <class S>
 Vec3<S> from_glm(const GlmVec3<S>& v) noexcept {
   return {v.x, v.y, v.z};
 }
 
+/// Copies it to a GLM type, whose columns come first.
 template <class S>
 GlmMat3<S> to_glm(const Mat3<S>& m) noexcept {
   return {to_glm(m.column(0)), to_glm(m.column(1)), to_glm(m.column(2))};
 }
+/// Copies it from a GLM type.
 template <class S>
 Mat3<S> from_glm(const GlmMat3<S>& m) noexcept {
   return transpose(Mat3<S>{{from_glm(m[0]), from_glm(m[1]), from_glm(m[2])}});
 }
 
+/// Copies it to a GLM type.
 template <class S>
 GlmQuat<S> to_glm(const Quat<S>& q) noexcept {
   GlmQuat<S> r;  // by name: the order of the constructor's arguments depends on the version
   r.w = q.w, r.x = q.x, r.y = q.y, r.z = q.z;
   return r;
 }
+/// Copies it from a GLM type.
 template <class S>
 Quat<S> from_glm(const GlmQuat<S>& q) noexcept {
   return {q.w, q.x, q.y, q.z};
 }
 
+/// Copies it to a GLM matrix with a last row of 0, 0, 0, 1.
 template <class S>
 GlmMat4<S> to_glm(const Affine3<S>& a) noexcept {
   GlmMat4<S> m(to_glm(a.linear));
@@ -101,6 +114,7 @@ Affine3<S> from_glm(const GlmMat4<S>& m) noexcept {
   return {from_glm(GlmMat3<S>(m)), from_glm(GlmVec3<S>(m[3]))};
 }
 
+/// Copies it to a GLM matrix with a last row of 0, 0, 0, 1.
 inline glm::dmat4 to_glm(const Similarity& s) noexcept { return to_glm(affine_from(s)); }
 /// Where an asset stands, from a model matrix that rotates, scales evenly and translates; an error where
 /// it does anything else.

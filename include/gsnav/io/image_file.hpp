@@ -39,7 +39,7 @@ std::vector<std::uint8_t> colorize_depth(std::span<const float> depth, float nea
 
 /// A decoded PNG.
 struct PngImage {
-  int width = 0, height = 0;
+  int width = 0, height = 0;           ///< Size in pixels.
   int channels = 0;                    ///< 1 grey, 2 grey alpha, 3 RGB, 4 RGBA
   int bits = 0;                        ///< 8 or 16
   std::vector<std::uint16_t> samples;  ///< [height][width][channels], as stored, no gamma applied
@@ -58,10 +58,10 @@ Status save_npy(const std::filesystem::path& path, std::span<const double> value
 
 /// What load_npy returns.
 struct NpyArray {
-  std::vector<std::size_t> shape;
-  std::vector<double> values;  ///< C order, whatever the file's; other types widened, which is exact
-  bool is_double = false;      ///< the file holds float64
-  std::string descr;           ///< NumPy's name of the file's type, "<f4" say
+  std::vector<std::size_t> shape;  ///< Lengths of the axes, outermost first.
+  std::vector<double> values;      ///< C order, whatever the file's; other types widened, which is exact
+  bool is_double = false;          ///< the file holds float64
+  std::string descr;               ///< NumPy's name of the file's type, "<f4" say
 };
 
 /// Reads `.npy` version 1 to 3: little-endian float16, 32 and 64, integers of 8 to 64 bits and booleans,

@@ -26,7 +26,7 @@ struct LoadSceneOptions {
   int level = 0;     ///< of streamed LOD sets, 0 is the finest
   bool sort = true;  ///< in space, as rendering wants it; false: rows stay as they were read
   double time = 0;   ///< seconds, of scenes that move (detail/io/temporal_file.hpp)
-  Storage storage = Storage::full;
+  Storage storage = Storage::full;  ///< How Gaussians are kept in memory.
   /// Whether SH bands that are zero in every Gaussian are held. They change no bit of an image; a cloud
   /// that is written to a file again keeps its degree by them. The report says what was let go.
   bool keep_zero_bands = false;
@@ -40,8 +40,8 @@ struct LoadSceneOptions {
 
 /// A packed scene with the report of how it was read; `report.packing` has what packing changed.
 struct LoadedPackedCloud {
-  PackedCloud cloud;
-  LoadReport report;
+  PackedCloud cloud;  ///< The Gaussians.
+  LoadReport report;  ///< What the reader found, changed and left out.
 };
 
 /// Reads a scene of Gaussians by what its path names: a `.ply`, `.splat`, `.ksplat`, `.spz`, `.sog`,
@@ -90,6 +90,7 @@ struct ClampedValues {
   std::uint64_t scales = 0;      ///< standard deviations; clamped
   std::uint64_t bands = 0;       ///< SH coefficients from band 1 on; clamped
   std::uint64_t lost_bands = 0;  ///< of these, such as are not zero, where the format has none
+  /// All values that were changed.
   std::uint64_t all() const noexcept { return colours + scales + bands + lost_bands; }
 };
 

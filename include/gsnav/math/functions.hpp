@@ -24,12 +24,13 @@ GSNAV_HD int count_bits(std::uint32_t bits) noexcept {
 #endif
 }
 
+/// Types that belong to a scalar or a lane pack.
 template <class L>
 struct LaneTraits {
-  using scalar = L;        ///< the element type
-  using mask = bool;       ///< the result of a comparison
-  using doubles = double;  ///< a double for each element
-  static constexpr int width = 1;
+  using scalar = L;                ///< the element type
+  using mask = bool;               ///< the result of a comparison
+  using doubles = double;          ///< a double for each element
+  static constexpr int width = 1;  ///< Number of elements.
 };
 /// Element type of a scalar or lane pack.
 template <class L>
@@ -65,17 +66,26 @@ GSNAV_HD double fma(double a, double b, double c) noexcept {
   return c;
 }
 #else
+/// a b + c, rounded once.
 GSNAV_HD float fma(float a, float b, float c) noexcept { return __builtin_fmaf(a, b, c); }
+/// a b + c, rounded once.
 GSNAV_HD double fma(double a, double b, double c) noexcept { return __builtin_fma(a, b, c); }
 #endif
+/// a b + c, rounded once.
 GSNAV_HD long double fma(long double a, long double b, long double c) noexcept {
   return __builtin_fmal(a, b, c);
 }
+/// Square root, correctly rounded.
 GSNAV_HD float sqrt(float a) noexcept { return __builtin_sqrtf(a); }
+/// Square root, correctly rounded.
 GSNAV_HD double sqrt(double a) noexcept { return __builtin_sqrt(a); }
+/// Square root, correctly rounded.
 GSNAV_HD long double sqrt(long double a) noexcept { return __builtin_sqrtl(a); }
+/// Absolute value.
 GSNAV_HD float abs(float a) noexcept { return __builtin_fabsf(a); }
+/// Absolute value.
 GSNAV_HD double abs(double a) noexcept { return __builtin_fabs(a); }
+/// Absolute value.
 GSNAV_HD long double abs(long double a) noexcept { return __builtin_fabsl(a); }
 #endif
 
@@ -117,11 +127,17 @@ GSNAV_HD double truncated(double a) noexcept {
   return static_cast<double>(static_cast<std::int32_t>(a));
 }
 
+/// Sine of radians.
 GSNAV_HD float sin(float a) noexcept { return ::sinf(a); }
+/// Sine of radians.
 GSNAV_HD double sin(double a) noexcept { return ::sin(a); }
+/// Cosine of radians.
 GSNAV_HD float cos(float a) noexcept { return ::cosf(a); }
+/// Cosine of radians.
 GSNAV_HD double cos(double a) noexcept { return ::cos(a); }
+/// Arc cosine, radians.
 GSNAV_HD float acos(float a) noexcept { return ::acosf(a); }
+/// Arc cosine, radians.
 GSNAV_HD double acos(double a) noexcept { return ::acos(a); }
 
 /// Smaller of two values; the second where either is NaN (the rule of SSE and of `a < b ? a : b`).
@@ -134,6 +150,7 @@ template <class S>
 GSNAV_HD constexpr S max(S a, S b) noexcept {
   return a > b ? a : b;
 }
+/// The value, limited to [low, high].
 template <class S>
 GSNAV_HD S clamp(S v, S low, S high) noexcept {
   return min(max(v, low), high);
@@ -145,28 +162,36 @@ GSNAV_HD std::uint8_t to_byte(S v) noexcept {
   // Not truncated(scaled + 0.5): the sum rounds.
   return static_cast<std::uint8_t>(static_cast<int>(whole) + (scaled - whole >= S(0.5) ? 1 : 0));
 }
+/// a if the mask is set, else b.
 template <class S>
 GSNAV_HD constexpr S select(bool mask, S a, S b) noexcept {
   return mask ? a : b;
 }
+/// Whether any lane is set.
 GSNAV_HD constexpr bool any(bool mask) noexcept { return mask; }
+/// Whether all lanes are set.
 GSNAV_HD constexpr bool all(bool mask) noexcept { return mask; }
 
+/// The bits of a float.
 GSNAV_HD std::uint32_t bits_of(float a) noexcept {
   std::uint32_t u;
   std::memcpy(&u, &a, sizeof u);
   return u;
 }
+/// The float that has these bits.
 GSNAV_HD float float_of_bits(std::uint32_t u) noexcept {
   float a;
   std::memcpy(&a, &u, sizeof a);
   return a;
 }
 
+/// Whether it is neither NaN nor infinite.
 GSNAV_HD bool is_finite(float a) noexcept { return (bits_of(a) & 0x7f800000u) != 0x7f800000u; }
 // A literal: numeric_limits' constexpr functions are host code to nvcc.
+/// Whether it is neither NaN nor infinite.
 GSNAV_HD bool is_finite(double a) noexcept { return abs(a) <= 1.7976931348623157e308; }
 #if !defined(__CUDACC__)
+/// Whether it is neither NaN nor infinite.
 GSNAV_HD bool is_finite(long double a) noexcept {
   return abs(a) <= std::numeric_limits<long double>::max();
 }
@@ -239,15 +264,18 @@ template <Exp2 = Exp2::degree5>
 GSNAV_HD double exp2(double x) noexcept {
   return ::exp2(x);
 }
+/// 2^x for every x, by the platform.
 template <Exp2 = Exp2::degree5>
 GSNAV_HD double exp2_in_range(double x) noexcept {
   return ::exp2(x);
 }
 #if !defined(__CUDACC__)
+/// 2^x, by the platform.
 template <Exp2 = Exp2::degree5>
 GSNAV_HD long double exp2(long double x) noexcept {
   return ::exp2l(x);
 }
+/// 2^x for every x, by the platform.
 template <Exp2 = Exp2::degree5>
 GSNAV_HD long double exp2_in_range(long double x) noexcept {
   return ::exp2l(x);

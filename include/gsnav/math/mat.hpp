@@ -8,30 +8,36 @@ namespace gsnav {
 /// 3x3 matrix stored by rows: `m.row[i][j]` is row i, column j. Vectors are columns: y = M x.
 template <class L>
 struct Mat3 {
-  Vec3<L> row[3]{};
+  Vec3<L> row[3]{};  ///< Rows, from the top.
 
+  /// Element in row i and column j.
   GSNAV_HD constexpr L& operator()(int i, int j) noexcept { return row[i][j]; }
   GSNAV_HD constexpr const L& operator()(int i, int j) const noexcept { return row[i][j]; }
 
+  /// The identity.
   GSNAV_HD static constexpr Mat3 identity() noexcept {
     return {{{L(1), L(0), L(0)}, {L(0), L(1), L(0)}, {L(0), L(0), L(1)}}};
   }
+  /// Column j.
   GSNAV_HD constexpr Vec3<L> column(int j) const noexcept { return {row[0][j], row[1][j], row[2][j]}; }
 };
 
-using Mat3f = Mat3<float>;
-using Mat3d = Mat3<double>;
+using Mat3f = Mat3<float>;   ///< Matrix of floats.
+using Mat3d = Mat3<double>;  ///< Matrix of doubles.
 
+/// The transposed matrix.
 template <class L>
 GSNAV_HD constexpr Mat3<L> transpose(const Mat3<L>& m) noexcept {
   return {{m.column(0), m.column(1), m.column(2)}};
 }
 
+/// Matrix times vector.
 template <class L>
 GSNAV_HD Vec3<L> operator*(const Mat3<L>& m, const Vec3<L>& v) noexcept {
   return {dot(m.row[0], v), dot(m.row[1], v), dot(m.row[2], v)};
 }
 
+/// Matrix product.
 template <class L>
 GSNAV_HD Mat3<L> operator*(const Mat3<L>& a, const Mat3<L>& b) noexcept {
   const Mat3<L> bt = transpose(b);
@@ -42,21 +48,25 @@ GSNAV_HD Mat3<L> operator*(const Mat3<L>& a, const Mat3<L>& b) noexcept {
   return r;
 }
 
+/// Every element times a scalar.
 template <class L>
 GSNAV_HD Mat3<L> operator*(const Mat3<L>& m, L s) noexcept {
   return {{m.row[0] * s, m.row[1] * s, m.row[2] * s}};
 }
 
+/// Sum, element by element.
 template <class L>
 GSNAV_HD Mat3<L> operator+(const Mat3<L>& a, const Mat3<L>& b) noexcept {
   return {{a.row[0] + b.row[0], a.row[1] + b.row[1], a.row[2] + b.row[2]}};
 }
 
+/// Determinant.
 template <class L>
 GSNAV_HD L determinant(const Mat3<L>& m) noexcept {
   return dot(m.row[0], cross(m.row[1], m.row[2]));
 }
 
+/// The matrix with another element type.
 template <class T, class U>
 GSNAV_HD constexpr Mat3<T> mat_cast(const Mat3<U>& m) noexcept {
   return {{vec_cast<T>(m.row[0]), vec_cast<T>(m.row[1]), vec_cast<T>(m.row[2])}};
@@ -65,20 +75,23 @@ GSNAV_HD constexpr Mat3<T> mat_cast(const Mat3<U>& m) noexcept {
 /// Affine map x -> linear * x + translation (the upper three rows of a 4x4 matrix).
 template <class L>
 struct Affine3 {
-  Mat3<L> linear = Mat3<L>::identity();
-  Vec3<L> translation{};
+  Mat3<L> linear = Mat3<L>::identity();  ///< Linear part.
+  Vec3<L> translation{};                 ///< Added after the linear part.
 };
 
+/// Image of a point.
 template <class L>
 GSNAV_HD Vec3<L> operator*(const Affine3<L>& a, const Vec3<L>& v) noexcept {
   return a.linear * v + a.translation;
 }
 
+/// The map that applies b, then a.
 template <class L>
 GSNAV_HD Affine3<L> operator*(const Affine3<L>& a, const Affine3<L>& b) noexcept {
   return {a.linear * b.linear, a * b.translation};
 }
 
+/// The map with another element type.
 template <class T, class U>
 GSNAV_HD constexpr Affine3<T> affine_cast(const Affine3<U>& a) noexcept {
   return {mat_cast<T>(a.linear), vec_cast<T>(a.translation)};

@@ -8,25 +8,29 @@ namespace gsnav {
 /// Quaternion in the order w, x, y, z (the order of INRIA files). Habitat's xyzw is converted in io.
 template <class L>
 struct Quat {
-  L w{1}, x{0}, y{0}, z{0};
+  L w{1}, x{0}, y{0}, z{0};  ///< Components; w is the real part.
 };
 
-using Quatf = Quat<float>;
-using Quatd = Quat<double>;
+using Quatf = Quat<float>;   ///< Quaternion of floats.
+using Quatd = Quat<double>;  ///< Quaternion of doubles.
 
+/// Inner product of the four components.
 template <class L>
 GSNAV_HD L dot(const Quat<L>& a, const Quat<L>& b) noexcept {
   return fma(a.z, b.z, fma(a.y, b.y, fma(a.x, b.x, a.w * b.w)));
 }
 
+/// Every component times a scalar.
 template <class L>
 GSNAV_HD Quat<L> operator*(const Quat<L>& a, L s) noexcept {
   return {a.w * s, a.x * s, a.y * s, a.z * s};
 }
+/// Sum, component by component.
 template <class L>
 GSNAV_HD Quat<L> operator+(const Quat<L>& a, const Quat<L>& b) noexcept {
   return {a.w + b.w, a.x + b.x, a.y + b.y, a.z + b.z};
 }
+/// All components negated: the same rotation.
 template <class L>
 GSNAV_HD Quat<L> operator-(const Quat<L>& a) noexcept {
   return {-a.w, -a.x, -a.y, -a.z};
@@ -41,11 +45,13 @@ GSNAV_HD Quat<L> operator*(const Quat<L>& a, const Quat<L>& b) noexcept {
           fma(a.z, b.w, fma(-a.y, b.x, fma(a.x, b.y, a.w * b.z)))};
 }
 
+/// The conjugate: the inverse rotation of a unit quaternion.
 template <class L>
 GSNAV_HD constexpr Quat<L> conjugate(const Quat<L>& q) noexcept {
   return {q.w, -q.x, -q.y, -q.z};
 }
 
+/// The quaternion with another element type.
 template <class T, class U>
 GSNAV_HD constexpr Quat<T> quat_cast(const Quat<U>& q) noexcept {
   return {static_cast<T>(q.w), static_cast<T>(q.x), static_cast<T>(q.y), static_cast<T>(q.z)};

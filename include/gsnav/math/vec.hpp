@@ -9,49 +9,58 @@ namespace gsnav {
 /// Two components. `L` is a scalar (float, double) or a lane pack.
 template <class L>
 struct Vec2 {
-  L x{}, y{};
+  L x{}, y{};  ///< Components.
 };
 
 /// Three components. `L` is a scalar (float, double) or a lane pack.
 template <class L>
 struct Vec3 {
-  L x{}, y{}, z{};
+  L x{}, y{}, z{};  ///< Components.
 
+  /// Component i, 0 to 2.
   GSNAV_HD constexpr L& operator[](int i) noexcept { return i == 0 ? x : (i == 1 ? y : z); }
   GSNAV_HD constexpr const L& operator[](int i) const noexcept { return i == 0 ? x : (i == 1 ? y : z); }
 };
 
-using Vec3f = Vec3<float>;
-using Vec3d = Vec3<double>;
+using Vec3f = Vec3<float>;   ///< Vector of floats.
+using Vec3d = Vec3<double>;  ///< Vector of doubles.
 
+/// Sum, component by component.
 template <class L>
 GSNAV_HD constexpr Vec3<L> operator+(const Vec3<L>& a, const Vec3<L>& b) noexcept {
   return {a.x + b.x, a.y + b.y, a.z + b.z};
 }
+/// Difference, component by component.
 template <class L>
 GSNAV_HD constexpr Vec3<L> operator-(const Vec3<L>& a, const Vec3<L>& b) noexcept {
   return {a.x - b.x, a.y - b.y, a.z - b.z};
 }
+/// The opposite vector.
 template <class L>
 GSNAV_HD constexpr Vec3<L> operator-(const Vec3<L>& a) noexcept {
   return {-a.x, -a.y, -a.z};
 }
+/// Every component times a scalar.
 template <class L>
 GSNAV_HD constexpr Vec3<L> operator*(const Vec3<L>& a, L s) noexcept {
   return {a.x * s, a.y * s, a.z * s};
 }
+/// Every component times a scalar.
 template <class L>
 GSNAV_HD constexpr Vec3<L> operator*(L s, const Vec3<L>& a) noexcept {
   return a * s;
 }
+/// Adds b to a.
 template <class L>
 GSNAV_HD constexpr Vec3<L>& operator+=(Vec3<L>& a, const Vec3<L>& b) noexcept {
   return a = a + b;
 }
+/// Subtracts b from a.
 template <class L>
 GSNAV_HD constexpr Vec3<L>& operator-=(Vec3<L>& a, const Vec3<L>& b) noexcept {
   return a = a - b;
 }
+/// Whether all components are equal.
 template <class L>
 GSNAV_HD constexpr bool operator==(const Vec3<L>& a, const Vec3<L>& b) noexcept {
   return a.x == b.x && a.y == b.y && a.z == b.z;
@@ -71,6 +80,7 @@ GSNAV_HD L difference_of_products(L a, L b, L c, L d) noexcept {
   return fma(a, b, -cd) + error;
 }
 
+/// Cross product.
 template <class L>
 GSNAV_HD Vec3<L> cross(const Vec3<L>& a, const Vec3<L>& b) noexcept {
   return {difference_of_products(a.y, b.z, a.z, b.y), difference_of_products(a.z, b.x, a.x, b.z),
@@ -90,6 +100,7 @@ GSNAV_HD Vec3<L> fma(L s, const Vec3<L>& b, const Vec3<L>& a) noexcept {
   return {fma(s, b.x, a.x), fma(s, b.y, a.y), fma(s, b.z, a.z)};
 }
 
+/// Length.
 template <class L>
 GSNAV_HD L norm(const Vec3<L>& a) noexcept {
   return sqrt(dot(a, a));
@@ -115,6 +126,7 @@ GSNAV_HD constexpr Vec3<T> vec_cast(const Vec3<U>& a) noexcept {
   return {static_cast<T>(a.x), static_cast<T>(a.y), static_cast<T>(a.z)};
 }
 
+/// Whether all components are finite.
 template <class S>
 GSNAV_HD bool is_finite(const Vec3<S>& a) noexcept {
   return is_finite(a.x) && is_finite(a.y) && is_finite(a.z);

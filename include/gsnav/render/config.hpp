@@ -21,18 +21,18 @@ struct RenderConfig {
   /// Images to make. Calls that are given a FrameImages make those that it points to, and do not read
   /// this.
   unsigned outputs = kRgb | kAlpha | kMedianDepth;
-  SortOrder sort_order = SortOrder::z_depth;
-  Response response = Response::ewa;
-  double first_hit_tau = 0.5;  ///< in (0, 1): first-hit depth is where alpha reaches this
+  SortOrder sort_order = SortOrder::z_depth;  ///< Quantity that Gaussians are sorted by.
+  Response response = Response::ewa;          ///< How a Gaussian spreads over the image.
+  double first_hit_tau = 0.5;                 ///< in (0, 1): first-hit depth is where alpha reaches this
   /// What colours are blended in, and images and `background` hold: the main asset's space. Sets of the
   /// other are converted Gaussian by Gaussian, after SH; meshes too. Linear images need encoding to be
   /// looked at (srgb_encoded).
   ColorSpace blend_space = ColorSpace::display;
   Vec3d background{0, 0, 0};                ///< of blend_space
   Composite composite = Composite::merged;  ///< of Gaussians and meshes, where a frame has both
-  Quality quality{};
-  Tuning tuning{};
-  Compat compat = Compat::none;
+  Quality quality{};                        ///< How exact the image is.
+  Tuning tuning{};                          ///< How the image is computed; it does not change the image.
+  Compat compat = Compat::none;             ///< Whose rules the image follows.
 
   bool operator==(const RenderConfig&) const = default;
 };

@@ -21,23 +21,24 @@ struct RenderStats {
   std::uint64_t gaussians = 0;  ///< in all sets
   std::uint64_t visible = 0;    ///< whose footprint bounds reach the image, less those found hidden
   std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs, less those found hidden by a mesh
-  MeshStats meshes;
+  MeshStats meshes;                      ///< Counts of the triangles.
 };
 
 /// Images of a batch of cameras of one size in host memory; an image not asked for is empty.
 template <class S>
 struct Frames {
-  std::size_t cameras = 0, height = 0, width = 0;
-  std::vector<S> rgb;                ///< [C][H][W][3]
-  std::vector<S> alpha;              ///< [C][H][W]
-  std::vector<S> median_depth;       ///< [C][H][W] metres, 0: no return
-  std::vector<S> expected_depth;     ///< [C][H][W]
-  std::vector<S> accumulated_depth;  ///< [C][H][W]
-  std::vector<S> first_hit_depth;    ///< [C][H][W]
-  std::vector<RenderStats> stats;    ///< [C]
+  std::size_t cameras = 0, height = 0, width = 0;  ///< Number of cameras and size of each image.
+  std::vector<S> rgb;                              ///< [C][H][W][3]
+  std::vector<S> alpha;                            ///< [C][H][W]
+  std::vector<S> median_depth;                     ///< [C][H][W] metres, 0: no return
+  std::vector<S> expected_depth;                   ///< [C][H][W]
+  std::vector<S> accumulated_depth;                ///< [C][H][W]
+  std::vector<S> first_hit_depth;                  ///< [C][H][W]
+  std::vector<RenderStats> stats;                  ///< [C]
 
   /// The images in the order of kImages (detail/frame/output.hpp).
   using VectorPointer = std::vector<S> Frames::*;
+  /// All images.
   static constexpr VectorPointer kVectors[] = {&Frames::rgb,
                                                &Frames::alpha,
                                                &Frames::median_depth,

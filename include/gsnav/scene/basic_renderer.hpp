@@ -37,10 +37,13 @@ namespace gsnav {
 template <class S, Backend B>
 class BasicRenderer {
  public:
+  /// A renderer without a scene. The backend must outlive it.
   explicit BasicRenderer(B& backend, const RenderConfig& config = {})
       : backend_(&backend), config_(config), workspace_(backend), device_images_(backend) {}
 
+  /// The settings.
   const RenderConfig& config() const noexcept { return config_; }
+  /// Changes the settings from the next frame on.
   void set_config(const RenderConfig& config) { config_ = config; }
 
   /// Meshes that the frames from now on show among the Gaussians (docs/composition.md); none: an empty
@@ -260,6 +263,7 @@ class BasicRenderer {
   [[no_unique_address]] typename ThreadFramesOf<B>::type thread_frames_;
 };
 
+/// Renders in float32 unless another scalar is named.
 template <Backend B>
 explicit BasicRenderer(B&, const RenderConfig& = {}) -> BasicRenderer<float, B>;
 

@@ -22,11 +22,11 @@ namespace gsnav {
 
 /// One Gaussian as files store it: raw, before any activation.
 struct RawGaussian {
-  Vec3d mean{};              ///< metres, asset frame
-  Quatd quat{};              ///< w, x, y, z, any length
-  Vec3d log_scales{};        ///< natural logarithm of the standard deviations
-  double opacity_logit = 0;  ///< opacity = 1 / (1 + exp(-logit)); infinities are legal
-  std::array<float, 3> sh0{};
+  Vec3d mean{};                ///< metres, asset frame
+  Quatd quat{};                ///< w, x, y, z, any length
+  Vec3d log_scales{};          ///< natural logarithm of the standard deviations
+  double opacity_logit = 0;    ///< opacity = 1 / (1 + exp(-logit)); infinities are legal
+  std::array<float, 3> sh0{};  ///< Coefficients of degree 0, RGB.
   const float* shN = nullptr;  ///< [(degree+1)^2 - 1][3], colour inner; null for degree 0
 };
 
@@ -50,11 +50,12 @@ struct GaussianCloud {
   std::vector<ChunkBounds> part_bounds;   ///< [ceil(N / kChunkPart)], or empty; bound_chunks makes both
 
   // How the asset was trained; copied into each GaussianSet made of the cloud.
-  Filter filter = Filter::classic;
-  float eps2d = 0.3f;
-  SortOrder sort_order = SortOrder::z_depth;
-  ColorSpace color_space = ColorSpace::display;
+  Filter filter = Filter::classic;  ///< Screen-space filter that the Gaussians were trained with.
+  float eps2d = 0.3f;               ///< Blur of the filter, square pixels.
+  SortOrder sort_order = SortOrder::z_depth;     ///< Quantity that Gaussians are sorted by.
+  ColorSpace color_space = ColorSpace::display;  ///< Space of the colours.
 
+  /// Number of Gaussians.
   std::size_t size() const noexcept { return opacities.size(); }
 
   /// Mean of Gaussian i in the asset's frame, metres.
@@ -106,11 +107,11 @@ inline constexpr double kOriginLattice = 64.0;
 
 /// A raw Gaussian after the activations.
 struct ActiveGaussian {
-  Vec3d mean{};
+  Vec3d mean{};                   ///< Centre, metres.
   std::array<float, 4> quat{};    ///< w, x, y, z, unit
   std::array<float, 3> scales{};  ///< linear
-  float opacity = 0;
-  bool clamped = false;  ///< a log-scale was outside of [-20, 20]
+  float opacity = 0;              ///< Opacity, in [0, 1].
+  bool clamped = false;           ///< a log-scale was outside of [-20, 20]
 };
 
 /// Activates a raw Gaussian with `rest` numbers in shN by the contract's rules: quaternions are
@@ -145,12 +146,14 @@ inline RowFate activate(const RawGaussian& raw, std::size_t rest, ActiveGaussian
 /// origin itself.
 class OriginLattice {
  public:
+  /// Number of the origin that a centre is stored from.
   std::uint32_t id_of(const Vec3d& mean) {
     Vec3d origin;
     for (int k = 0; k < 3; ++k) origin[k] = kOriginLattice * std::nearbyint(mean[k] / kOriginLattice);
     if (origin == origins_[last_]) return last_;
     return last_ = id_of_point(origin);
   }
+  /// Number of an origin on the lattice.
   std::uint32_t id_of_point(const Vec3d& origin) {
     const auto [it, added] = index_.emplace(std::make_tuple(origin.x, origin.y, origin.z),
                                             static_cast<std::uint32_t>(origins_.size()));
@@ -169,6 +172,7 @@ class OriginLattice {
 /// Puts means into a cloud, from the first row to the last.
 class MeanWriter {
  public:
+  /// Appends a centre to the cloud.
   void push(GaussianCloud& cloud, const Vec3d& mean) {
     const std::uint32_t id = lattice_.id_of(mean);
     if (id != 0 && cloud.origins.empty()) {  // the first Gaussian away from zero
@@ -199,6 +203,7 @@ class GaussianCloudBuilder {
     rest_ = 3 * static_cast<std::size_t>(sh_coefficient_count(sh_degree) - 1);
   }
 
+  /// Makes room for n Gaussians.
   void reserve(std::size_t n) {
     for (auto& p : cloud_.means) p.reserve(n);
     for (auto& p : cloud_.quats) p.reserve(n);
@@ -224,7 +229,9 @@ class GaussianCloudBuilder {
     return true;
   }
 
+  /// Counts so far.
   LoadReport& report() noexcept { return report_; }
+  /// The cloud so far.
   GaussianCloud& cloud() noexcept { return cloud_; }
 
  private:
@@ -259,8 +266,8 @@ inline void expand_sh(GaussianCloud& cloud) {
 
 /// A cloud with the report of how it was read.
 struct LoadedCloud {
-  GaussianCloud cloud;
-  LoadReport report;
+  GaussianCloud cloud;  ///< The Gaussians.
+  LoadReport report;    ///< What the reader found, changed and left out.
 };
 
 /// Appends `b` to `a`; the SH degree becomes the larger (missing bands are zero). Used to merge the

@@ -103,8 +103,11 @@ class LodCut {
 
   /// What the last select() chose.
   const LodStats& stats() const noexcept { return stats_; }
+  /// Sets to draw: the cloud's chunks and the merged chunks.
   std::span<const GaussianSet> sets() const noexcept { return sets_; }
+  /// Chosen chunks of the cloud.
   const std::vector<std::uint32_t>& leaf_chunks() const noexcept { return leaf_chunks_; }
+  /// Chosen chunks of merged Gaussians.
   const std::vector<std::uint32_t>& merged_chunks() const noexcept { return merged_chunks_; }
 
   /// A cloud as the pixels of O_photo(k) see it: averaged over k x k samples, each blurred as the

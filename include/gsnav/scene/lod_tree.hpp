@@ -24,7 +24,7 @@ struct LodNode {
 
 /// A box of a set that ships its levels, at one of them (detail/scene/lod_levels.hpp).
 struct LodBox {
-  static constexpr std::uint32_t kNone = 0xffffffffu;
+  static constexpr std::uint32_t kNone = 0xffffffffu;  ///< No node.
   std::uint32_t first_chunk = 0, chunks = 0;  ///< of the cloud where nothing is finer, else of `merged`
   std::uint32_t finer = kNone;                ///< the node that shows the same in more Gaussians
   std::uint32_t rows = 0;   ///< Gaussians in its chunks, less those that fill the last one
@@ -49,7 +49,9 @@ struct LodTree {
   std::vector<LodBox> boxes;         ///< of a forest, one a node
   std::vector<std::uint32_t> roots;  ///< of a forest: the coarsest node of each box
 
+  /// Number of levels.
   std::size_t levels() const noexcept { return level_begin.empty() ? 0 : level_begin.size() - 1; }
+  /// Number of leaves.
   std::size_t leaves() const noexcept { return levels() == 0 ? 0 : level_begin[1]; }
   /// Chunks of the cloud that it was made of.
   std::size_t cloud_chunks() const noexcept {

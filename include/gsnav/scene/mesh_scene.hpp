@@ -98,14 +98,14 @@ class MeshTexture {
 
 /// A mesh and what its surface looks like. What it does not have stays empty, and costs nothing.
 struct SurfaceMesh {
-  TriangleMesh geometry;
+  TriangleMesh geometry;         ///< Vertices and triangles.
   std::vector<Vec3f> normals;    ///< one a vertex, unit; empty: the faces'
   std::vector<Vec3f> colors;     ///< one a vertex, linear RGB; empty: white
   std::vector<Vec2<float>> uvs;  ///< one a vertex, (0, 0) the texture's top left; empty: no texture
   std::shared_ptr<const MeshTexture> texture;  ///< null: white
   Vec3f base_color{1, 1, 1};                   ///< linear RGB
-  bool two_sided = false;
-  bool unlit = false;  ///< its colour is what is seen, whatever the light
+  bool two_sided = false;                      ///< Back faces are drawn too.
+  bool unlit = false;                          ///< its colour is what is seen, whatever the light
   MeshAlpha alpha_mode =
       MeshAlpha::opaque;      ///< what alpha does: base_alpha times those of vertices and of the texture
   float base_alpha = 1;       ///< in [0, 1]
@@ -149,7 +149,9 @@ class MeshScene {
     find_box(meshes_.back());
     return meshes_.size() - 1;
   }
+  /// Number of meshes.
   std::size_t size() const noexcept { return meshes_.size(); }
+  /// Mesh i.
   const SurfaceMesh& mesh(std::size_t i) const& noexcept { return meshes_[i].surface; }
   const SurfaceMesh& mesh(std::size_t i) const&& = delete;
 
@@ -212,6 +214,7 @@ class MeshScene {
 template <Backend B>
 class MeshArrays {
  public:
+  /// Copies a mesh to the backend's memory.
   MeshArrays(B& backend, const MeshView& mesh) : mesh_(mesh) {
     if constexpr (!is_host_backend<B>) {
       to_device(backend, mesh_.vertices, vectors_);

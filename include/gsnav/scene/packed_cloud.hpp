@@ -41,7 +41,9 @@ struct PackedCloud {
   /// What is not packed: ids, origins, chunk bounds, what the asset says, and planes that a limit kept.
   GaussianCloud rest;
 
+  /// Number of Gaussians.
   std::size_t size() const noexcept { return count; }
+  /// Memory in bytes.
   std::size_t bytes() const noexcept {
     return sizeof(std::uint16_t) * (codes.size() + sh0.size()) + shN.size() +
            sizeof(PackedChunk) * chunks.size() + rest.bytes() +
@@ -58,6 +60,7 @@ struct PackedCloud {
     return v;
   }
   GaussianRows view() const&& = delete;
+  /// The cloud as a set to draw. Valid while the cloud lives.
   GaussianSet set(const Similarity& world_from_asset = {}) const& noexcept {
     return {view(), world_from_asset, rest.filter, rest.eps2d, rest.color_space};
   }

@@ -30,7 +30,7 @@ namespace gsnav {
 /// are left out for cameras in it. An approximation, for the profiles `fast` and `lod`; docs/lod.md has
 /// its error.
 struct VisibleSets {
-  using Key = std::array<std::int32_t, 3>;
+  using Key = std::array<std::int32_t, 3>;  ///< Place of a cell in the lattice.
 
   /// Side of the cubic cells, in the asset's frame: cell k spans [k, k + 1) times this along each axis.
   double cell = 0;
@@ -46,9 +46,11 @@ struct VisibleSets {
       ends;  ///< [cells], where the words of each end; those of the first begin at 0
   std::vector<std::uint32_t> bits;  ///< Selection::seen of each cell, one behind the other
 
+  /// Number of cells.
   std::size_t cells() const noexcept { return keys.size(); }
   /// Words of a cell that say which chunks it sees.
   std::size_t words() const noexcept { return (cloud_chunks + 31) / 32; }
+  /// Memory in bytes.
   std::size_t bytes() const noexcept {
     return keys.size() * sizeof(Key) + ends.size() * sizeof(std::uint64_t) +
            bits.size() * sizeof(std::uint32_t);

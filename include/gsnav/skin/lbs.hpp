@@ -40,8 +40,8 @@ GSNAV_HD Mat3<L> cofactors(const Mat3<L>& m) noexcept {
 /// A rotation times `scale` > 0.
 template <class L>
 struct ScaledRotation {
-  Mat3<L> matrix;
-  L scale;
+  Mat3<L> matrix;  ///< The rotation times the scale.
+  L scale;         ///< Scale, > 0.
 };
 
 /// The rotation nearest to m in the Frobenius norm (its polar factor), for det(m) > 0, in closed form
@@ -85,6 +85,7 @@ GSNAV_HD ScaledRotation<L> scaled_polar_rotation(const Mat3<L>& m) noexcept {
             fma(g22, m.row[2], fma(-g12, m.row[1], fma(-g02, m.row[0], c.row[2] * sum)))}},
           fma(pairs, sum, -det)};
 }
+/// The rotation nearest to m.
 template <class L>
 GSNAV_HD Mat3<L> polar_rotation(const Mat3<L>& m) noexcept {
   const ScaledRotation<L> r = scaled_polar_rotation(m);
@@ -121,7 +122,7 @@ GSNAV_HD Quat<L> quat_direction(const ScaledRotation<L>& rotation) noexcept {
 /// A Gaussian after skinning.
 template <class L>
 struct Skinned {
-  Vec3<L> mean{};
+  Vec3<L> mean{};      ///< Posed centre.
   Quat<L> quat{};      ///< orientation: rotation * canonical orientation
   Quat<L> rotation{};  ///< what the body has turned it by since the canonical pose
 };
@@ -182,7 +183,9 @@ struct SkinningArgs {
   View<const float> scales[3];  ///< canonical, metres, [N] each
   View<Out> axes_out[9];        ///< [N] each, as ShapeRows::axes
 
+  /// Number of Gaussians.
   GSNAV_HD std::size_t size() const noexcept { return means[0].size; }
+  /// Whether rotations are written too.
   GSNAV_HD bool writes_rotations() const noexcept { return !rotations_out[0].empty(); }
 };
 
@@ -217,9 +220,9 @@ GSNAV_HD auto blend_influences(const Joint& joint, const Weight& weight) noexcep
 /// What skinning reads of a Gaussian.
 template <int K>
 struct SkinRow {
-  std::uint16_t joints[K], parts[K];
-  Vec3<float> mean;
-  Quat<float> quat;
+  std::uint16_t joints[K], parts[K];  ///< Joint and weight of each influence.
+  Vec3<float> mean;                   ///< Centre in the rest pose.
+  Quat<float> quat;                   ///< Rotation in the rest pose.
 };
 
 /// Of Gaussian i.
@@ -260,8 +263,9 @@ GSNAV_HD void store_skinned(const Args& args, std::size_t i, const Skinned<S>& s
 /// Skins Gaussian i.
 template <class S, class Out = float>
 struct SkinGaussian {
-  SkinningArgs<S, Out> args;
+  SkinningArgs<S, Out> args;  ///< Arrays of the avatar.
 
+  /// Skins Gaussian i.
   GSNAV_HD void operator()(std::size_t i) const noexcept {
     const auto joint_at = [this](std::uint16_t j)
                               GSNAV_INLINED -> const Affine3<S>& { return args.joints[j]; };

@@ -55,8 +55,8 @@ GSNAV_HD bool id_less(std::uint32_t avatar_a, std::uint32_t bone_a, std::uint32_
 /// The first body that an agent's motion runs into.
 template <class S>
 struct FirstImpact {
-  SweepResult<S> sweep{};  ///< relative to the interval swept; meaningful where `hit`
-  bool hit = false;
+  SweepResult<S> sweep{};              ///< relative to the interval swept; meaningful where `hit`
+  bool hit = false;                    ///< The capsules touch within the tick.
   std::uint32_t avatar = 0, bone = 0;  ///< whom, where `hit`
   bool started_overlapping = false;    ///< some body overlapped the agent at the start
   bool pushed = false;                 ///< some body came closer from contact by its own motion

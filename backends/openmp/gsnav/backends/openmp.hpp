@@ -49,25 +49,39 @@ inline namespace GSNAV_LANES_TAG {
 /// The lane kernels of one instruction set: Gaussians, meshes (which a frame draws first), skinning and
 /// capsules. lanes::kernel_table fills it.
 struct LaneKernels {
-  const char* name;
-  int width;
+  const char* name;  ///< Name of the instruction set.
+  int width;         ///< Floats per SIMD register.
+  /// Projects one chunk.
   void (*project_chunk)(const ViewedSet<float>&, const ProjectOutputs<float>&,
                         std::size_t chunk) noexcept;
+  /// Counts tiles of one block of splats.
   void (*count_tiles)(const CountTileIntersections<float>&, std::size_t block) noexcept;
+  /// Counts tiles of one block of splats that no mesh hides.
   void (*count_tiles_before_mesh)(const CountTileIntersections<float, MeshCull<float>>&,
                                   std::size_t block) noexcept;
+  /// Writes one block of splats to the lists of their tiles.
   void (*scatter_tiles)(const ScatterTileIntersections<float>&, std::size_t block) noexcept;
+  /// Writes one block of splats that no mesh hides to the lists of their tiles.
   void (*scatter_tiles_before_mesh)(const ScatterTileIntersections<float, MeshCull<float>>&,
                                     std::size_t block) noexcept;
-  void (*rasterize_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
+  void (*rasterize_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;  ///< Blends one tile.
+  /// Blends one tile of Gaussians and meshes.
   void (*composite_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
+  /// Projects one chunk of vertices.
   void (*project_mesh_vertices)(const ProjectMeshVertices<float>&, std::size_t chunk) noexcept;
+  /// Counts the visible triangles of one chunk.
   void (*count_mesh_triangles)(const CountMeshTriangles<float>&, std::size_t chunk) noexcept;
+  /// Writes the visible triangles of one chunk.
   void (*write_mesh_triangles)(const WriteMeshTriangles<float>&, std::size_t chunk) noexcept;
+  /// Rasterizes the triangles of one tile.
   void (*rasterize_mesh_tile)(const RasterizeMeshTile<float>&, std::size_t tile) noexcept;
+  /// Shades one row of pixels.
   void (*shade_mesh_row)(const ShadeMeshRow<float>&, std::size_t row) noexcept;
+  /// Skins Gaussians [begin, end).
   void (*skin_range)(const SkinningArgs<float>&, std::size_t begin, std::size_t end) noexcept;
+  /// Measures gaps of capsules [begin, end).
   void (*gap_range)(const CapsuleGapArgs<float>&, std::size_t begin, std::size_t end) noexcept;
+  /// Sweeps capsules [begin, end).
   void (*sweep_range)(const SweepArgs<float>&, std::size_t begin, std::size_t end) noexcept;
 };
 
@@ -94,7 +108,9 @@ class OpenMPBackend : public HostMemory {
       : threads_(threads > 0 ? threads : default_threads()),
         pool_(threads_ > 1 ? std::make_shared<ThreadPool>(threads_) : nullptr) {}
 
+  /// Number of threads.
   int threads() const noexcept { return threads_; }
+  /// How many items the backend works on at a time.
   std::size_t concurrency() const noexcept { return static_cast<std::size_t>(threads_); }
 
   /// Optional member: batches of cameras go by whole frames, each on one thread.
@@ -114,9 +130,11 @@ class OpenMPBackend : public HostMemory {
       for (std::size_t i = begin; i < end; ++i) f(i);
     });
   }
+  /// Waits until all work of the backend is done. Errors: as of the device.
   Status synchronize() { return {}; }
 
   // Stages in lanes (core/stages.hpp).
+  /// Runs a stage with SIMD kernels on all threads.
   void run(stage::Project, const ViewedSet<float>& args, const ProjectOutputs<float>& out) {
     const auto kernel = lane_kernels().project_chunk;
     parallel_for(args.chunk_count(), [&args, &out, kernel](std::size_t c) { kernel(args, out, c); });
@@ -128,7 +146,7 @@ class OpenMPBackend : public HostMemory {
     parallel_for(chunks.size,
                  [&args, &out, chunks, kernel](std::size_t i) { kernel(args, out, chunks[i]); });
   }
-  static constexpr bool bins_in_lanes = true;
+  static constexpr bool bins_in_lanes = true;  ///< Says that this backend bins splats with SIMD kernels.
   void run(stage::Each, std::size_t n, const CountTileIntersections<float>& k) {
     parallel_for(n, Compiled{k, lane_kernels().count_tiles});
   }

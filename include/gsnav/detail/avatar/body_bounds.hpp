@@ -13,7 +13,7 @@ namespace gsnav {
 /// around balls at the joints, each as large as the furthest Gaussian that its joint moves.
 class BodyBounds {
  public:
-  explicit BodyBounds(const AvatarAsset& asset);
+  explicit BodyBounds(const AvatarAsset& asset);  ///< Measures the avatar once, at each of its joints.
 
   /// For joints to root frame, [J], metres.
   ChunkBounds at(const std::vector<Affine3<double>>& joints) const noexcept;

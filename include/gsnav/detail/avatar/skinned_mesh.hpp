@@ -16,8 +16,8 @@ namespace gsnav {
 
 /// A rigged surface in its bind pose: what an avatar of Gaussians is made of.
 struct SkinnedMesh {
-  std::string name;
-  Skeleton skeleton;
+  std::string name;              ///< Name of the mesh in its file.
+  Skeleton skeleton;             ///< Joints and their rest pose.
   std::vector<Vec3d> positions;  ///< [V] bind pose, root frame (Y up, facing -Z), metres
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< counter-clockwise seen from outside
   std::size_t influences = 0;                           ///< k
@@ -27,7 +27,7 @@ struct SkinnedMesh {
   std::vector<Vec3d> colors;                            ///< [V] linear light, or empty: white
   std::vector<std::uint32_t> materials_of;  ///< [T] index into materials, or empty: the first
   std::vector<SurfaceMaterial> materials;   ///< empty: white
-  std::vector<TextureImage> textures;
+  std::vector<TextureImage> textures;       ///< Images that materials refer to by index.
 
   /// invalid_argument naming the array and what is wrong with it.
   Status validate() const;
@@ -35,17 +35,18 @@ struct SkinnedMesh {
 
 /// What reading a rigged surface did to it; nothing is repaired without being counted here.
 struct SkinnedMeshReport {
-  std::size_t vertices = 0, triangles = 0;
+  std::size_t vertices = 0, triangles = 0;   ///< Size of the surface.
   std::size_t skins = 1, skins_in_file = 1;  ///< whose meshes were read, and all (glTF)
   std::size_t unequal_weights =
       0;  ///< vertices whose weights did not sum to 1 (1e-3): divided by the sum
+  /// Range of the sums of weights per vertex, as stored.
   double least_weight_sum = 1.0, greatest_weight_sum = 1.0;
   std::size_t without_weights =
       0;  ///< vertices with none: moved by the nearest weighted vertex's joints
   /// Greatest distance, metres, between a vertex posed by the file's own matrices and by rigid joints
   /// (scales of joints are not kept), over the poses looked at.
   double rigid_error = 0.0;
-  std::vector<std::string> warnings;
+  std::vector<std::string> warnings;  ///< Messages for people, one per problem.
 };
 
 }  // namespace gsnav

@@ -12,11 +12,12 @@ namespace gsnav {
 
 /// Where an actor stands at one time. World frame: Y up, metres; it faces -Z turned by `yaw` about +Y.
 struct TrajectorySample {
-  Vec3d position{};
+  Vec3d position{};       ///< Place on the floor, metres.
   double yaw = 0.0;       ///< radians, positive to the left
   double distance = 0.0;  ///< metres walked since time 0
   /// Distances at which the present walk began and will end with a stop; infinite where there is none.
   double leg_begin = -std::numeric_limits<double>::infinity();
+  /// Distance at which the walk ends with a stop, metres; infinity if it does not.
   double leg_end = std::numeric_limits<double>::infinity();
   double turned = 0.0;   ///< radians turned on the spot since time 0
   double walking = 0.0;  ///< speed as a share of the walking speed
@@ -34,6 +35,7 @@ class Trajectory {
 /// Stands in one place.
 class StandingTrajectory final : public Trajectory {
  public:
+  /// Stands at `position` (metres), turned by `yaw` (radians).
   explicit StandingTrajectory(const Vec3d& position = {}, double yaw = 0.0);
   TrajectorySample at(double) const override { return sample_; }
 
@@ -41,6 +43,7 @@ class StandingTrajectory final : public Trajectory {
   TrajectorySample sample_;
 };
 
+/// How an actor walks along a path.
 struct WalkOptions {
   double speed = 1.2;            ///< metres a second along the path, > 0
   double acceleration = 2.0;     ///< metres a second squared at stops, > 0

@@ -16,7 +16,7 @@ struct IndoorViewOptions {
   int width = 640, height = 480;  ///< pixels, [1, 16384]
   double hfov = 75;               ///< degrees, [10, 150]
   double eye_height = 1.5;        ///< metres above the floor, [0.3, 2.2]
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;         ///< Seed; equal seeds give equal results.
 };
 
 /// Random cameras inside the rooms of a generated scene. Views spread over the rooms. An eye

@@ -38,11 +38,12 @@ GSNAV_HD S converted(S value, ColorSpace from, ColorSpace to) noexcept {
 /// chunk.
 template <class S>
 struct ConvertSplatColors {
-  View<SplatColor<S>> colors;
-  View<const std::uint32_t> counts;
-  std::size_t first_chunk = 0;
-  ColorSpace from{}, to{};
+  View<SplatColor<S>> colors;        ///< Colours of the projected Gaussians, converted in place.
+  View<const std::uint32_t> counts;  ///< Number of projected Gaussians per chunk.
+  std::size_t first_chunk = 0;       ///< First chunk of the set.
+  ColorSpace from{}, to{};           ///< Color space to convert from and to.
 
+  /// Converts chunk c.
   GSNAV_HD void operator()(std::size_t c) const noexcept {
     const std::size_t base = (first_chunk + c) * kProjectChunk;
     for (std::size_t i = base; i < base + counts[first_chunk + c]; ++i) {
@@ -57,7 +58,8 @@ struct ConvertSplatColors {
 /// Decodes a display-referred image in place, one value a work item.
 template <class S>
 struct DecodeImage {
-  S* values = nullptr;
+  S* values = nullptr;  ///< First value of the image.
+  /// Decodes value i.
   GSNAV_HD void operator()(std::size_t i) const noexcept { values[i] = srgb_decoded(values[i]); }
 };
 

@@ -14,7 +14,7 @@ namespace gsnav::io {
 
 /// One avatar of a scene, as the file says. Paths are as they are to be opened.
 struct SceneAvatar {
-  std::string name;
+  std::string name;                 ///< Name of the avatar.
   std::filesystem::path canonical;  ///< `canonical_gaussians`
   std::filesystem::path driver;     ///< `.npz`; a `.pkl` in the file stands for the `.npz` beside it
   std::filesystem::path
@@ -30,9 +30,9 @@ struct SceneAvatar {
 
 /// The avatars of a scene and its clock.
 struct AvatarScene {
-  std::vector<SceneAvatar> avatars;
-  double time_max = 0.0;  ///< 0: when the last avatar has left
-  bool time_loop = true;
+  std::vector<SceneAvatar> avatars;  ///< Avatars in the order of the file.
+  double time_max = 0.0;             ///< 0: when the last avatar has left
+  bool time_loop = true;             ///< The clock starts again after `time_max`.
   /// Seconds by which a clock that loops goes on after `time_max` for those who are there at its end and
   /// at its begin to get back, at least; more where they would move faster than 1.4 m/s. 0: they jump,
   /// as with Habitat-GS.

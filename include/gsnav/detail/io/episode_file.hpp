@@ -14,8 +14,8 @@ namespace gsnav::io {
 
 /// What load_episodes returns.
 struct EpisodeFile {
-  std::vector<PointNavEpisode> episodes;
-  std::vector<std::string> warnings;  ///< keys and goals that are left out, each once
+  std::vector<PointNavEpisode> episodes;  ///< Episodes in the order of the file.
+  std::vector<std::string> warnings;      ///< keys and goals that are left out, each once
 };
 
 /// Reads Habitat-Lab's PointNav and ImageNav episodes, `.json` or `.json.gz`. A file without episodes

@@ -14,12 +14,12 @@ namespace gsnav::io {
 
 /// A `*.stage_config.json`: what a scene is made of. Paths are as they are to be opened.
 struct StageConfig {
-  std::filesystem::path file;
-  std::filesystem::path render_asset;     ///< Gaussians, or a mesh
-  std::filesystem::path collision_asset;  ///< a mesh, or empty
-  Vec3d up{0, 1, 0}, front{0, 0, -1}, origin{};
-  double units_to_meters = 1.0;
-  double scale = 1.0;
+  std::filesystem::path file;                    ///< The file to read.
+  std::filesystem::path render_asset;            ///< Gaussians, or a mesh
+  std::filesystem::path collision_asset;         ///< a mesh, or empty
+  Vec3d up{0, 1, 0}, front{0, 0, -1}, origin{};  ///< Axes and origin of the stage's own frame.
+  double units_to_meters = 1.0;                  ///< Metres per unit of the file.
+  double scale = 1.0;                            ///< Factor on all lengths.
   bool norm_quaternion = true;  ///< Habitat-GS's; quaternions are always normalised here
 
   /// World from asset by up, front, origin, units and scale. Habitat-GS leaves all of these out for
@@ -29,16 +29,16 @@ struct StageConfig {
 
 /// A `*.scene_instance.json`: a stage, the NavMesh and who is in it.
 struct HabitatScene {
-  std::string name;  ///< the file's, without `.scene_instance.json`
-  std::filesystem::path file;
-  StageConfig stage;
+  std::string name;               ///< the file's, without `.scene_instance.json`
+  std::filesystem::path file;     ///< The file to read.
+  StageConfig stage;              ///< The stage of the scene.
   std::filesystem::path navmesh;  ///< or empty
-  AvatarScene avatars;
+  AvatarScene avatars;            ///< The people of the scene.
 };
 
 /// What a `*.scene_dataset_config.json` leads to. Its order is that of the scenes' names.
 struct HabitatDataset {
-  std::vector<HabitatScene> scenes;
+  std::vector<HabitatScene> scenes;  ///< Scenes in the order of the dataset.
   std::vector<std::string>
       warnings;  ///< keys that are left out, each once, with the first file that has it
 

@@ -29,7 +29,7 @@ std::filesystem::path lod_path(const std::string& spec, const GaussianCloud& clo
 
 /// A tree, and what there is to say of where it came from.
 struct CachedLod {
-  LodTree tree;
+  LodTree tree;        ///< The levels of detail.
   bool built = false;  ///< now; else read
   std::string
       warning;  ///< why a file that is there was not taken, or why none could be written; or empty

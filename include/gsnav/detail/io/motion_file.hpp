@@ -15,11 +15,12 @@ namespace gsnav::io {
 
 /// A motion with the skeleton that it is of.
 struct LoadedMotion {
-  Skeleton skeleton;
-  MotionClip clip;
-  std::vector<std::string> warnings;
+  Skeleton skeleton;                  ///< Joints and their rest pose.
+  MotionClip clip;                    ///< The motion.
+  std::vector<std::string> warnings;  ///< Messages for people, one per problem.
 };
 
+/// How a BVH file is read.
 struct BvhOptions {
   double scale = 1.0;  ///< metres a unit of the file (0.01 for centimetres), > 0
   bool z_up = false;   ///< the file's Z is up: turned by -90 degrees about X
@@ -36,6 +37,7 @@ struct BvhOptions {
 /// one name); invalid_argument (the options); out_of_memory. Never throws.
 Result<LoadedMotion> load_bvh(const std::filesystem::path& path, const BvhOptions& options = {});
 
+/// How an ASF/AMC pair is read.
 struct AmcOptions {
   double frame_rate = 120.0;  ///< frames a second, > 0; the files do not say (CMU records at 120 or 60)
   double scale = 0.0;  ///< metres a unit; 0: the skeleton's `length` is units an inch, as in CMU's
@@ -85,6 +87,7 @@ struct DriverFrames {
 /// out_of_memory.
 Status save_driver(const std::filesystem::path& path, const DriverFrames& frames);
 
+/// How a file of SMPL poses is read.
 struct SmplMotionOptions {
   bool z_up = true;  ///< the motion's Z is up, as in AMASS: turned by -90 degrees about X
 };

@@ -26,7 +26,7 @@ class NpzFile {
   const std::string& source() const noexcept;
   /// Names of the arrays without `.npy`, sorted.
   std::vector<std::string> names() const;
-  bool contains(const std::string& name) const;
+  bool contains(const std::string& name) const;  ///< Whether there is an array of this name.
 
   /// One array, as load_npy reads it. An entry may claim 256 MiB and a hundred times its compressed
   /// size on top, not more. Errors name the file and the array: invalid_file (also: there is no such
@@ -44,8 +44,8 @@ class NpzFile {
 
 /// One array for save_npz. The values stay the caller's; their product of `shape` must be their number.
 struct NpzEntry {
-  std::string name;  ///< without `.npy`
-  std::vector<std::size_t> shape;
+  std::string name;                ///< without `.npy`
+  std::vector<std::size_t> shape;  ///< Lengths of the axes, outermost first.
   /// C order; written as `<f4`, `<f8`, `<i8` or, a text, as `|S` of one element (its shape is ignored).
   std::variant<std::span<const float>, std::span<const double>, std::span<const std::int64_t>,
                std::string>

@@ -17,17 +17,18 @@ namespace gsnav::io {
 /// A clip of a file, on the mesh's skeleton.
 struct NamedClip {
   std::string name;  ///< the file's, or "clip0", "clip1", ...
-  MotionClip clip;
+  MotionClip clip;   ///< The motion.
 };
 
 /// A rigged surface with what its file can make it do.
 struct LoadedSkinnedMesh {
-  SkinnedMesh mesh;
-  LocalPose pose;  ///< how the file shows it where nothing moves
-  std::vector<NamedClip> clips;
-  SkinnedMeshReport report;
+  SkinnedMesh mesh;              ///< The rigged surface.
+  LocalPose pose;                ///< how the file shows it where nothing moves
+  std::vector<NamedClip> clips;  ///< Animations of the file.
+  SkinnedMeshReport report;      ///< What the reader found and changed.
 };
 
+/// How a rigged glTF file is read.
 struct GltfOptions {
   /// Names or indices of the skins whose meshes are read; they must share a rig. Empty: all.
   std::vector<std::string> skins{};
@@ -68,8 +69,8 @@ Result<LoadedSkinnedMesh> load_gltf_skin(const std::filesystem::path& path,
 
 /// Clips for a skeleton, read from a file of their own.
 struct LoadedClips {
-  std::vector<NamedClip> clips;
-  std::vector<std::string> warnings;
+  std::vector<NamedClip> clips;       ///< Animations of the file.
+  std::vector<std::string> warnings;  ///< Messages for people, one per problem.
 };
 
 /// Reads the animations of a glTF 2.0 file, with or without a skin, for `skeleton`. A joint is the node
@@ -81,6 +82,7 @@ struct LoadedClips {
 Result<LoadedClips> load_gltf_clips(const std::filesystem::path& path, const Skeleton& skeleton,
                                     const GltfOptions& options = {});
 
+/// How MakeHuman's files are read.
 struct MakeHumanOptions {
   std::filesystem::path skeleton;  ///< `.mhskel`
   std::filesystem::path weights;   ///< `.mhw`; empty: the one that the skeleton names

@@ -14,8 +14,8 @@ namespace gsnav::io {
 
 /// A moving scene with the report of how it was read.
 struct LoadedTemporalCloud {
-  TemporalCloud scene;
-  LoadReport report;
+  TemporalCloud scene;  ///< Gaussians that move.
+  LoadReport report;    ///< What the reader found, changed and left out.
 };
 
 /// Reads 4D Gaussians as Habitat-GS does, rows as they were read (sort_spatially sorts them):

@@ -30,7 +30,7 @@ std::filesystem::path visible_sets_path(const std::string& spec, const GaussianC
 
 /// Visible sets, and what there is to say of where they came from.
 struct CachedVisibleSets {
-  VisibleSets sets;
+  VisibleSets sets;    ///< The visible sets.
   bool built = false;  ///< now; else read
   std::string
       warning;  ///< why a file that is there was not taken, or why none could be written; or empty

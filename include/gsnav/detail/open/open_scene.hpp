@@ -41,7 +41,7 @@ struct OpenOptions {
   /// ground (guess_up), or else what the file's kind usually has; "keep": the world is the file's frame.
   std::string up = "auto";
   double time = 0;  ///< seconds; the moment of a scene that moves (4D Gaussians)
-  CloudStorage storage = CloudStorage::full;
+  CloudStorage storage = CloudStorage::full;  ///< How Gaussians are kept in memory.
   /// SH bands that change no colour by more than this are let go. 0: those of zeros alone, which changes
   /// no image; kUnseenColor: those that nobody sees, for Quality::fast and levels of detail.
   double unseen_color = 0;

@@ -9,6 +9,7 @@
 
 namespace gsnav {
 
+/// How capsules are fitted to a body.
 struct CapsuleFitOptions {
   double percentile =
       0.99;  ///< share of a bone's Gaussian centres, over all poses, that its capsule holds, (0.5, 1]
@@ -20,11 +21,11 @@ struct CapsuleFitOptions {
 
 /// How well capsules hold a body, over poses. Lengths in metres.
 struct CapsuleReport {
-  std::size_t capsules = 0, poses = 0;
-  double percentile = 0.0;       ///< that was needed
-  double contained_least = 1.0;  ///< share of the centres within a capsule, in the worst pose
-  double contained_mean = 1.0;
-  double outside_greatest = 0.0;  ///< how far a centre lies outside of all capsules
+  std::size_t capsules = 0, poses = 0;  ///< Counts of capsules and of poses.
+  double percentile = 0.0;              ///< that was needed
+  double contained_least = 1.0;         ///< share of the centres within a capsule, in the worst pose
+  double contained_mean = 1.0;          ///< Share of the centres within a capsule, mean over poses.
+  double outside_greatest = 0.0;        ///< how far a centre lies outside of all capsules
   double over_mean = 0.0;  ///< distance of the capsules' outer surface from the nearest centre: mean
   double over_p99 = 0.0;   ///< ... and 99th percentile
   double body_volume =

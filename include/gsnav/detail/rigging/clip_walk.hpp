@@ -10,6 +10,7 @@
 
 namespace gsnav {
 
+/// How a recorded walk is made to loop.
 struct ClipWalkOptions {
   /// The part of the clip that is one cycle (two steps): keys [first, first + keys]. 0 keys: the whole
   /// clip where it ends as it begins, else the part of 0.7 to 1.8 s that closes best.
@@ -42,6 +43,7 @@ class ClipWalk final : public MotionSource {
   double speed() const noexcept { return stride() / seconds_; }
   /// The part of the clip that was taken.
   std::size_t first_key() const noexcept { return first_; }
+  /// Number of key poses in the cycle.
   std::size_t keys() const noexcept { return cycle_.size(); }
 
   void pose(const MotionInput& input, LocalPose& out) const override;

@@ -40,18 +40,20 @@ class NearestTriangle {
 
 }  // namespace detail
 
+/// How a cloud is bound to a skeleton.
 struct CloudBindingOptions {
   Similarity mesh_from_cloud{};  ///< takes the cloud's frame to the mesh's: HumanGaussian's are scaled
                                  ///< and shifted
   double furthest = 0.05;        ///< metres; Gaussians further from the surface are left out
-  WeightOptions weights;
+  WeightOptions weights;         ///< How many influences are kept.
 };
 
+/// A cloud as an avatar, and how well it is bound.
 struct BoundCloud {
-  AvatarAsset asset;
+  AvatarAsset asset;         ///< The avatar.
   std::size_t left_out = 0;  ///< Gaussians further from the surface than allowed
   double furthest = 0.0;     ///< metres, of those kept
-  WeightReport weights;
+  WeightReport weights;      ///< What happened to the skinning weights.
 };
 
 /// An avatar from Gaussians that were made around a body without weights (HumanGaussian's PLY, a scan):

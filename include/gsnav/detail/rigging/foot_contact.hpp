@@ -11,15 +11,15 @@ namespace gsnav {
 
 /// A point of a sole, fixed to a joint.
 struct SolePoint {
-  std::size_t joint = 0;
-  Vec3d local{};  ///< in the joint's frame, metres
+  std::size_t joint = 0;  ///< Index of the joint.
+  Vec3d local{};          ///< in the joint's frame, metres
 };
 
 /// One foot: its joints, the ankle first, and where it touches the ground: heel, ball and tip of the
 /// toes.
 struct Foot {
-  std::vector<std::size_t> joints;
-  std::vector<SolePoint> sole;
+  std::vector<std::size_t> joints;  ///< Joints of the foot, the ankle first.
+  std::vector<SolePoint> sole;      ///< Points that touch the ground.
 };
 
 /// The feet of a skeleton that stands upright in its rest pose with its soles at the height `floor`
@@ -34,13 +34,13 @@ struct FootSlide {
   std::size_t contacts = 0;  ///< times that a foot was down
   double mean = 0.0;         ///< slid in one of them, on average
   double greatest = 0.0;     ///< ... at most
-  double total = 0.0;
+  double total = 0.0;        ///< Slid in all contacts together.
 };
 
 /// What a foot does from one frame to the next.
 struct FootMove {
-  bool down = false;
-  Vec3d way{};  ///< along the floor, of the point of the sole that moves least; metres
+  bool down = false;  ///< The foot is on the ground.
+  Vec3d way{};        ///< along the floor, of the point of the sole that moves least; metres
 };
 
 /// A foot is down while a point of its sole is within `clearance` of the lowest that it gets and does
@@ -54,6 +54,7 @@ std::vector<FootMove> foot_moves(const Foot& foot,
 /// Measures sliding over frames of joints in the world, by foot_moves.
 class FootSlideMeter {
  public:
+  /// Measures these feet. `clearance` in metres, as for foot_moves.
   FootSlideMeter(std::vector<Foot> feet, double clearance = 0.02)
       : feet_(std::move(feet)), clearance_(clearance) {}
 

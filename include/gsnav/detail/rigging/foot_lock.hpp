@@ -12,11 +12,13 @@ namespace gsnav {
 /// The joints of a leg above a foot: thigh and shin each turn as a whole, whatever joints a rig cuts
 /// them into.
 struct Leg {
-  std::size_t hip = 0, knee = 0, ankle = 0;
-  std::vector<std::size_t> thigh, shin,
-      foot;  ///< joints that move with each, hip, knee and ankle included
+  std::size_t hip = 0, knee = 0, ankle = 0;  ///< Indices of the joints.
+  std::vector<std::size_t> thigh;  ///< joints that move with the hip, itself included
+  std::vector<std::size_t> shin;   ///< joints that move with the knee, itself included
+  std::vector<std::size_t> foot;   ///< joints that move with the ankle, itself included
 };
 
+/// How feet are held.
 struct FootLockOptions {
   double clearance = 0.02;  ///< metres: as for FootSlideMeter
   double shortest = 0.08;   ///< seconds a foot is down at least, and up at least in between
@@ -24,6 +26,7 @@ struct FootLockOptions {
       0.10;  ///< metres: no foot is moved further; what it would slide beyond that it slides
 };
 
+/// How far feet were moved.
 struct FootLockReport {
   double moved = 0.0;         ///< metres: greatest way that a foot was moved
   double out_of_reach = 0.0;  ///< metres: greatest way that a leg was too short for

@@ -12,10 +12,11 @@ namespace gsnav {
 /// them in the CMU captures (ASF/AMC), MakeHuman's default rig, MakeHuman's BVH files and Mixamo's rig
 /// ("mixamorig:" left out). Letters in either case.
 struct BodyJointNames {
-  const char* smpl;
+  const char* smpl;                   ///< Name in SMPL.
   std::array<const char*, 6> others;  ///< null: none
 };
 
+/// Names of the 22 joints of a body, in the order of SMPL.
 const std::array<BodyJointNames, 22>& body_joint_names() noexcept;
 
 /// The joint that stands for each body joint (body_joint_names), or -1.

@@ -11,22 +11,24 @@
 
 namespace gsnav {
 
+/// How Gaussians are spread over a surface.
 struct MeshAvatarOptions {
   std::size_t gaussians = 100000;  ///< about so many, [100, 4000000]
-  std::uint64_t seed = 1;
-  double overlap = 0.7;     ///< standard deviation along the surface over the least spacing, > 0
-  double thickness = 0.12;  ///< standard deviation across the surface over the spacing, > 0
-  double opacity = 0.99;    ///< (0, 1)
+  std::uint64_t seed = 1;          ///< Seed; equal seeds give equal results.
+  double overlap = 0.7;            ///< standard deviation along the surface over the least spacing, > 0
+  double thickness = 0.12;         ///< standard deviation across the surface over the spacing, > 0
+  double opacity = 0.99;           ///< (0, 1)
   double shade =
       0.0;  ///< share of the light that surfaces lose which look down in the bind pose, [0, 1]
   WeightOptions weights{};  ///< its poses should be those of the motions it will make
 };
 
+/// An avatar made from a rigged mesh.
 struct MeshAvatar {
-  AvatarAsset asset;
+  AvatarAsset asset;     ///< The avatar.
   double area = 0.0;     ///< of the surface in its bind pose, square metres
   double spacing = 0.0;  ///< metres; no two Gaussians of one side are nearer than this
-  WeightReport weights;
+  WeightReport weights;  ///< What happened to the skinning weights.
 };
 
 namespace detail {

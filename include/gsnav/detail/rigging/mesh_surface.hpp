@@ -10,7 +10,7 @@ namespace gsnav {
 
 /// sRGB's transfer function and its inverse, for one channel in [0, 1].
 double srgb_from_linear(double c) noexcept;
-double linear_from_srgb(double c) noexcept;
+double linear_from_srgb(double c) noexcept;  ///< Linear value of an sRGB component, both in [0, 1].
 
 /// Colour and opacity of a surface point.
 struct SurfaceColor {
@@ -21,6 +21,7 @@ struct SurfaceColor {
 /// Answers what colour a mesh has where. Keeps a reference to the mesh.
 class MeshColors {
  public:
+  /// Looks up colours of this mesh, which must outlive it.
   explicit MeshColors(const SkinnedMesh& mesh);
 
   /// At barycentric coordinates `at` of triangle t: texture (bilinear, repeated) times factor times

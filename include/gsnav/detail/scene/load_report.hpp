@@ -22,9 +22,9 @@ struct PackErrors {
   double mean_deviations = 0;  ///< the same in the Gaussian's largest standard deviations
   double scale = 0;            ///< of a standard deviation, in the Gaussian's largest
   double rotation = 0;         ///< radians
-  double opacity = 0;
-  double sh0 = 0;             ///< of a coefficient of degree 0
-  double sh = 0, sh_rms = 0;  ///< of one from band 1 on: largest, root mean square
+  double opacity = 0;          ///< Difference of an opacity.
+  double sh0 = 0;              ///< of a coefficient of degree 0
+  double sh = 0, sh_rms = 0;   ///< of one from band 1 on: largest, root mean square
 };
 
 /// What a loader did to a file: nothing is repaired or dropped without being counted here.
@@ -40,21 +40,21 @@ struct LoadReport {
   std::uint64_t sh_bytes_let_go =
       0;                   ///< what bands of zeros alone would take (LoadSceneOptions::keep_zero_bands)
   int sh_degree_used = 0;  ///< highest band with a coefficient that is not zero
-  Filter filter = Filter::classic;  ///< that the file asks for
-  float eps2d = 0.3f;               ///< its term on the 2D covariance's diagonal, px^2
-  SortOrder sort_order = SortOrder::z_depth;
-  std::uint64_t memory = 0;  ///< bytes of the cloud's arrays
-  Vec3d up{};                ///< guessed, asset frame: one of +-y, +-z; zero of an empty cloud
+  Filter filter = Filter::classic;            ///< that the file asks for
+  float eps2d = 0.3f;                         ///< its term on the 2D covariance's diagonal, px^2
+  SortOrder sort_order = SortOrder::z_depth;  ///< Quantity that Gaussians are sorted by.
+  std::uint64_t memory = 0;                   ///< bytes of the cloud's arrays
+  Vec3d up{};            ///< guessed, asset frame: one of +-y, +-z; zero of an empty cloud
   bool up_seen = false;  ///< by the cloud's ground (guess_up); false: only by what its kind of file does
   double up_confidence = 0;     ///< of a seen one, 0 to 1
   double sh_storage_error = 0;  ///< largest difference of a coefficient by keeping them as binary16
   bool compact = false;         ///< SH is kept as binary16
   bool packed = false;          ///< all is kept in fewer bits (PackedCloud), which changed:
-  PackErrors packing;
+  PackErrors packing;           ///< Errors of packing, where `packed`.
   bool moving = false;  ///< 4D Gaussians; these are the first and the last of their own times, seconds:
-  double first_time = 0, last_time = 0;
-  Aabb<double> bounds{};              ///< of the kept means, asset frame
-  std::vector<std::string> warnings;  ///< everything else a person should know
+  double first_time = 0, last_time = 0;  ///< Range of time of a moving scene, seconds.
+  Aabb<double> bounds{};                 ///< of the kept means, asset frame
+  std::vector<std::string> warnings;     ///< everything else a person should know
 
   /// Counts a row that was read.
   void count(RowFate fate, bool clamped) noexcept {
@@ -88,6 +88,7 @@ struct LoadReport {
     bounds.add(part.bounds);
   }
 
+  /// Rows that were left out.
   std::uint64_t dropped() const noexcept {
     return dropped_non_finite + dropped_zero_quat + dropped_transparent;
   }

@@ -15,9 +15,9 @@ namespace gsnav {
 
 /// A surface ready to be drawn: its meshes, one a part, and where they stand.
 struct PlacedMeshes {
-  MeshScene meshes;
-  std::vector<TexturedScene::Instance> instances;
-  std::vector<std::string> warnings;  ///< what is drawn otherwise than asked for
+  MeshScene meshes;                                ///< One mesh per part.
+  std::vector<TexturedScene::Instance> instances;  ///< Where the meshes stand.
+  std::vector<std::string> warnings;               ///< what is drawn otherwise than asked for
 
   /// All of it in the world, for BasicRenderer::set_meshes on host backends; ids count from `first_id`.
   /// Valid while this lives and no mesh is added.

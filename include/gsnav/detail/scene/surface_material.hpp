@@ -11,8 +11,8 @@ namespace gsnav {
 
 /// A picture that colours a surface. Display-referred (sRGB-encoded), 8 bits.
 struct TextureImage {
-  std::size_t width = 0, height = 0;
-  std::vector<std::uint8_t> rgba;  ///< [height][width][4], row 0 is v = 0
+  std::size_t width = 0, height = 0;  ///< Size in pixels.
+  std::vector<std::uint8_t> rgba;     ///< [height][width][4], row 0 is v = 0
 };
 
 /// How a part of a surface is coloured: its texture, or white, times a factor in linear light.
