@@ -139,12 +139,14 @@ def header_text(path, name, group):
     return document_the_obvious(plain_comments(text))
 
 
+NO_MARKUP = re.compile(r"<(?=/?[A-Za-z])|\\(?=x)|(?<=\w)@(?=\w)|(?<=[\w>])::(?=create\b)")
+
+
 def plain_comments(text):
     """Escapes in comments what Doxygen would take for HTML or a command: Simulator<B>, \\xNN."""
     def escape(m):
         parts = re.split(r"(`[^`]*`)", m.group())
-        return "".join(part if k % 2 else re.sub(r"<(?=/?[A-Za-z])|\\(?=x)|(?<=\w)@(?=\w)|(?<=[\w>])::(?=create\b)", r"\\\g<0>", part)
-                       for k, part in enumerate(parts))
+        return "".join(part if k % 2 else NO_MARKUP.sub(r"\\\g<0>", part) for k, part in enumerate(parts))
 
     return re.sub(r"///<? ?(?! {4}).*", escape, text)
 
@@ -158,8 +160,9 @@ OBVIOUS = ((re.compile(r"^ *(?:explicit )?(\w+)\(\1&&\)"), "Moves from the other
            (re.compile(r"^ *(?:friend )?(?:constexpr )?(?:bool|auto) operator(?:==|<=>)\(.*\).* = default;"),
             "Compares all members."),
            (re.compile(r"^ *explicit operator bool\(\) const"), "Same as ok()."))
+FIELD = r"[A-Za-z_]\w*(?:\[\w+\])?(?: = [^,;]+|\{[^{}]*\})?"
 FIELDS = re.compile(r"^( *)((?:static |inline |constexpr |mutable )*(?:[\w:]+(?:<[^;={}]*>)?)[*&]? )"
-                    r"(\w+(?:\[\w+\])?(?: = [^,;]+|\{[^{}]*\})?(?:, \w+(?:\[\w+\])?(?: = [^,;]+|\{[^{}]*\})?)+);(?:\s*///< (.*))?$")
+                    rf"({FIELD}(?:, {FIELD})+);(?:\s*///< (.*))?$")
 FUNCTION = re.compile(r"^ *(?:template .*> )?(?:GSNAV_HD |static |constexpr |virtual |inline |friend )*"
                       r"[\w:<>,*& ]*?[ *&](\w+|operator *[^\s(]+)\(")
 

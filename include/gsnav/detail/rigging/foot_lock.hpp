@@ -13,9 +13,9 @@ namespace gsnav {
 /// them into.
 struct Leg {
   std::size_t hip = 0, knee = 0, ankle = 0;  ///< Indices of the joints.
-  std::vector<std::size_t> thigh;  ///< joints that move with the hip, itself included
-  std::vector<std::size_t> shin;   ///< joints that move with the knee, itself included
-  std::vector<std::size_t> foot;   ///< joints that move with the ankle, itself included
+  std::vector<std::size_t> thigh;            ///< joints that move with the hip, itself included
+  std::vector<std::size_t> shin;             ///< joints that move with the knee, itself included
+  std::vector<std::size_t> foot;             ///< joints that move with the ankle, itself included
 };
 
 /// How feet are held.
