@@ -4,7 +4,7 @@
 # Checks the layout of text: C++ and CUDA sources are as clang-format 14 writes them (105 columns, literals may be
 # longer), no line of prose in Markdown is longer than 105 columns (tables, code and links may be;
 # docs/notes/approximations.md is generated), and no line of Python, shell or CMake, nor any of C++ with its literals, is
-# longer than 120.
+# longer than 120. The wording of folders that tools/check_words.py names follows the rules in CONTRIBUTING.md.
 #
 #   tools/check_format.sh          names what is wrong; exit status 1 where anything is
 #   tools/check_format.sh --fix    formats the sources in place
@@ -15,7 +15,7 @@ case ${1:-} in
   "") options=(--dry-run -Werror) ;;
   --fix) options=(-i) ;;
   *)
-    sed -n '4,10s/^# \{0,1\}//p' tools/check_format.sh
+    sed -n '4,11s/^# \{0,1\}//p' tools/check_format.sh
     exit $([[ $1 == --help || $1 == -h ]] && echo 0 || echo 2)
     ;;
 esac
@@ -35,6 +35,9 @@ git ls-files -z '*.md' | { grep -zvx docs/notes/approximations.md || true; } | x
 git ls-files -z '*.hpp' '*.cpp' '*.cu' '*.cuh' '*.py' '*.sh' '*.cmake' '*.cmake.in' '*CMakeLists.txt' | xargs -0 awk '
   length($0) > 120 { printf "%s:%d: %d columns\n", FILENAME, FNR, length($0); wrong = 1 }
   END { exit wrong }' || failed=1
+if command -v python3 > /dev/null; then
+  python3 tools/check_words.py || failed=1
+fi
 if [[ $failed -ne 0 ]]; then
   echo "Lines above: run tools/check_format.sh --fix for sources; wrap prose at 105 columns, the rest at 120" >&2
 fi

@@ -1,17 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // gsnav-replay: an episode of an evaluation once more, from any camera.
-#include <unistd.h>
-
 #include <array>
-#include <csignal>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
-#include <fstream>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <string>
-#include <system_error>
+#include <utility>
 #include <vector>
 
 #include "../common/overlay.hpp"
@@ -21,6 +19,7 @@
 #include "gsnav/io.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "pictures.hpp"
+#include "video.hpp"
 
 namespace gsnav_eval {
 namespace {
@@ -36,63 +35,8 @@ struct ReplayOptions {
   std::string frames = "replay";
   std::string video;
   int every = 1;
-};
-
-/// Frames into ffmpeg's standard input. ffmpeg writes to a file aside, which takes the video's name once
-/// it is whole.
-class Video {
- public:
-  Video() = default;
-  Video(const Video&) = delete;
-  Video& operator=(const Video&) = delete;
-  ~Video() {
-    pipe_.reset();
-    std::error_code none;
-    if (!aside_.empty()) fs::remove(aside_, none);
-  }
-
-  Status open(const std::string& path, int width, int height, double rate) {
-    if (path.find_first_of("'\\\n") != std::string::npos)
-      return {Errc::invalid_argument, "--video: quotes in the path"};
-    path_ = path;
-    aside_ = fs::path(path).replace_extension(std::to_string(::getpid()) + ".part" +
-                                              fs::path(path).extension().string());
-    char command[512];
-    const int n = std::snprintf(
-        command, sizeof command,
-        "ffmpeg -y -loglevel error -f rawvideo -pix_fmt rgb24 -s %dx%d -r %g -i - "
-        "-vf 'pad=ceil(iw/2)*2:ceil(ih/2)*2' -pix_fmt yuv420p '%s'",  // its colour is at half the size
-        width, height, rate, aside_.c_str());
-    if (n < 0 || n >= static_cast<int>(sizeof command))
-      return {Errc::invalid_argument, "--video: the path is too long"};
-    std::signal(SIGPIPE, SIG_IGN);  // an ffmpeg that ends early is reported, not died of
-    pipe_.reset(popen(command, "w"));
-    if (pipe_ == nullptr) return {Errc::unsupported, "--video: ffmpeg cannot be run"};
-    return {};
-  }
-  Status add(const std::vector<std::uint8_t>& rgb) {
-    if (std::fwrite(rgb.data(), 1, rgb.size(), pipe_.get()) == rgb.size()) return {};
-    return {Errc::unsupported, "--video: ffmpeg takes no frames; is it installed?"};
-  }
-  Status close() {
-    if (pclose(pipe_.release()) != 0)
-      return {Errc::unsupported, "--video: ffmpeg failed; is it installed?"};
-    return gsnav::replace_file(path_, [this](gsnav::OutputFile& out) -> Status {
-      std::ifstream in(aside_, std::ios::binary);
-      for (std::vector<char> part(1 << 16); in;) {
-        in.read(part.data(), static_cast<std::streamsize>(part.size()));
-        out.write(part.data(), static_cast<std::size_t>(in.gcount()));
-      }
-      return in.eof() ? Status() : Status(Errc::invalid_file, aside_.string() + ": cannot be read");
-    });
-  }
-
- private:
-  struct Close {
-    void operator()(std::FILE* f) const noexcept { pclose(f); }
-  };
-  std::unique_ptr<std::FILE, Close> pipe_;
-  fs::path path_, aside_;
+  int per_action = 1;
+  bool inset = false;
 };
 
 /// Where everything was at each step, [T]...
@@ -108,17 +52,153 @@ struct Track {
   }
 };
 
-/// A picture with the agent's body drawn into it.
-std::vector<std::uint8_t> with_agent(const std::vector<std::uint8_t>& rgb, const gsnav::Camera& camera,
-                                     const std::vector<float>& depth, const gsnav::World& world) {
-  gsnav_tools::Canvas canvas(camera.width, camera.height, {0, 0, 0});
-  canvas.paste(rgb.data(), camera.width, camera.height, 0, 0);
-  const double radius = world.config().agent_radius, height = world.config().agent_height;
-  const Vec3d at = world.agent().position;
-  const gsnav::Capsule<double> body{at + Vec3d{0, radius, 0}, at + Vec3d{0, height - radius, 0}, radius};
-  gsnav_tools::draw_capsule({canvas, camera, depth}, body, {0.05f, 0.30f, 0.85f}, 0.85f);
-  return canvas.bytes();
+/// Where the agent is at one moment.
+struct Moment {
+  double time = 0;  ///< seconds on the scene's clock
+  gsnav::AgentPose agent;
+};
+
+/// The moment between two, at `t` in [0, 1]. The agent moves in a straight line and turns the short way.
+Moment between(const Moment& a, const Moment& b, double t) {
+  Moment m = b;
+  if (t == 1) return m;
+  m.time = a.time + t * (b.time - a.time);
+  m.agent.position = a.agent.position + (b.agent.position - a.agent.position) * t;
+  m.agent.yaw = a.agent.yaw + t * std::remainder(b.agent.yaw - a.agent.yaw, 2 * std::numbers::pi);
+  m.agent.pitch = a.agent.pitch + t * (b.agent.pitch - a.agent.pitch);
+  return m;
 }
+
+/// Draws pictures of moments of an episode.
+class Painter {
+ public:
+  static gsnav::Result<Painter> create(const Options& o, const ReplayOptions& r, const Stage& stage) {
+    gsnav::RenderOptions options;
+    options.render = stage.config.render;
+    options.detail = gsnav::detail_choice(stage.config);
+    options.render.outputs = gsnav::kRgb | gsnav::kMedianDepth;
+    auto renderer = gsnav::Renderer::create(o.device, stage.scene, options);
+    if (!renderer) return renderer.status();
+    Painter p(std::move(*renderer));
+    p.own_ = stage.config.sensors.front();
+    p.radius_ = stage.config.task.agent_radius;
+    p.height_ = stage.config.task.agent_height;
+    if (!r.eye.empty()) {
+      const Vec3d eye{r.eye[0], r.eye[1], r.eye[2]}, target{r.target[0], r.target[1], r.target[2]};
+      const Vec3d down = target - eye;
+      const bool steep = std::hypot(down.x, down.z) < 1e-6 * gsnav::norm(down);
+      p.fixed_ = gsnav::Camera::look_at(eye, target, steep ? Vec3d{0, 0, -1} : Vec3d{0, 1, 0}, o.width,
+                                        o.height, o.hfov);
+    }
+    p.inset_ = r.inset;
+    return p;
+  }
+
+  /// [height][width][3] bytes: what the chosen camera sees.
+  gsnav::Result<std::vector<std::uint8_t>> paint(const Moment& m) {
+    if (!fixed_) return view(own_camera(m, 1), m.time);
+    auto rgb = view(*fixed_, m.time);
+    if (!rgb) return rgb;
+    gsnav_tools::Canvas canvas(fixed_->width, fixed_->height, {0, 0, 0});
+    canvas.paste(rgb->data(), fixed_->width, fixed_->height, 0, 0);
+    const Vec3d at = m.agent.position;
+    const gsnav::Capsule<double> body{at + Vec3d{0, radius_, 0}, at + Vec3d{0, height_ - radius_, 0},
+                                      radius_};
+    gsnav_tools::draw_capsule({canvas, *fixed_, frames_.median_depth}, body, {0.05f, 0.30f, 0.85f},
+                              0.85f);
+    if (inset_) {
+      constexpr int kShare = 4, kFrame = 2;  // a quarter of the picture's width, in a white frame
+      const gsnav::Camera camera = own_camera(m, kShare);
+      rgb = view(camera, m.time);
+      if (!rgb) return rgb;
+      const int x = fixed_->width - camera.width - 4 * kFrame,
+                y = fixed_->height - camera.height - 4 * kFrame;
+      canvas.rect(x - kFrame, y - kFrame, camera.width + 2 * kFrame, camera.height + 2 * kFrame,
+                  {1, 1, 1}, 1);
+      canvas.paste(rgb->data(), camera.width, camera.height, x, y);
+    }
+    return canvas.bytes();
+  }
+
+ private:
+  explicit Painter(gsnav::Renderer renderer) : renderer_(std::move(renderer)) {}
+
+  /// The agent's own camera, its image `share` times smaller.
+  gsnav::Camera own_camera(const Moment& m, int share) const {
+    gsnav::SensorSpec spec = own_;
+    for (int& side : spec.resolution) side /= share;
+    return gsnav::sensor_camera(spec, m.agent.position, m.agent.rotation(), m.agent.pitch);
+  }
+  gsnav::Result<std::vector<std::uint8_t>> view(const gsnav::Camera& camera, double time) {
+    if (Status s = renderer_.render({&camera, 1}, frames_, time); !s) return s;
+    std::vector<std::uint8_t> rgb(frames_.rgb.size());
+    gsnav::to_bytes(frames_.rgb, rgb);
+    return rgb;
+  }
+
+  gsnav::Renderer renderer_;
+  gsnav::Frames<float> frames_;  // its memory is used again
+  gsnav::SensorSpec own_;
+  std::optional<gsnav::Camera> fixed_;
+  double radius_ = 0, height_ = 0;
+  bool inset_ = false;
+};
+
+/// Follows a replay: keeps its track, and hands pictures to a folder or a video.
+class Recorder {
+ public:
+  Recorder(const Options& o, const ReplayOptions& r, Painter painter)
+      : options_(o), replay_(r), painter_(std::move(painter)) {}
+
+  Status open(double control_period) {
+    if (replay_.video.empty()) return {};
+    const double rate = replay_.per_action / (control_period * replay_.every);
+    auto video = open_video(replay_.video, options_.width, options_.height, rate);
+    if (video) video_ = std::move(*video);
+    return video.status();
+  }
+  Status look(Simulator& s, std::size_t step) {
+    const Moment now{s.clock(), s.agent()};
+    const Vec3d& at = now.agent.position;
+    track_.positions.insert(track_.positions.end(), {at.x, at.y, at.z});
+    track_.yaws.push_back(now.agent.yaw);
+    track_.times.push_back(now.time);
+    track_.clearances.push_back(s.world().last_step().avatar_clearance);
+    if (step % static_cast<std::size_t>(replay_.every) != 0) return {};
+    for (int k = step == 0 ? replay_.per_action : 1; k <= replay_.per_action; ++k) {
+      const auto rgb = painter_.paint(between(last_, now, static_cast<double>(k) / replay_.per_action));
+      if (!rgb) return rgb.status();
+      if (Status added = add(*rgb); !added) return added;
+    }
+    last_ = now;
+    return {};
+  }
+  Status close() {
+    if (video_ != nullptr) {
+      if (Status s = video_->close(); !s) return s;
+    }
+    return track_.save(fs::path(replay_.frames) / "track.npz");
+  }
+
+ private:
+  Status add(const std::vector<std::uint8_t>& rgb) {
+    if (video_ != nullptr) return video_->add(rgb);
+    char name[32];
+    const std::size_t number =
+        pictures_++ * static_cast<std::size_t>(replay_.per_action > 1 ? 1 : replay_.every);
+    std::snprintf(name, sizeof name, "%05zu.png", number);
+    return gsnav::io::save_png_rgb8(fs::path(replay_.frames) / name, rgb, options_.width,
+                                    options_.height);
+  }
+
+  const Options& options_;
+  const ReplayOptions& replay_;
+  Painter painter_;
+  std::unique_ptr<Video> video_;
+  Track track_;
+  Moment last_;
+  std::size_t pictures_ = 0;
+};
 
 Status run(const Options& o, const ReplayOptions& r) {
   if (Status s = r.video.empty() ? Status() : gsnav::check_output_path(r.video); !s) return s;
@@ -138,45 +218,13 @@ Status run(const Options& o, const ReplayOptions& r) {
   }
   auto sim = make_simulator(o, *stage);
   if (!sim) return sim.status();
-  std::optional<Video> video;
-  if (!r.video.empty()) {
-    video.emplace();
-    const double rate = 1.0 / (stage->config.task.control_period * r.every);
-    if (Status s = video->open(r.video, o.width, o.height, rate); !s) return s;
-  }
-  Track track;
-  const auto look = [&](Simulator& s, std::size_t step) -> Status {
-    const gsnav::AgentPose& agent = s.agent();
-    track.positions.insert(track.positions.end(),
-                           {agent.position.x, agent.position.y, agent.position.z});
-    track.yaws.push_back(agent.yaw);
-    track.times.push_back(s.clock());
-    track.clearances.push_back(s.world().last_step().avatar_clearance);
-    if (step % static_cast<std::size_t>(r.every) != 0) return {};
-    gsnav::Camera camera = gsnav::sensor_camera(stage->config.sensors.front(), agent.position,
-                                                agent.rotation(), agent.pitch);
-    if (!r.eye.empty()) {
-      const Vec3d eye{r.eye[0], r.eye[1], r.eye[2]}, target{r.target[0], r.target[1], r.target[2]};
-      const Vec3d down = target - eye;
-      const bool steep = std::hypot(down.x, down.z) < 1e-6 * gsnav::norm(down);
-      camera = gsnav::Camera::look_at(eye, target, steep ? Vec3d{0, 0, -1} : Vec3d{0, 1, 0}, o.width,
-                                      o.height, o.hfov);
-    }
-    const auto frame = s.render(camera, gsnav::kRgb | gsnav::kMedianDepth);
-    if (!frame) return frame.status();
-    std::vector<std::uint8_t> rgb((*frame)->rgb.size());
-    gsnav::to_bytes((*frame)->rgb, rgb);
-    if (!r.eye.empty()) rgb = with_agent(rgb, camera, (*frame)->median_depth, s.world());
-    if (video) return video->add(rgb);
-    char name[32];
-    std::snprintf(name, sizeof name, "%05zu.png", step);
-    return gsnav::io::save_png_rgb8(fs::path(r.frames) / name, rgb, o.width, o.height);
-  };
+  auto painter = Painter::create(o, r, *stage);
+  if (!painter) return painter.status();
+  Recorder recorder(o, r, std::move(*painter));
+  if (Status s = recorder.open(stage->config.task.control_period); !s) return s;
+  const auto look = [&](Simulator& s, std::size_t step) { return recorder.look(s, step); };
   if (Status s = replay(*sim, stage->episodes[r.episode], found->second, look); !s) return s;
-  if (video) {
-    if (Status s = video->close(); !s) return s;
-  }
-  return track.save(fs::path(r.frames) / "track.npz");
+  return recorder.close();
 }
 
 }  // namespace
@@ -201,10 +249,16 @@ int main(int argc, char** argv) try {
       ->needs("--eye");
   app.get_option("--eye")->needs("--target");
   app.add_option("--frames", r.frames, "folder for images and track.npz")->capture_default_str();
-  app.add_option("--video", r.video, "video file to write instead of PNG files (.mp4, needs ffmpeg)");
+  app.add_option("--video", r.video,
+                 "video file to write instead of PNG files: .webp (animated), or .mp4 (needs ffmpeg)");
   app.add_option("--every", r.every, "draw one frame per this number of actions")
       ->capture_default_str()
       ->check(CLI::Range(1, 100000));
+  app.add_option("--per-action", r.per_action,
+                 "images per action; the agent moves in a straight line between two steps")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100));
+  app.add_flag("--inset", r.inset, "draw the agent's own view in the corner")->needs("--eye");
   if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
   gsnav::Status s;
   if (const auto recorded = gsnav_eval::Journal::recorded_options(o.out); !recorded) {

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "gsnav/core/status.hpp"
+
+namespace gsnav_eval {
+
+/// A video file that is written picture by picture. It takes its name once it is whole.
+class Video {
+ public:
+  virtual ~Video() = default;
+  /// Adds a picture, [height][width][3] bytes.
+  virtual gsnav::Status add(const std::vector<std::uint8_t>& rgb) = 0;
+  /// Finishes the file. Without this call the file of before stays.
+  virtual gsnav::Status close() = 0;
+};
+
+/// Opens a video of `rate` pictures per second. A path that ends in .webp gives an animated WebP by
+/// libwebpmux, every other path a video by ffmpeg. Errors: invalid_argument (the path, sizes),
+/// unsupported (ffmpeg cannot be run; a build without libwebpmux).
+gsnav::Result<std::unique_ptr<Video>> open_video(const std::string& path, int width, int height,
+                                                 double rate);
+
+}  // namespace gsnav_eval

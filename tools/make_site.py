@@ -1,0 +1,287 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Makes the API site by Doxygen: README, the pages of docs/ and every type and function for users.
+
+usage: make_site.py [--out FOLDER] [--doxygen PROGRAM]
+
+Writes FOLDER/html/index.html (default: build/site). Fails where a public entity has no documentation or a
+page has a broken reference. Headers for users are those of include/gsnav outside detail/, those that a
+module header includes, and those of the backends.
+"""
+import argparse
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+from xml.sax.saxutils import quoteattr
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+SITE = ROOT / "docs/site"
+# Group, its title, the module header that has it (or none) and the folders whose other headers belong to it.
+GROUPS = (("render", "Scenes and rendering", "render", ("render", "image", "frame", "scene", "device")),
+          ("avatar", "Avatars", "avatar", ("avatar", "skin")),
+          ("rigging", "Making avatars", "rigging", ("rigging",)),
+          ("nav", "Navigation", "nav", ("nav", "sweep")),
+          ("sim", "Simulator", "sim", ("sim",)),
+          ("io", "Files", "io", ("io",)),
+          ("eval", "Errors and oracles", "eval", ("eval",)),
+          ("demo", "Scenes and people made by code", "demo", ("demo",)),
+          ("open", "Opening a scene", "open", ("open",)),
+          ("core", "Status, buffers and backends", None, ("core", "config.hpp", "version.hpp")),
+          ("math", "Mathematics", None, ("math",)),
+          ("backends", "Serial, OpenMP and CUDA", None, ("backends",)),
+          ("interop", "Eigen, GLM and DLPack", None, ("interop",)))
+# Launch sizes of the CUDA kernels. Only changes of the backend read them.
+NOT_FOR_USERS = {"policy.hpp"}
+# Folders of pages, in the order of the menu.
+SECTIONS = (("Guide", "docs/guide"), ("Concepts", "docs/concepts"), ("Reference", "docs/reference"),
+            ("Topics", "docs"), ("Notes", "docs/notes"))
+ABOUT = ("CONTRIBUTING.md", "CHANGELOG.md")
+FENCE = re.compile(r"\s*(```|~~~)")
+REFERENCE = re.compile(r"\[([^\]]*)\]\(@ref [^)]*\)")
+SPAN = re.compile(r"`[^`\n]+\n[^`\n]+`")  # Doxygen takes the second line for a list where it begins with + or -
+LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s]+)\)")
+
+
+def headers():
+    """{header: group} of all headers for users."""
+    found = {}
+    for group, _, module, _ in GROUPS:
+        if module:
+            text = (ROOT / f"include/gsnav/{module}.hpp").read_text(encoding="utf-8")
+            for name in re.findall(r'#include "(gsnav/[^"]+)"', text):
+                found.setdefault(ROOT / "include" / name, group)
+    public = [p for p in (ROOT / "include/gsnav").rglob("*.hpp") if "detail" not in p.parts]
+    for path in public + [
+            p for p in ROOT.glob("backends/*/gsnav/**/*.hpp") if p.name not in NOT_FOR_USERS]:
+        own = path.is_relative_to(ROOT / "include")
+        part = path.relative_to(ROOT / "include/gsnav").parts[0] if own else "backends"
+        for group, _, _, folders in GROUPS:
+            if part in folders:
+                found.setdefault(path, group)
+    return found
+
+
+def pages():
+    """Pages of the site, named from the root."""
+    found = ["README.md", *ABOUT] + [p.relative_to(ROOT).as_posix() for p in sorted((ROOT / "docs").rglob("*.md"))]
+    return [p for p in found if (ROOT / p).is_file() and not p.startswith("docs/site/")]
+
+
+def label(page, heading=""):
+    """Label of a page or of one of its headings."""
+    text = re.sub(r"[^\w]+", "_", page.removesuffix(".md")) + ("__" + slug(heading) if heading else "")
+    return "page_" + text
+
+
+def slug(heading):
+    """The anchor that GitHub gives a heading."""
+    heading = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading)
+    return re.sub(r"[^\w-]", "", heading.strip().lower().replace(" ", "-"))
+
+
+def title_of(page):
+    for line in (ROOT / page).read_text(encoding="utf-8").splitlines():
+        if line.startswith("# "):
+            return line[2:].strip().replace("`", "")
+    return page
+
+
+def page_text(name, known):
+    """A page with labels on its headings and links that Doxygen resolves."""
+    folder, code, seen, out = (ROOT / name).parent, False, set(), []
+
+    def link(m):
+        text, target = m.group(1), m.group(2)
+        if re.match(r"\w+:", target):
+            return m.group()
+        file, _, anchor = target.partition("#")
+        path = pathlib.Path(os.path.normpath(folder / file)) if file else ROOT / name
+        linked = path.relative_to(ROOT).as_posix() if path.is_relative_to(ROOT) else ""
+        if linked not in known:  # not on the site: a folder, a source
+            return text if "`" in text else f"`{linked}`" if text == linked else text
+        return f"[{text}](@ref {label(linked, anchor)})"
+
+    source = (ROOT / name).read_text(encoding="utf-8")
+    parts = re.split(r"(^ *```.*?^ *```|^    [^\n]*)", source, flags=re.DOTALL | re.MULTILINE)
+    parts[::2] = (SPAN.sub(lambda m: m.group().replace("\n", " "), LINK.sub(link, part)) for part in parts[::2])
+    source = "".join(parts)
+    for line in source.splitlines():
+        code ^= bool(FENCE.match(line))
+        heading = re.match(r"(#{1,6}) (.*?)#*$", line)
+        if code or line.startswith("    "):
+            out.append(line)
+        elif heading:
+            mark, text = heading.group(1), REFERENCE.sub(r"\1", heading.group(2).strip())
+            own = label(name) if mark == "#" and not seen else label(name, text)
+            out.append(f"{mark} {text}" + (f" {{#{own}}}" if own not in seen else ""))
+            seen.add(own)
+        else:
+            parts = re.split(r"(`[^`]*`|\]\(@ref [^)]*\))", line)
+            out.append("".join(part if k % 2 else re.sub(r"@|<(?=[\d\s=])", r"\\\g<0>", part)
+                               for k, part in enumerate(parts)))
+    return "\n".join(out) + "\n"
+
+
+def header_text(path, name, group):
+    """A header whose namespaces are members of its group. Lines behind the first namespace keep their numbers."""
+    text = path.read_text(encoding="utf-8")
+    opens = re.compile(r"^(?:inline )?namespace gsnav(?:::(?!detail)\w+)* \{", re.MULTILINE)
+    for _ in opens.findall(text):  # each takes one line more
+        text = re.sub(r"\A(.*?)\n\n", r"\1\n", text, count=1, flags=re.DOTALL)
+    text = opens.sub(rf"\g<0> /** @addtogroup {group}\n@{{ */", text)
+    text = re.sub(r"^\}  // namespace gsnav(?:::(?!detail)\w+)*$", r"/** @} */ \g<0>", text, flags=re.MULTILINE)
+    text = text.replace("#pragma once", f"/** @file {name} */", 1)
+    # Explicit instantiations repeat a template that is documented elsewhere.
+    text = re.sub(r"^extern template [^;]*;", lambda m: "\n" * m.group().count("\n"), text, flags=re.MULTILINE)
+    return document_the_obvious(plain_comments(text))
+
+
+NO_MARKUP = re.compile(r"<(?=/?[A-Za-z])|\\(?=x)|(?<=\w)@(?=\w)|(?<=[\w>])::(?=create\b)")
+
+
+def plain_comments(text):
+    """Escapes in comments what Doxygen would take for HTML or a command: Simulator<B>, \\xNN."""
+    def escape(m):
+        parts = re.split(r"(`[^`]*`)", m.group())
+        return "".join(part if k % 2 else NO_MARKUP.sub(r"\\\g<0>", part) for k, part in enumerate(parts))
+
+    return re.sub(r"///<? ?(?! {4}).*", escape, text)
+
+
+# Functions whose meaning the language fixes.
+OBVIOUS = ((re.compile(r"^ *(?:explicit )?(\w+)\(\1&&\)"), "Moves from the other, which is empty afterwards."),
+           (re.compile(r"^ *(?:explicit )?(\w+)\(const \1&\)"), "Copies the other."),
+           (re.compile(r"^ *\w+& operator=\(\w+&&\)"), "Moves from the other, which is empty afterwards."),
+           (re.compile(r"^ *\w+& operator=\(const \w+&\)"), "Copies the other."),
+           (re.compile(r"^ *(?:virtual )?~\w+\("), "Releases all that it holds."),
+           (re.compile(r"^ *(?:friend )?(?:constexpr )?(?:bool|auto) operator(?:==|<=>)\(.*\).* = default;"),
+            "Compares all members."),
+           (re.compile(r"^ *explicit operator bool\(\) const"), "Same as ok()."))
+FIELD = r"[A-Za-z_]\w*(?:\[\w+\])?(?: = [^,;]+|\{[^{}]*\})?"
+FIELDS = re.compile(r"^( *)((?:static |inline |constexpr |mutable )*(?:[\w:]+(?:<[^;={}]*>)?)[*&]? )"
+                    rf"({FIELD}(?:, {FIELD})+);(?:\s*///< (.*))?$")
+FUNCTION = re.compile(r"^ *(?:template .*> )?(?:GSNAV_HD |static |constexpr |virtual |inline |friend )*"
+                      r"[\w:<>,*& ]*?[ *&](\w+|operator *[^\s(]+)\(")
+
+
+def document_the_obvious(text):
+    """Gives functions that the language defines their meaning, several fields of one line its comment each, and
+    overloads directly behind a documented one a reference to it. Lines keep their numbers."""
+    lines, out, documented, above = text.split("\n"), [], "", ""
+    for line in lines:
+        bare = line.strip()
+        commented = above.startswith("///") and not above.startswith("///<")
+        several = FIELDS.match(line)
+        if several and (several.group(4) or commented) and "(" not in several.group(3).split("=")[0]:
+            said = several.group(4) or above.lstrip("/ ")
+            names = re.split(r", (?=[A-Za-z_]\w*(?: =|\{|\[|,|$))", several.group(3))
+            first = several.group(1) + several.group(2) + names[0] + ";" + (f" ///< {said}" if not commented else "")
+            rest = " ".join(f"/** {said} */ {several.group(2)}{name};" for name in names[1:])
+            line = f"{several.group(1)}{rest} {first.strip()}" if not commented else f"{first} {rest}"
+        elif not commented:
+            for pattern, said in OBVIOUS:
+                if pattern.match(line):
+                    line = f"/** {said} */ {line}"
+                    break
+            else:
+                function = FUNCTION.match(line)
+                if function and function.group(1) == documented and "///" not in line:
+                    line = f"/** @overload */ {line}"
+        function = FUNCTION.match(line.split("*/ ", 1)[-1])
+        if function and (commented or "/**" in line or "///<" in line):
+            documented = function.group(1)
+        elif not bare or bare.endswith(("}", "{")) and not function:
+            documented = "" if not bare else documented
+        out.append(line)
+        above = bare if not bare.startswith("template") else above
+    return "\n".join(out)
+
+
+def write_inputs(out):
+    """Copies of the pages and headers for Doxygen, in folders as in the tree; their paths."""
+    known, copies = set(pages()), {}
+    for name in sorted(known):
+        copies[name] = page_text(name, known)
+    for path, group in headers().items():
+        name = path.relative_to(ROOT).as_posix()
+        copies[name] = header_text(path, re.sub(r"^include/|^backends/\w+/", "", name), group)
+    for name, text in copies.items():
+        (out / "input" / name).parent.mkdir(parents=True, exist_ok=True)
+        (out / "input" / name).write_text(text, encoding="utf-8")
+    return [out / "input" / name for name in sorted(copies)]
+
+
+def module_comment(module):
+    """The comment of a module header."""
+    text = (ROOT / f"include/gsnav/{module}.hpp").read_text(encoding="utf-8")
+    block = re.search(r"#pragma once\n\n((?://.*\n)+)", text)
+    return " ".join(re.sub(r"^///? ?", "", line) for line in block.group(1).splitlines()) if block else ""
+
+
+def write_groups(out):
+    lines = []
+    for group, title, module, _ in GROUPS:
+        text = f"`#include \"gsnav/{module}.hpp\"`\n\n{module_comment(module)}" if module else ""
+        lines.append(f"/** @defgroup {group} {title}\n{text}\n*/")
+    for name, text in (("gsnav", "All names of the library."), ("gsnav::io", "Files: readers and writers."),
+                       ("gsnav::interop", "Types of other libraries.")):
+        lines.append(f"/** @namespace {name}\n{text} */")
+    (out / "groups.dox").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def write_layout(out):
+    """The menu: sections of pages, modules, an index of names."""
+    tabs = ['<tab type="mainpage" visible="yes" title="Overview"/>']
+    known = [p for p in pages() if p != "README.md"]
+    sections = [(title, [p for p in known if pathlib.PurePath(p).parent.as_posix() == folder])
+                for title, folder in SECTIONS] + [("Project", [p for p in ABOUT if p in known])]
+    for title, listed in sections:
+        if listed:
+            entries = "".join(f'<tab type="user" url="@ref {label(p)}" title={quoteattr(title_of(p))}/>'
+                              for p in listed)
+            tabs.append(f'<tab type="usergroup" visible="yes" title="{title}">{entries}</tab>')
+    tabs.append('<tab type="modules" visible="yes" title="API"/>')
+    tabs.append('<tab type="usergroup" visible="yes" title="Index"><tab type="classlist" visible="yes" title="Types"/>'
+                '<tab type="namespacemembers" visible="yes" title="Functions and names"/>'
+                '<tab type="filelist" visible="yes" title="Headers"/></tab>')
+    text = (SITE / "layout.xml").read_text(encoding="utf-8")
+    (out / "layout.xml").write_text(text.replace("@TABS@", "\n".join(tabs)), encoding="utf-8")
+
+
+def version():
+    text = (ROOT / "include/gsnav/version.hpp").read_text(encoding="utf-8")
+    return ".".join(re.findall(r"#define GSNAV_VERSION_(?:MAJOR|MINOR|PATCH) (\d+)", text))
+
+
+def make(out, doxygen):
+    shutil.rmtree(out, ignore_errors=True)
+    out.mkdir(parents=True)
+    write_groups(out)
+    write_layout(out)
+    inputs = [*write_inputs(out), out / "groups.dox"]
+    values = {"OUT": out, "ROOT": ROOT, "SITE": SITE, "VERSION": version(),
+              "INPUT": " \\\n  ".join(f'"{p}"' for p in inputs)}
+    text = (SITE / "Doxyfile.in").read_text(encoding="utf-8")
+    (out / "Doxyfile").write_text(re.sub(r"@([A-Z]+)@", lambda m: str(values[m.group(1)]), text), encoding="utf-8")
+    done = subprocess.run([doxygen, str(out / "Doxyfile")], cwd=ROOT, capture_output=True, text=True, check=False)
+    said = (done.stdout + done.stderr).replace(f"{out}/input/", "")
+    print(said, end="")
+    if done.returncode != 0 or "warning:" in said or "error:" in said:
+        return 1
+    print(f"{out}/html/index.html")
+    return 0
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Makes the API site by Doxygen.")
+    parser.add_argument("--out", type=pathlib.Path, default=ROOT / "build/site", help="folder to write (build/site)")
+    parser.add_argument("--doxygen", default="doxygen", help="the program")
+    o = parser.parse_args()
+    return make(o.out.resolve(), o.doxygen)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
