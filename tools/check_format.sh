@@ -3,8 +3,8 @@
 #
 # Checks the layout of text: C++ and CUDA sources are as clang-format 14 writes them (105 columns, literals may be
 # longer), no line of prose in Markdown is longer than 105 columns (tables, code and links may be;
-# docs/notes/approximations.md is generated), and no line of Python, shell or CMake, nor any of C++ with its literals, is
-# longer than 120. The wording of folders that tools/check_words.py names follows the rules in CONTRIBUTING.md.
+# docs/notes/approximations.md is generated), and no line of Python, shell or CMake, nor any of C++ with its literals,
+# is longer than 120. The wording of folders that tools/check_words.py names follows the rules in CONTRIBUTING.md.
 #
 #   tools/check_format.sh          names what is wrong; exit status 1 where anything is
 #   tools/check_format.sh --fix    formats the sources in place
