@@ -24,9 +24,10 @@ struct SkinnedMesh {
   std::vector<std::uint16_t> joint_indices;  ///< [V][k].
   std::vector<float> weights;                ///< [V][k]; each row sums to 1.
   std::vector<std::array<double, 2>> uvs;    ///< [V], or empty.
-  std::vector<Vec3d> colors;                 ///< [V] linear light. Empty: white.
+  std::vector<Vec3d> colors;                 ///< [V] linear light. Materials of the triangles. Empty:
+                                             ///< white.
   std::vector<std::uint32_t> materials_of;   ///< [T] index into `materials`. Empty: the first.
-  std::vector<SurfaceMaterial> materials;    ///< Empty: white.
+  std::vector<SurfaceMaterial> materials;    ///< Materials of the triangles. Empty: white.
   std::vector<TextureImage> textures;        ///< Textures of the materials.
 
   /// Checks the arrays. Error: invalid_argument naming the array and the problem.
@@ -40,7 +41,7 @@ struct SkinnedMeshReport {
                                              ///< (glTF).
   std::size_t unequal_weights =
       0;  ///< Vertices whose weights did not sum to 1 (within 1e-3); they were divided by the sum.
-  /// Range of the sums of weights in the file.
+  /// Least and greatest sum of a vertex's weights in the file.
   double least_weight_sum = 1.0, greatest_weight_sum = 1.0;
   std::size_t without_weights =
       0;  ///< Vertices without weights; the joints of the nearest weighted vertex move them.
