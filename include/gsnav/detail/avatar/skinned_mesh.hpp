@@ -24,8 +24,7 @@ struct SkinnedMesh {
   std::vector<std::uint16_t> joint_indices;  ///< [V][k].
   std::vector<float> weights;                ///< [V][k]; each row sums to 1.
   std::vector<std::array<double, 2>> uvs;    ///< [V], or empty.
-  std::vector<Vec3d> colors;                 ///< [V] linear light. Materials of the triangles. Empty:
-                                             ///< white.
+  std::vector<Vec3d> colors;                 ///< [V] linear light. Empty: white.
   std::vector<std::uint32_t> materials_of;   ///< [T] index into `materials`. Empty: the first.
   std::vector<SurfaceMaterial> materials;    ///< Materials of the triangles. Empty: white.
   std::vector<TextureImage> textures;        ///< Textures of the materials.
