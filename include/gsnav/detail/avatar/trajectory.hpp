@@ -28,7 +28,7 @@ struct TrajectorySample {
 /// A path over time. Implementations are immutable and continuous in time.
 class Trajectory {
  public:
-  virtual ~Trajectory() = default;
+  virtual ~Trajectory() = default;  ///< Virtual, so that paths can be deleted as Trajectory.
   /// State at time t, in seconds since the actor appeared; any finite value.
   virtual TrajectorySample at(double t) const = 0;
 };
