@@ -26,7 +26,7 @@ struct GltfNode {
 /// All nodes of a file.
 struct GltfNodes {
   std::vector<GltfNode> nodes;
-  std::vector<std::int64_t> parents;  ///< -1: none.
+  std::vector<std::int64_t> parents;  ///< Parent of each node; -1: none.
   std::vector<std::vector<std::size_t>> children;
   std::vector<std::size_t> order;  ///< Parents before their children.
   std::vector<std::string> names;

@@ -15,10 +15,9 @@ namespace gsnav {
 
 /// A capsule that moves with one joint. Navigation sees a body as its capsules.
 struct ProxyCapsule {
-  /// Index of the joint in the skeleton.
-  std::uint16_t joint = 0;
-  Vec3d p0{}, p1{};     ///< Ends of the segment, in the joint's bind frame, metres.
-  double radius = 0.0;  ///< metres
+  std::uint16_t joint = 0;  ///< Index of the joint in the skeleton.
+  Vec3d p0{}, p1{};         ///< Ends of the segment, in the joint's bind frame, metres.
+  double radius = 0.0;      ///< metres
 };
 
 /// How a body's Gaussians follow its joints. Choose what a captured avatar was trained with, which is
@@ -33,24 +32,20 @@ enum class Skinning : std::uint8_t {
 /// A body: Gaussians, skeleton, weights and capsules, shared by all actors that look alike. Immutable
 /// once built.
 struct AvatarAsset {
-  /// Name, for messages.
-  std::string name;
-  /// The joints.
-  Skeleton skeleton;
+  std::string name;                          ///< Name, for messages.
+  Skeleton skeleton;                         ///< The joints.
   GaussianCloud cloud;                       ///< The Gaussians in the bind pose, root frame (Y up,
                                              ///< facing -Z), metres.
   int influences = kInfluences4;             ///< K: joints that move one Gaussian, 4 or 8.
   std::vector<std::uint16_t> joint_indices;  ///< [N][K], by falling weight.
   std::vector<std::uint16_t>
       skinning_weights;  ///< [N][K], in parts of kWeightParts. Each row sums to kWeightParts.
-  /// How Gaussians follow the joints.
-  Skinning skinning = Skinning::linear;
+  Skinning skinning = Skinning::linear;  ///< How Gaussians follow the joints.
   /// Needed by linear_stretched only (bake_weight_gradients): gradients of the second to last weight of
   /// each row, [N][K-1][3], 1/metres.
   std::vector<float> weight_gradients;
-  /// The body's shape for navigation.
-  std::vector<ProxyCapsule> capsules;
-  LocalPose idle;  ///< Pose of an actor without a motion. Empty: the rest pose.
+  std::vector<ProxyCapsule> capsules;  ///< The body's shape for navigation.
+  LocalPose idle;                      ///< Pose of an actor without a motion. Empty: the rest pose.
 
   /// Number of Gaussians.
   std::size_t size() const noexcept { return cloud.size(); }

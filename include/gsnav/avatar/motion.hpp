@@ -30,7 +30,7 @@ struct MotionInput {
 /// actors on many threads may share one.
 class MotionSource {
  public:
-  virtual ~MotionSource() = default;
+  virtual ~MotionSource() = default;  ///< Virtual, so that sources can be deleted as MotionSource.
   /// Fills all of `out`. The same input gives the same pose.
   virtual void pose(const MotionInput& input, LocalPose& out) const = 0;
   /// Fills only the joints whose `needed` [J] is not 0; the others of `out` are unspecified. The

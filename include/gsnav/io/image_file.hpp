@@ -45,10 +45,8 @@ std::vector<std::uint8_t> colorize_depth(std::span<const float> depth, float nea
 
 /// A decoded PNG.
 struct PngImage {
-  /// Pixels.
-  int width = 0, height = 0;
-  /// 1 (grey), 2 (grey and alpha), 3 (RGB) or 4 (RGBA).
-  int channels = 0;
+  int width = 0, height = 0;           ///< Pixels.
+  int channels = 0;                    ///< 1 (grey), 2 (grey and alpha), 3 (RGB) or 4 (RGBA).
   int bits = 0;                        ///< 8 or 16
   std::vector<std::uint16_t> samples;  ///< [height][width][channels], values as stored, without gamma
                                        ///< correction.
@@ -68,8 +66,7 @@ Status save_npy(const std::filesystem::path& path, std::span<const double> value
 
 /// An array that load_npy read.
 struct NpyArray {
-  /// Length of each axis.
-  std::vector<std::size_t> shape;
+  std::vector<std::size_t> shape;  ///< Length of each axis.
   std::vector<double> values;  ///< In C order, whatever the order of the file. Other types than float64
                                ///< are widened exactly.
   bool is_double = false;      ///< Whether the file holds float64.

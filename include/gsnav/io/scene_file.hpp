@@ -43,10 +43,8 @@ struct LoadSceneOptions {
 
 /// A packed cloud and the report of how it was read. `report.packing` has what packing changed.
 struct LoadedPackedCloud {
-  /// The cloud.
-  PackedCloud cloud;
-  /// What reading found, changed and left out.
-  LoadReport report;
+  PackedCloud cloud;  ///< The cloud.
+  LoadReport report;  ///< What reading found, changed and left out.
 };
 
 /// Reads a scene of Gaussians. The format follows from the name: `.ply`, `.splat`, `.ksplat`, `.spz`,

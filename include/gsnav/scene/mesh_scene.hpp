@@ -100,8 +100,7 @@ class MeshTexture {
 
 /// A mesh with its material. Vectors that are not needed stay empty and take no memory.
 struct SurfaceMesh {
-  /// Vertices and triangles.
-  TriangleMesh geometry;
+  TriangleMesh geometry;         ///< Vertices and triangles.
   std::vector<Vec3f> normals;    ///< One for each vertex, unit. Empty: the normals of the faces.
   std::vector<Vec3f> colors;     ///< One for each vertex, linear RGB. Empty: white.
   std::vector<Vec2<float>> uvs;  ///< One for each vertex; (0, 0) is the top left of the texture. Empty:

@@ -36,11 +36,11 @@ struct VisibleSets {
   /// Side of the cubic cells, in the asset's frame: cell k spans [k, k + 1) times this length along each
   /// axis.
   double cell = 0;
-  /// Focal length of the viewpoints' images, pixels. The sets are unknown for cameras with a longer one.
+  /// Focal length of the viewpoints' images, pixels. The sets do not apply to cameras with a longer one.
   double focal = 0;
-  double near_plane = 0;         ///< Near plane of those images, metres in the world. The sets are
-                                 ///< unknown for cameras with a farther one.
-  double near_sigma = 0;         ///< Camera::near_sigma of those images. The sets are unknown for
+  double near_plane = 0;         ///< Near plane of those images, metres in the world. The sets do not
+                                 ///< apply to cameras with a farther one.
+  double near_sigma = 0;         ///< Camera::near_sigma of those images. The sets do not apply to
                                  ///< cameras with another value.
   double min_weight = 0;         ///< VisibleSettings::min_weight.
   std::size_t cloud_chunks = 0;  ///< Number of chunks of the cloud.

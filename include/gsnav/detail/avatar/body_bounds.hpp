@@ -14,6 +14,7 @@ namespace gsnav {
 /// the furthest Gaussian that the joint moves.
 class BodyBounds {
  public:
+  /// Measures the reach of each joint in the asset.
   explicit BodyBounds(const AvatarAsset& asset);
 
   /// The box for a pose. `joints` [J]: joint to root frame, metres.

@@ -22,6 +22,7 @@ namespace gsnav {
 template <Backend B>
 class SkinnedCrowd {
  public:
+  /// Keeps a pointer to `backend`.
   explicit SkinnedCrowd(B& backend) : backend_(&backend), joints_(backend) {}
 
   /// Adds a place for an actor of this asset and returns the place's index.
@@ -47,6 +48,7 @@ class SkinnedCrowd {
     return pose(
         actors.size(), [&](std::size_t i) -> const AvatarActor& { return actors[i]; }, t);
   }
+  /// The same for pointers to actors.
   Status pose(std::span<const AvatarActor* const> actors, double t) {
     return pose(
         actors.size(), [&](std::size_t i) -> const AvatarActor& { return *actors[i]; }, t);
@@ -63,6 +65,7 @@ class SkinnedCrowd {
     }
     return {};
   }
+  /// Second step of `pose`: skins all actors that some camera sees.
   Status skin_prepared() {
     host_joints_.clear();
     for (SkinnedGaussians<B>& a : actors_) {
@@ -83,6 +86,7 @@ class SkinnedCrowd {
     return skin_all<float, B, float>(*backend_, jobs_);
   }
 
+  /// Number of places.
   std::size_t size() const noexcept { return actors_.size(); }
   /// The posed Gaussians of a place. Valid until the next pose().
   GaussianSet set(std::size_t place) const& noexcept { return actors_[place].set(); }

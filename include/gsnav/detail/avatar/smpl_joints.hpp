@@ -26,7 +26,7 @@ struct BodyJoints {
   std::span<const std::int32_t> parents;  ///< [J]
 };
 
-/// The joints of SMPL for 24, of SMPL-X for 55, else empty.
+/// The joints of the body model that has `count` joints: SMPL for 24, SMPL-X for 55, otherwise none.
 BodyJoints body_joints(std::size_t count) noexcept;
 
 }  // namespace gsnav

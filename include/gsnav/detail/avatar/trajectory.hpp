@@ -13,7 +13,7 @@ namespace gsnav {
 /// Where an actor is at one time. World frame: Y up, metres. The actor faces -Z turned by `yaw` about
 /// +Y.
 struct TrajectorySample {
-  Vec3d position{};
+  Vec3d position{};       ///< Metres, on the ground.
   double yaw = 0.0;       ///< Radians, positive to the left.
   double distance = 0.0;  ///< Metres walked since time 0.
   /// Distance at which the present walk began, metres; -infinity if it had no start.
@@ -28,7 +28,7 @@ struct TrajectorySample {
 /// A path over time. Implementations are immutable and continuous in time.
 class Trajectory {
  public:
-  virtual ~Trajectory() = default;
+  virtual ~Trajectory() = default;  ///< Virtual, so that paths can be deleted as Trajectory.
   /// State at time t, in seconds since the actor appeared; any finite value.
   virtual TrajectorySample at(double t) const = 0;
 };
@@ -36,6 +36,7 @@ class Trajectory {
 /// Stands in one place.
 class StandingTrajectory final : public Trajectory {
  public:
+  /// Stands at `position` (metres), facing `yaw` (radians).
   explicit StandingTrajectory(const Vec3d& position = {}, double yaw = 0.0);
   TrajectorySample at(double) const override { return sample_; }
 
@@ -43,6 +44,7 @@ class StandingTrajectory final : public Trajectory {
   TrajectorySample sample_;
 };
 
+/// Settings of WalkTrajectory.
 struct WalkOptions {
   double speed = 1.2;            ///< Metres per second along the path, > 0.
   double acceleration = 2.0;     ///< Metres per second squared at stops, > 0.

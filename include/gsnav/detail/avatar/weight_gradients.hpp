@@ -8,6 +8,7 @@
 
 namespace gsnav {
 
+/// Settings of bake_weight_gradients.
 struct WeightGradientOptions {
   std::size_t neighbours = 16;  ///< Number of Gaussians to whose weights a gradient is fitted, >= 4.
 };

@@ -26,8 +26,8 @@ struct DefaultScene {
 
 /// A viewpoint in the flat that shows a room.
 struct DefaultView {
-  const char* name;
-  Vec3d eye, target;
+  const char* name;   ///< Name of the view.
+  Vec3d eye, target;  ///< Position of the camera, and the point that it looks at; metres.
 };
 
 /// Viewpoints at eye level, one for each room, the living room first.

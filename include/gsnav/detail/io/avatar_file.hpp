@@ -20,7 +20,9 @@ enum class AvatarColors : std::uint8_t {
   rgb,           ///< Display colours.
 };
 
+/// Options of load_avatar.
 struct LoadAvatarOptions {
+  /// Meaning of `shs` with one coefficient for each Gaussian.
   AvatarColors colors = AvatarColors::guess;
   /// Names and parents of the joints. Empty: `joint_names` and `joint_parents` of the file, or else SMPL
   /// for 24 joints and SMPL-X for 55.
@@ -32,9 +34,9 @@ struct LoadAvatarOptions {
 
 /// A body that load_avatar read.
 struct LoadedAvatar {
-  AvatarAsset asset;
-  LoadReport report;
-  WeightReport weights;
+  AvatarAsset asset;     ///< The body.
+  LoadReport report;     ///< What reading found, changed and left out.
+  WeightReport weights;  ///< The error of the weights that were dropped.
 };
 
 /// Reads a canonical Gaussian avatar: `canonical_gs.npz` with Habitat-GS's keys. Arrays may have any

@@ -15,14 +15,15 @@ namespace gsnav::io {
 /// A stage (`*.stage_config.json`): the assets of a scene. Paths are resolved: they can be opened as
 /// they are.
 struct StageConfig {
-  std::filesystem::path file;
+  std::filesystem::path file;             ///< Path of the stage file.
   std::filesystem::path render_asset;     ///< Gaussians or a mesh.
   std::filesystem::path collision_asset;  ///< A mesh, or empty.
+  /// Axes and origin of the asset, for world_from_asset().
   Vec3d up{0, 1, 0}, front{0, 0, -1}, origin{};
-  double units_to_meters = 1.0;
-  double scale = 1.0;
-  bool norm_quaternion = true;  ///< Read for Habitat-GS, without effect: gsnav always normalises
-                                ///< quaternions.
+  double units_to_meters = 1.0;  ///< Metres for each unit of the asset.
+  double scale = 1.0;            ///< Further scale of the asset.
+  bool norm_quaternion = true;   ///< Read for Habitat-GS, without effect: gsnav always normalises
+                                 ///< quaternions.
 
   /// Transform from the asset to the world by up, front, origin, units and scale. Habitat-GS ignores
   /// these for Gaussians, so data made for it needs the identity instead.
@@ -31,16 +32,16 @@ struct StageConfig {
 
 /// A scene (`*.scene_instance.json`): a stage, a NavMesh and avatars.
 struct HabitatScene {
-  std::string name;  ///< Name of the file without `.scene_instance.json`.
-  std::filesystem::path file;
-  StageConfig stage;
+  std::string name;               ///< Name of the file without `.scene_instance.json`.
+  std::filesystem::path file;     ///< Path of the scene file.
+  StageConfig stage;              ///< The stage.
   std::filesystem::path navmesh;  ///< Path of the NavMesh, or empty.
-  AvatarScene avatars;
+  AvatarScene avatars;            ///< The avatars and the clock.
 };
 
 /// A dataset (`*.scene_dataset_config.json`) with all its scenes, sorted by name.
 struct HabitatDataset {
-  std::vector<HabitatScene> scenes;
+  std::vector<HabitatScene> scenes;  ///< All scenes, by name.
   std::vector<std::string>
       warnings;  ///< Keys that were left out, each once, with the first file that has it.
 

@@ -38,11 +38,13 @@ struct OpenOptions {
   Device device{};  ///< Device that builds levels of detail and visible sets.
 
   // ---- Gaussians
-  /// The file's up axis: "x", "y" or "z" with an optional sign; "auto": guessed from the ground
-  /// (guess_up), or else the usual axis of the file's format; "keep": the world is the file's frame.
+  /// Axis of the file that points up:
+  /// - "x", "y" or "z", with an optional sign.
+  /// - "auto": guessed from the ground (guess_up), or else the usual axis of the file's format.
+  /// - "keep": the world is the file's frame.
   std::string up = "auto";
   double time = 0;  ///< Seconds: the moment of a scene that moves (4D Gaussians).
-  CloudStorage storage = CloudStorage::full;
+  CloudStorage storage = CloudStorage::full;  ///< How the Gaussians are kept in memory.
   /// Largest change of a colour for which SH bands are dropped. 0 drops only bands of zeros, which
   /// changes no image. kUnseenColor drops bands too weak to be seen, for Quality::fast and levels of
   /// detail.
@@ -71,8 +73,11 @@ struct OpenOptions {
                                                   ///< metres.
 
   // ---- Visible sets
-  /// Visible sets: "": none; "auto": read from next to the scene's file, or else computed for the places
-  /// on the NavMesh and stored there; otherwise a file (gsnav-navmesh --visible-sets).
+  /// Visible sets:
+  /// - "": none.
+  /// - "auto": read from next to the scene's file, or else computed for the places on the NavMesh and
+  ///   stored there.
+  /// - otherwise a file (gsnav-navmesh --visible-sets).
   std::string visible_sets{};
   /// A camera like those that will render, of an agent at the world's origin. "auto" computes visible
   /// sets for its height above the NavMesh and up to its focal length (VisibleSettings::serve).

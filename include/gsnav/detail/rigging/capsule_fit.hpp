@@ -9,6 +9,7 @@
 
 namespace gsnav {
 
+/// Settings of fit_body_capsules.
 struct CapsuleFitOptions {
   double percentile = 0.99;  ///< Share of a bone's Gaussian centres, over all poses, that its capsule
                              ///< contains, in (0.5, 1].
@@ -21,10 +22,10 @@ struct CapsuleFitOptions {
 
 /// How well capsules cover a body, over poses. Lengths are in metres.
 struct CapsuleReport {
-  std::size_t capsules = 0, poses = 0;
-  double percentile = 0.0;       ///< The percentile that was needed.
-  double contained_least = 1.0;  ///< Share of the centres inside a capsule, in the worst pose.
-  double contained_mean = 1.0;
+  std::size_t capsules = 0, poses = 0;  ///< Number of capsules, and number of poses.
+  double percentile = 0.0;              ///< The percentile that was needed.
+  double contained_least = 1.0;         ///< Share of the centres inside a capsule, in the worst pose.
+  double contained_mean = 1.0;    ///< Mean over the poses of the share of centres inside a capsule.
   double outside_greatest = 0.0;  ///< Greatest distance of a centre from the nearest capsule.
   double over_mean = 0.0;  ///< Mean distance of the capsules' outer surface from the nearest centre.
   double over_p99 = 0.0;   ///< 99th percentile of that distance.

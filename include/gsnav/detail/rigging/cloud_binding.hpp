@@ -22,8 +22,10 @@ namespace detail {
 /// Finds the triangle nearest to a point, among the triangles at the vertices near it.
 class NearestTriangle {
  public:
+  /// Keeps a reference to the mesh.
   explicit NearestTriangle(const SkinnedMesh& mesh);
 
+  /// The nearest point of the mesh. `distance` gets its distance from p, metres.
   MeshSample find(const Vec3d& p, double& distance) const;
 
  private:
@@ -40,18 +42,20 @@ class NearestTriangle {
 
 }  // namespace detail
 
+/// Settings of bind_cloud.
 struct CloudBindingOptions {
   Similarity mesh_from_cloud{};  ///< Transform from the frame of the cloud to that of the mesh.
                                  ///< HumanGaussian's clouds are scaled and shifted.
   double furthest = 0.05;        ///< Metres. Gaussians further from the surface are left out.
-  WeightOptions weights;
+  WeightOptions weights;         ///< How many weights are kept.
 };
 
+/// An avatar that bind_cloud made.
 struct BoundCloud {
-  AvatarAsset asset;
+  AvatarAsset asset;         ///< The avatar.
   std::size_t left_out = 0;  ///< Gaussians further from the surface than allowed.
   double furthest = 0.0;     ///< Greatest distance from the surface of those kept, metres.
-  WeightReport weights;
+  WeightReport weights;      ///< The error of the weights that were dropped.
 };
 
 /// Makes an avatar from Gaussians without weights, such as HumanGaussian's PLY or a scan of a person.

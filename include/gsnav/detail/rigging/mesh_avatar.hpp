@@ -11,9 +11,10 @@
 
 namespace gsnav {
 
+/// Settings of make_mesh_avatar.
 struct MeshAvatarOptions {
   std::size_t gaussians = 100000;  ///< Approximate number of Gaussians, in [100, 4000000].
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;          ///< Seed of the random points.
   double overlap = 0.7;     ///< Standard deviation along the surface, in units of the least spacing, >
                             ///< 0.
   double thickness = 0.12;  ///< Standard deviation across the surface, in units of the spacing, > 0.
@@ -22,17 +23,19 @@ struct MeshAvatarOptions {
   WeightOptions weights{};  ///< Choose its poses from the motions that the avatar will make.
 };
 
+/// An avatar that make_mesh_avatar made.
 struct MeshAvatar {
-  AvatarAsset asset;
+  AvatarAsset asset;     ///< The avatar.
   double area = 0.0;     ///< Area of the surface in its bind pose, square metres.
   double spacing = 0.0;  ///< Least distance between two Gaussians on one side of the surface, metres.
-  WeightReport weights;
+  WeightReport weights;  ///< The error of the weights that were dropped.
 };
 
 namespace detail {
 
 /// A point of a mesh.
 struct MeshSample {
+  /// Index of the triangle.
   std::size_t triangle = 0;
   Vec3d at{}, position{}, normal{};  // barycentric coordinates; metres; unit, outwards
 };

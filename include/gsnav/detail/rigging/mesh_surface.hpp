@@ -21,6 +21,7 @@ struct SurfaceColor {
 /// Evaluates the colours of a mesh. Keeps a reference to the mesh.
 class MeshColors {
  public:
+  /// Keeps a reference to `mesh`.
   explicit MeshColors(const SkinnedMesh& mesh);
 
   /// Colour at the barycentric coordinates `at` of triangle t: texture (bilinear, repeated) times factor

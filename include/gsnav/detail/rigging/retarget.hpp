@@ -10,12 +10,13 @@
 
 namespace gsnav {
 
+/// Settings of retarget.
 struct RetargetOptions {
   /// Pairs of joint names, (target, source). Target joints without a pair keep their rest rotation;
   /// further roots without a pair rotate with the first root.
   std::vector<std::pair<std::string, std::string>> joints;
-  double yaw = 0.0;  ///< Rotation about +Y, radians, from the heading of the source's rest pose to that
-                     ///< of the target's.
+  double yaw = 0.0;  ///< Rotation about +Y, radians, from the source's heading in its rest pose to the
+                     ///< target's heading.
   /// Target joints whose rest pose corresponds to that of their source, whatever the direction to their
   /// child: feet that stand flat in both, for example.
   std::vector<std::string> same_rest;

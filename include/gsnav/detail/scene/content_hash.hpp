@@ -18,6 +18,7 @@ namespace gsnav {
 /// apart; it does not protect against forgery.
 class Hasher {
  public:
+  /// Adds `size` bytes.
   void bytes(const void* data, std::size_t size) noexcept {
     const char* p = static_cast<const char*>(data);
     std::uint64_t w = 0;
@@ -41,6 +42,7 @@ class Hasher {
     value(v.size());
     bytes(v.data(), v.size() * sizeof(T));
   }
+  /// Adds a text with its length.
   void text(const std::string& s) noexcept {
     value(s.size());
     bytes(s.data(), s.size());
@@ -52,7 +54,9 @@ class Hasher {
                   static_cast<unsigned long long>(state_[1]));
     return out;
   }
+  /// The lower 64 bits of the hash.
   std::uint64_t low() const noexcept { return state_[0]; }
+  /// The 128 bits of the hash.
   const std::array<std::uint64_t, 2>& state() const noexcept { return state_; }
 
  private:

@@ -22,6 +22,7 @@ namespace gsnav {
 template <Backend B>
 class GaussianArrays {
  public:
+  /// Views the cloud on host backends, copies it to others.
   GaussianArrays(B& backend, const GaussianCloud& cloud) : set_(cloud.set()) {
     if constexpr (!is_host_backend<B>) upload(backend, cloud);
   }
@@ -35,6 +36,7 @@ class GaussianArrays {
       detail::move_to(backend, set_.gaussians.color.chunk_degrees, bytes_);
     }
   }
+  /// The same for a packed cloud.
   GaussianArrays(B& backend, const PackedCloud& cloud) : set_(cloud.set()) {
     if constexpr (!is_host_backend<B>) {
       const GaussianCloud floats = unpack_cloud(cloud);
@@ -42,6 +44,7 @@ class GaussianArrays {
       upload(backend, floats);
     }
   }
+  /// The same for a packed cloud.
   GaussianArrays(B& backend, const PackedCloud& cloud, const SceneBands& bands)
       : set_(bands.applied_to(cloud.set())) {
     if constexpr (!is_host_backend<B>) {

@@ -30,8 +30,8 @@ struct LodLevel {
 /// A cloud in which every chunk belongs to one box, and its levels of detail. The last chunk of a box is
 /// filled up with transparent rows.
 struct LeveledCloud {
-  GaussianCloud cloud;
-  LodTree tree;
+  GaussianCloud cloud;  ///< The finest level, in chunks.
+  LodTree tree;         ///< The coarser levels.
 };
 
 namespace detail {

@@ -127,6 +127,7 @@ void bound_chunks(B& backend, GaussianCloud& cloud) {
   cloud.chunk_bounds = chunk_bounds_of(backend, cloud);
   cloud.part_bounds = chunk_bounds_of(backend, cloud, kChunkPart);
 }
+/// The same on threads of its own.
 inline void bound_chunks(GaussianCloud& cloud) {
   PoolBackend backend(threads_for(cloud.size()));
   bound_chunks(backend, cloud);
@@ -202,6 +203,7 @@ void sort_spatially(B& backend, GaussianCloud& cloud) {
   }
   bound_chunks(backend, cloud);
 }
+/// The same on threads of its own.
 inline void sort_spatially(GaussianCloud& cloud) {
   PoolBackend backend(threads_for(cloud.size()));
   sort_spatially(backend, cloud);

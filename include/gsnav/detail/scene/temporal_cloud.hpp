@@ -18,6 +18,7 @@ struct TemporalCloud {
   std::array<std::vector<float>, kMotionPlanes>
       motion;  ///< x, y, z of velocity, acceleration and jerk; [N] each, or empty.
 
+  /// Number of Gaussians, N.
   std::size_t size() const noexcept { return cloud.size(); }
   /// Bytes of the arrays.
   std::size_t bytes() const noexcept {

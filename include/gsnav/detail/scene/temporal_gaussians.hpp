@@ -16,6 +16,7 @@ namespace gsnav {
 template <Backend B>
 class TemporalGaussians {
  public:
+  /// Views the scene on host backends, copies it to others.
   TemporalGaussians(B& backend, const TemporalCloud& scene)
       : backend_(backend), arrays_(backend, scene.cloud), view_(scene.view()), moment_(backend) {
     view_.base = arrays_.set().gaussians;
