@@ -106,10 +106,10 @@ struct NavPath {
   double length = 0.0;        ///< Length on the surface, metres.
 };
 
-/// Distance with an error bound. `length - at_least <= relative_error * at_least`, and the length of the
-/// shortest path lies between `at_least` and `length`. Both values are infinite if there is no path.
+/// Distance with an error bound: the true distance lies between `at_least` and `2 length - at_least`,
+/// and `length - at_least <= relative_error * at_least`. Both values are infinite if there is no path.
 struct BoundedDistance {
-  double length = 0.0;    ///< Length of a path that exists, metres.
+  double length = 0.0;    ///< Estimate: the middle of the two bounds, metres.
   double at_least = 0.0;  ///< Lower bound of the distance, metres. No path is shorter.
 };
 /// Accuracy of a distance query.
