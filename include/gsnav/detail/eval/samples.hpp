@@ -9,8 +9,8 @@
 
 namespace gsnav::eval {
 
-/// Values of an image in either precision, read as double. Owns nothing: what it was made from must
-/// outlive it. Images are row-major from the top-left pixel, channels inner.
+/// Read-only view of image values in float or double, read as double. The data must outlive it. Images
+/// are row-major from the top-left pixel, with channels innermost.
 class Samples {
  public:
   Samples() = default;
