@@ -21,7 +21,7 @@ inline double det(const Ground& a, const Ground& b) noexcept { return a.x * b.z 
 inline double length(const Ground& a) noexcept { return std::sqrt(dot(a, a)); }
 inline Ground left_of(const Ground& a) noexcept { return {-a.z, a.x}; }
 
-/// Where dot(normal, v) >= offset, less the slack that `soft` ones are given.
+/// Half plane dot(normal, v) >= offset. For soft ones the offset is reduced by the slack.
 struct HalfPlane {
   Ground normal;  ///< Unit vector.
   double offset = 0;

@@ -157,7 +157,7 @@ class Delaunay {
     const double det = ax * (bz * cc - cz * bb) - az * (bx * cc - cx * bb) + aa * (bx * cz - cx * bz);
     return det > 1e-9 * max(aa, max(bb, cc)) * max(aa, max(bb, cc));
   }
-  /// Flips these edges where that is Delaunay's, and those that it may have made wrong.
+  /// Flips these edges if they violate the Delaunay condition, and then the edges that a flip affects.
   void settle(std::vector<Side> edges) {
     // Every flip improves the triangulation, but rounding could cause an endless loop. Limit their
     // number.
