@@ -6,7 +6,7 @@
 
 #include "batch_state.cuh"
 
-// What a batch can draw, and how many cameras at once.
+// Limits of a batch: supported frames, and cameras per call.
 
 namespace gsnav {
 

@@ -128,7 +128,7 @@ struct Observation {
   std::span<const float> data;  ///< Shape [height][width][channels], top row first.
 };
 
-/// Result of a reset or an action: images, goal, and what the action did.
+/// Result of a reset or an action: images, goal, and outcome of the action.
 struct Observations : StepInfo {
   std::span<const Observation> images;  ///< Images in the order of the sensors. Empty if nothing was
                                         ///< rendered.

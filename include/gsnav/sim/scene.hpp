@@ -46,7 +46,7 @@ struct SceneMesh {
   Similarity world_from_surface{};              ///< Transform from the mesh's frame to the world.
 };
 
-/// Everything that a simulator runs in. It does not change, so many simulators can share it.
+/// Everything that a simulator runs in. It does not change, so simulators can share it.
 struct SimulatorScene {
   std::vector<SceneAsset> assets;          ///< Static Gaussians.
   std::vector<SceneMesh> meshes;           ///< Triangle meshes.
@@ -58,7 +58,7 @@ struct SimulatorScene {
 /// Which part of a scene's assets is drawn.
 struct DetailChoice {
   std::optional<LodChoice> lod{};  ///< Level of detail. Empty: the assets as they are.
-  bool visible_sets = false;       ///< Draw only what is visible from the camera's cell.
+  bool visible_sets = false;       ///< Draw only the Gaussians that are visible from the camera's cell.
 };
 
 /// Checks that a scene is complete enough to simulate.
@@ -69,7 +69,7 @@ Status validate(const SimulatorScene& scene);
 Status validate_assets(const SimulatorScene& scene);
 
 /// Checks that a scene has the data that `choice` needs.
-/// @return invalid_argument, with what is missing or out of range.
+/// @return invalid_argument, with the part that is missing or out of range.
 Status validate_detail(const SimulatorScene& scene, const DetailChoice& choice);
 
 /// Appends the motion of the scene's avatars over [t0, t1], numbered in scene order.

@@ -29,7 +29,7 @@ struct AgentPose {
   Vec3d forward() const noexcept { return {-std::sin(yaw), 0.0, -std::cos(yaw)}; }
 };
 
-/// What one action did.
+/// Outcome of one action.
 struct StepInfo {
   bool collided = false;         ///< A wall or an avatar stopped or deflected the move.
   bool wall_collision = false;   ///< A wall stopped or deflected the move.
@@ -118,7 +118,7 @@ class World {
   double tick(int k) const noexcept;
   /// Current pose of the agent.
   const AgentPose& agent() const noexcept { return s_.agent; }
-  /// What the last action did.
+  /// Outcome of the last action.
   const StepInfo& last_step() const noexcept { return s_.last; }
   /// Current episode.
   const PointNavEpisode& episode() const noexcept { return s_.episode; }

@@ -40,8 +40,8 @@ struct CudaSpace {};
 
 /// Backend for one NVIDIA GPU.
 /// It uses the same kernels as the CPU. Keys, footprints, and float32 images of the profile `exact` are
-/// bit-identical to the CPU's. Images of `fast` differ by the CPU's exponential (docs/notes/cuda.md). All work
-/// goes to one stream, in order. Link gsnav::cuda; the header itself does not need CUDA.
+/// bit-identical to those of the CPU. Images of `fast` differ by the CPU's exponential (docs/notes/cuda.md).
+/// All work goes to one stream, in order. Link gsnav::cuda; the header itself does not need CUDA.
 ///
 /// If the driver rejects a call, the next `synchronize()` returns the error. Later calls before that do
 /// nothing.
@@ -86,7 +86,7 @@ class CudaBackend {
   /// @return backend_failure if a call since the last synchronize() failed.
   Status synchronize();
 
-  /// Number of host threads that take part in the work.
+  /// Number of pieces into which callers should divide work.
   std::size_t concurrency() const noexcept { return 1; }
   /// Index of the GPU.
   int device() const noexcept { return device_; }

@@ -14,8 +14,8 @@ namespace gsnav::eval {
 /// Pixels per degree of a monitor that is 0.7 m wide, has 3840 pixels per row and is viewed from 0.7 m.
 inline constexpr double kFlipPixelsPerDegree = 67.0;
 
-/// FLIP error: the difference that an observer sees when flipping between two images. 0: none, 1:
-/// largest.
+/// FLIP error: the difference that an observer sees when flipping between two images. It ranges from 0
+/// (none) to 1 (largest).
 struct Flip {
   double mean = 0.0;       ///< Mean over all pixels.
   double p99 = 0.0;        ///< 99th percentile over pixels (nearest rank).

@@ -59,8 +59,8 @@ struct OracleMesh {
 /// Settings of the reference renderer.
 struct OracleConfig {
   /// Settings of the image. `outputs`, `tuning` and `quality.exponential` are ignored: all images are
-  /// produced, in float64, without tiles. `response` and `compat` must be the contract's, and with a
-  /// mesh also `composite` and `blend_space`.
+  /// produced, in float64, without tiles. `response` and `compat` must be those of the contract, and
+  /// with a mesh also `composite` and `blend_space`.
   RenderConfig rules{};
   OracleKind kind = OracleKind::contract;  ///< Definition of the image.
   OracleOrder order = OracleOrder::own;    ///< Order of blending.

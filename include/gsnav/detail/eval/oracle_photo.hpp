@@ -97,7 +97,8 @@ class PhotoReducer {
 ///   ones, so that it is a depth that occurs); 0 if fewer than half of the samples have a return
 /// - masks: 1 if any sample is 1
 ///
-/// Works in bands of about 2^20 fine pixels, which take 90 MB in addition to what oracle_render needs.
+/// Works in bands of about 2^20 fine pixels, which take 90 MB in addition to the memory of
+/// oracle_render.
 /// @param k Factor, in [1, 16].
 /// @param config `crop` is in pixels of `camera`. Counts are those of the fine image.
 /// @return the errors of oracle_render; invalid_argument if k is out of range or the fine image too

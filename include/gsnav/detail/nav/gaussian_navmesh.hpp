@@ -101,9 +101,9 @@ inline NavMeshSettings gaussian_navmesh_settings() noexcept {
 /// not a storey.
 ///
 /// Mesh. Solid voxels become spans of Recast's heightfield. Tops of floors are walkable, and small gaps
-/// in them are closed. Clearance, agent radius and regions are Recast's. If `settings.tile_size` is 0,
-/// the mesh is one tile up to 2^22 columns, and has tiles of 512 cells above that; its settings show
-/// which.
+/// in them are closed. Recast applies clearance and agent radius, and forms the regions. If
+/// `settings.tile_size` is 0, the mesh is one tile up to 2^22 columns, and has tiles of 512 cells above
+/// that; its settings show which.
 ///
 /// @return invalid_argument for a setting or option out of range, or for a grid above `max_voxels` or
 /// `max_cells` (the message suggests a cell size); nothing_navigable, with the floor height and the

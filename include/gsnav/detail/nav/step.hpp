@@ -45,7 +45,7 @@ struct StepOptions {
   StepCompat compat = StepCompat::none;  ///< Collision rules.
 };
 
-/// What limited a step.
+/// Reason why a step was limited.
 enum class BlockedBy : std::uint8_t {
   none,     ///< The step was carried out as requested.
   wall,     ///< An edge of the NavMesh stopped or deflected it.
@@ -61,7 +61,7 @@ struct StepResult {
                           ///< invalid.
   double fraction = 0.0;  ///< Ground-plane distance walked divided by the requested one, in [0, 1]. 1
                           ///< for a step of zero length.
-  BlockedBy blocked_by = BlockedBy::none;  ///< What limited the step.
+  BlockedBy blocked_by = BlockedBy::none;  ///< Reason why the step was limited.
   bool hit_wall = false;                   ///< An edge of the mesh stopped or deflected the step.
   Vec3d wall_normal{};                     ///< Normal of the edge if hit_wall. It points into the mesh.
 

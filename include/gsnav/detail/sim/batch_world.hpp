@@ -16,7 +16,7 @@
 
 namespace gsnav {
 
-/// What happens to an environment after its episode has ended. Equivalent to Gymnasium's AutoresetMode.
+/// Treatment of an environment whose episode has ended. Equivalent to Gymnasium's AutoresetMode.
 enum class AutoReset : std::uint8_t {
   next_step,  ///< The next step ignores its action and begins an episode. Its reward is 0, and it is
               ///< neither terminated nor truncated.
@@ -41,7 +41,7 @@ struct BatchInfo {
   std::span<const double> rewards;           ///< Reward of the action.
   std::span<const std::uint8_t> terminated;  ///< 1 if `stop` ended the episode.
   std::span<const std::uint8_t> truncated;   ///< 1 if the episode reached its limit of actions.
-  std::span<const StepInfo> infos;  ///< What the action did. With AutoReset::same_step, this includes
+  std::span<const StepInfo> infos;  ///< Outcome of the action. With AutoReset::same_step, this includes
                                     ///< the last action of a finished episode.
   std::span<const PointGoal> point_goals;  ///< Goal as observed now. In a new episode, its own goal.
   std::span<const double> times;           ///< Time on the clock of the environment's scene, seconds.

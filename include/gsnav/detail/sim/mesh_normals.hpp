@@ -65,9 +65,8 @@ class MeshNormals {
  private:
   B* backend_;
   MeshWorkspace<float, B> workspace_;
-  Buffer<float, B> normals_;  // Normals in the backend's memory, if it is not the host's.
-  std::vector<float> depth_;  // Host copy of the meshes' depth, if the backend's memory is not the
-                              // host's.
+  Buffer<float, B> normals_;  // Normals in the backend's memory, if that differs from host memory.
+  std::vector<float> depth_;  // Host copy of the meshes' depth, if the backend has its own memory.
 };
 
 }  // namespace gsnav

@@ -22,10 +22,10 @@ struct SceneDetail {
     const GaussianCloud* cloud;                  ///< The Gaussians.
     Similarity world_from_asset;                 ///< Transform from the asset's frame to the world.
     GaussianRows cloud_there{}, merged_there{};  ///< Arrays of `cloud` and of the tree in the backend's
-                                                 ///< own memory. Empty if it uses the host's.
+                                                 ///< own memory. Empty if it uses host memory.
     const VisibleSets* visible = nullptr;        ///< Visible sets. Null: everything may be visible.
     const std::uint32_t* visible_there =
-        nullptr;  ///< `visible->bits` in the backend's own memory. Null if it uses the host's.
+        nullptr;  ///< `visible->bits` in the backend's own memory. Null if it uses host memory.
   };
   std::vector<Asset> assets;  ///< In the order of the scene's sets. Empty: draw all assets whole.
   LodChoice choice{};         ///< Settings of the levels of detail.

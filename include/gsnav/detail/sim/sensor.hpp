@@ -38,7 +38,7 @@ enum class SensorModel : std::uint8_t {
             ///< with depth 0.
 };
 
-/// Parameters of the double sphere model. The defaults are Habitat's.
+/// Parameters of the double sphere model. The defaults are those of Habitat.
 struct FisheyeLens {
   double alpha = 0.59, xi = -0.18;  ///< Parameters of the model.
   /// Focal lengths in pixels. 0: chosen so that the middle row spans the sensor's hfov, which the lens
@@ -47,10 +47,10 @@ struct FisheyeLens {
   std::array<double, 2> principal_point_offset{0.0, 0.0};  ///< Offset from the image centre, pixels.
 };
 
-/// A camera fixed to the agent. Conventions and defaults are Habitat's.
+/// A camera fixed to the agent. Conventions and defaults are those of Habitat.
 struct SensorSpec {
   std::string uuid = "rgb";                  ///< Name of the observation, unique per agent.
-  SensorKind kind = SensorKind::rgb;         ///< What the sensor measures.
+  SensorKind kind = SensorKind::rgb;         ///< Quantity that the sensor measures.
   SensorModel model = SensorModel::pinhole;  ///< Camera model.
   std::array<int, 2> resolution{256, 256};   ///< Height and width in pixels.
   double hfov = 90.0;                        ///< Horizontal field of view, degrees. Pixels are square.

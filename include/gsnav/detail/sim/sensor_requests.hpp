@@ -17,7 +17,7 @@
 
 namespace gsnav {
 
-/// What the sensors of one agent look at: its pose, the scene, and its row in the images.
+/// Input of one agent's sensors: its pose, the scene, and its row in the images.
 struct SensorView {
   Vec3d base{};                          ///< World position, metres.
   Quatd rotation{};                      ///< Orientation of the agent.

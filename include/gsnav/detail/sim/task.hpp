@@ -8,7 +8,7 @@
 
 namespace gsnav {
 
-/// Discrete action of the agent in one control period. Values are Habitat's.
+/// Discrete action of the agent in one control period. Values are those of Habitat.
 enum class Action : std::uint8_t {
   /// Ends the episode.
   stop = 0,
@@ -62,7 +62,7 @@ struct TaskConfig {
   }
 
   /// PointNav among people, with penalties for coming near them. An action completely inside a person's
-  /// space costs as much as a forward step earns, and a collision costs twice that.
+  /// space costs 0.25, the reward of a forward step. A collision costs twice that.
   static TaskConfig avatar_pointnav() noexcept {
     TaskConfig c;
     c.reward.proximity = 0.25;

@@ -86,7 +86,7 @@ class CudaBatchRenderer {
                          const MeshFrame& meshes = {});
 
   /// Number of cameras, from the first on, that one call should render. It is limited by 32-bit counts
-  /// and by the free device memory, assuming that each camera needs as much as those of the last call.
+  /// and by the free device memory, assuming the mean consumption of the last call's cameras.
   /// At least 1 if there are cameras. `render` accepts more if it can.
   std::size_t capacity(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras) const;
 
