@@ -44,7 +44,7 @@ double memory(const char* key) {
 
 struct Reading {
   LoadedCloud made;
-  double seconds = 1e9, peak = 0;  ///< seconds: the least of all runs; peak: of the last run
+  double seconds = 1e9, peak = 0;  ///< least of all runs, and of the last run
 };
 
 /// Loads a scene three times. `sort`: in spatial order, as it is rendered.
