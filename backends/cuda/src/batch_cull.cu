@@ -26,9 +26,9 @@ __device__ bool part_is_candidate(const ViewedSet<float>& args, std::size_t chun
 }
 
 /// Mask of the parts of a chunk that the lane's instance may see, one bit per part; 0 unless `seen`,
-/// which says whether it may see the chunk. If the chunk lies wholly in view, the mask has all parts. If
-/// it is at the edge of the view, the lanes of the warp test its parts together, with kPartsPerChunk
-/// lanes for each such instance.
+/// which says whether it may see the chunk. If the chunk lies wholly in view or its parts have no
+/// bounds, the mask has all parts with rows that may be seen. If it is at the edge of the view, the
+/// lanes of the warp test its parts together, with kPartsPerChunk lanes for each such instance.
 __device__ unsigned parts_in_view(const BatchInstance* instances, std::size_t chunk, bool seen) {
   const unsigned lane = threadIdx.x % 32;
   const GaussianRows& gs = instances[0].args.gaussians;

@@ -213,8 +213,7 @@ class FrameBatch {
   Buffer<float, B> scratch_;
   // Of the current group:
   std::vector<GaussianSet> sets_;
-  std::unordered_multimap<const float*, std::uint32_t>
-      places_;  // index in sets_, by the address of the means
+  std::unordered_multimap<const float*, std::uint32_t> places_;  // index in sets_ by address of means
   std::vector<std::uint32_t> lists_;
   std::vector<View<const std::uint32_t>> seen_;  // visible rows of each entry of lists_
   std::vector<std::size_t> ends_;
