@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# Prints how many files to compile at a time: one per processor, limited by 1.5 GiB of memory per file.
+# Prints how many files to compile at a time: one per processor, and at most one per 1.5 GiB of memory.
 set -euo pipefail
 processors=$(nproc)
 memory_kib=$(awk '/^MemAvailable:/ { print $2 }' /proc/meminfo 2> /dev/null || true)

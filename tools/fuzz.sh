@@ -5,10 +5,10 @@
 #
 # usage: tools/fuzz.sh [SECONDS [READER...]]
 #   SECONDS  time per reader (default: 20)
-#   READER   ply, spz, ... (default: all)
+#   READER   ply, spz, ... (default: all readers)
 #
-# GSNAV_FUZZ_OUT   folder of corpora, which are kept, crashes and logs (default: build/fuzz)
-# GSNAV_JOBS       number of parallel compilations, then of parallel readers
+# GSNAV_FUZZ_OUT   folder for corpora (kept between runs), crashes and logs (default: build/fuzz)
+# GSNAV_JOBS       number of parallel compilations, and of readers that run at a time
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -24,7 +24,7 @@ if command -v ccache > /dev/null; then options+=(-DCMAKE_CXX_COMPILER_LAUNCHER=c
 cmake --build "$build" -j "$jobs" --target fuzz_readers fuzz_seeds
 fuzzer=$build/tests/fuzz/fuzz_readers
 "$build/tests/fuzz/fuzz_seeds" "$out/seeds"
-# Corpora of earlier runs, smallest inputs first. All of them grew from the seeds.
+# Corpora of earlier runs, smallest files first. They were grown from the seeds.
 mkdir -p "$out/corpus" "$out/crashes"
 tar --skip-old-files -xJf "$root/tests/fuzz/corpora.tar.xz" -C "$out/corpus" ||
   echo "tests/fuzz/corpora.tar.xz was not unpacked (is xz there?): from the seeds alone"

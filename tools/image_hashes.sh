@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# Hashes the images that the tests `images` and `hard_cases` draw: with the serial backend, with OpenMP
-# for each instruction set of this machine, and with the CUDA kernels emulated on the host.
+# Hashes the images of the tests `images` and `hard_cases` on the serial backend, on OpenMP with each
+# instruction set of this machine, and on the emulated CUDA backend.
 #
 #   tools/image_hashes.sh FILE           builds both tests and writes FILE, one line per image
-#   tools/image_hashes.sh FILE BEFORE    also fails if a line differs from the file BEFORE
+#   tools/image_hashes.sh FILE BEFORE    does the same, and fails if a line differs from the file BEFORE
 #
-# Run it before and after a change that must not change any bit. The first run takes ten minutes.
+# Run it before and after a change that must keep every bit. A first run takes ten minutes on two cores.
 #
 # GSNAV_JOBS=N   compile N files at a time (default: see tools/build_jobs.sh)
 set -euo pipefail
@@ -33,14 +33,14 @@ cmake --build "$build" -j "$jobs" --target test_images test_hard_cases
 
 lines=$(mktemp)
 trap 'rm -f "$lines" "$lines".*' EXIT
-# GSNAV_ISA can only lower the choice. Without AVX-512, "avx512" uses the widest set of the processor.
+# GSNAV_ISA only lowers the choice. A processor without AVX-512 draws "avx512" with its widest set.
 for isa in baseline avx2 avx512; do
   part=$lines.$isa
   for test in images hard_cases; do
     echo "Drawing: $test, $isa"
     GSNAV_ISA=$isa GSNAV_IMAGE_HASHES=$part "$build/tests/$test/test_$test" --no-version --minimal
   done
-  # Images of other backends do not depend on the instruction set. Keep them once.
+  # Only OpenMP depends on the instruction set; keep the other lines once.
   grep -F '| openmp' "$part" | sed "s/| openmp/| $isa openmp/" >> "$lines"
   [[ $isa == baseline ]] && grep -vF '| openmp' "$part" >> "$lines"
 done

@@ -1,17 +1,17 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# Installs the Debian or Ubuntu packages that a job needs. Does nothing if all are installed.
+# Installs the missing Debian or Ubuntu packages for a job.
 #
 # usage: tools/install_deps.sh demo|tests|ci
 #   demo   build and run the navigation loop
 #   tests  ... and the tests, benchmarks and packaging checks
 #   ci     ... and clang with its OpenMP, sanitizers, fuzzer and clang-format
 #
-# Optional packages that are not installed: libopenmpi-dev (nav_eval_mpi), ffmpeg (gsnav-replay --video),
-# chromium (the test of gsnav-viewer's page), libfcl-dev (a comparison in bench_kernels).
+# These are optional and not installed: libopenmpi-dev (nav_eval_mpi), ffmpeg (gsnav-replay --video),
+# chromium (test of the page of gsnav-viewer), libfcl-dev (comparison in bench_kernels).
 #
-# GSNAV_NO_APT=1   never call apt-get; name the missing packages and continue
+# GSNAV_NO_APT=1   never call apt-get; print the missing packages and go on
 set -euo pipefail
 
 job=${1:-demo}
@@ -57,7 +57,7 @@ apt() { "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -o Dpkg::
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 echo "Installing ${missing[*]}"
-# Package lists may be old or missing. A failed update does not matter if the installation succeeds.
+# An update may fail while the packages can still be installed.
 apt update > "$log" 2>&1 || echo "apt-get update failed; trying with the lists that are there"
 if ! apt install -y --no-install-recommends "${missing[@]}" >> "$log" 2>&1; then
   tail -n 20 "$log" >&2

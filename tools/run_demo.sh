@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# Installs missing packages, builds and runs the navigation loop example. All arguments go to it:
+# Installs missing packages, then builds and runs the example nav_loop. All arguments go to it:
 #   tools/run_demo.sh --help
-# GPU code is compiled for the GPU of this machine, if --device is cuda or cuda:NUMBER.
+# With --device cuda or cuda:NUMBER, code for the GPU of this machine is compiled too.
 #
 # GSNAV_NO_APT=1   never call apt-get
-# GSNAV_JOBS=N     compile N files at a time (default: one per processor, limited by memory)
+# GSNAV_JOBS=N     compile N files at a time (default: see tools/build_jobs.sh)
 # GSNAV_PRESET     configure preset (default: demo)
 set -euo pipefail
 
@@ -15,7 +15,7 @@ preset=${GSNAV_PRESET:-demo}
 build=$root/build/$preset
 help=$root/examples/nav_loop/help.txt  # what nav_loop --help prints; a test compares them
 
-# Answer --help and reject bad options before building anything.
+# Answer --help and unknown options before anything is built.
 device=
 previous=
 for argument in "$@"; do
@@ -45,13 +45,13 @@ if [[ $device == cuda* ]]; then
   fi
   cuda=ON
 elif grep -qs '^GSNAV_CUDA:STRING=ON' "$build/CMakeCache.txt"; then
-  cuda=ON  # keep the GPU code of an earlier build
+  cuda=ON  # keep the CUDA build of an earlier run
 fi
 
 "$root/tools/install_deps.sh" demo >&2
 jobs=${GSNAV_JOBS:-$("$root/tools/build_jobs.sh")}
 
-# Progress goes to stderr, so that stdout has only the output of the example.
+# Progress goes to stderr, so that stdout is the example's own.
 if [[ -x $build/examples/nav_loop ]]; then
   echo "Building what has changed of nav_loop in $build" >&2
 else

@@ -3,17 +3,16 @@
 #
 # Installs missing packages, builds everything and runs all tests. Arguments go to ctest:
 #   tools/run_tests.sh [--cuda] [-R render ...]
-# The exit status is that of ctest. GPU code is compiled if there is a GPU, for that GPU. With --cuda it is
-# also compiled without one, for the oldest supported GPU.
+# The exit status is that of ctest. Code for GPUs is compiled if there is a GPU (for that GPU), or with
+# --cuda (without a GPU, for the oldest architecture). ccache is used if it is installed.
 #
 # GSNAV_NO_APT=1      never call apt-get
-# GSNAV_DEPS          packages to install: demo, tests or ci; see tools/install_deps.sh (default: by preset)
+# GSNAV_DEPS          set of packages: demo, tests or ci (default: by preset); see tools/install_deps.sh
 # GSNAV_PRESET        configure preset (default: tests, which compiles fastest)
-# GSNAV_CUDA          AUTO (if nvcc is found), ON (like --cuda) or OFF (even if there is a GPU)
+# GSNAV_CUDA          AUTO (if nvcc is found), ON (as --cuda) or OFF
 # GSNAV_JOBS=N        compile N files and run N tests at a time (default: see tools/build_jobs.sh)
-# GSNAV_WERROR=ON     treat warnings as errors (default: set by the preset)
-# GSNAV_DATA_DIR=DIR  folder of real scenes; tests that need them are skipped if it does not exist
-# ccache is used if it is installed.
+# GSNAV_WERROR=ON     treat warnings as errors (default: as in the preset)
+# GSNAV_DATA_DIR=DIR  folder of real scenes; tests that need them are skipped without it
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // gsnav-replay: shows an episode of an evaluation again, from any camera.
-#include <unistd.h>
-
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -33,69 +31,12 @@ namespace fs = std::filesystem;
 
 struct ReplayOptions {
   std::size_t episode = 0;
-  std::vector<double> eye, target;  // Empty: the agent's own camera.
+  std::vector<double> eye, target;  // empty: the agent's own camera
   std::string frames = "replay";
   std::string video;
   int every = 1;
-};
-
-/// Pipes frames to ffmpeg. ffmpeg writes to a temporary file, which gets the name of the video when it
-/// is complete.
-class Video {
- public:
-  Video() = default;
-  Video(const Video&) = delete;
-  Video& operator=(const Video&) = delete;
-  ~Video() {
-    pipe_.reset();
-    std::error_code none;
-    if (!aside_.empty()) fs::remove(aside_, none);
-  }
-
-  Status open(const std::string& path, int width, int height, double rate) {
-    if (path.find_first_of("'\\\n") != std::string::npos)
-      return {Errc::invalid_argument, "--video: quotes in the path"};
-    path_ = path;
-    aside_ = fs::path(path).replace_extension(std::to_string(::getpid()) + ".part" +
-                                              fs::path(path).extension().string());
-    char command[512];
-    const int n = std::snprintf(
-        command, sizeof command,
-        "ffmpeg -y -loglevel error -f rawvideo -pix_fmt rgb24 -s %dx%d -r %g -i - "
-        "-vf 'pad=ceil(iw/2)*2:ceil(ih/2)*2' -pix_fmt yuv420p '%s'",  // Even size, because yuv420p
-                                                                      // stores colour at half the
-                                                                      // resolution.
-        width, height, rate, aside_.c_str());
-    if (n < 0 || n >= static_cast<int>(sizeof command))
-      return {Errc::invalid_argument, "--video: the path is too long"};
-    std::signal(SIGPIPE, SIG_IGN);  // An early end of ffmpeg is reported instead of ending this program.
-    pipe_.reset(popen(command, "w"));
-    if (pipe_ == nullptr) return {Errc::unsupported, "--video: ffmpeg cannot be run"};
-    return {};
-  }
-  Status add(const std::vector<std::uint8_t>& rgb) {
-    if (std::fwrite(rgb.data(), 1, rgb.size(), pipe_.get()) == rgb.size()) return {};
-    return {Errc::unsupported, "--video: ffmpeg takes no frames; is it installed?"};
-  }
-  Status close() {
-    if (pclose(pipe_.release()) != 0)
-      return {Errc::unsupported, "--video: ffmpeg failed; is it installed?"};
-    return gsnav::replace_file(path_, [this](gsnav::OutputFile& out) -> Status {
-      std::ifstream in(aside_, std::ios::binary);
-      for (std::vector<char> part(1 << 16); in;) {
-        in.read(part.data(), static_cast<std::streamsize>(part.size()));
-        out.write(part.data(), static_cast<std::size_t>(in.gcount()));
-      }
-      return in.eof() ? Status() : Status(Errc::invalid_file, aside_.string() + ": cannot be read");
-    });
-  }
-
- private:
-  struct Close {
-    void operator()(std::FILE* f) const noexcept { pclose(f); }
-  };
-  std::unique_ptr<std::FILE, Close> pipe_;
-  fs::path path_, aside_;
+  int per_action = 1;
+  bool inset = false;
 };
 
 /// Positions and other values at each step. All have the shape [T]...
@@ -111,16 +52,22 @@ struct Track {
   }
 };
 
-/// Draws the agent's body into a picture.
-std::vector<std::uint8_t> with_agent(const std::vector<std::uint8_t>& rgb, const gsnav::Camera& camera,
-                                     const std::vector<float>& depth, const gsnav::World& world) {
-  gsnav_tools::Canvas canvas(camera.width, camera.height, {0, 0, 0});
-  canvas.paste(rgb.data(), camera.width, camera.height, 0, 0);
-  const double radius = world.config().agent_radius, height = world.config().agent_height;
-  const Vec3d at = world.agent().position;
-  const gsnav::Capsule<double> body{at + Vec3d{0, radius, 0}, at + Vec3d{0, height - radius, 0}, radius};
-  gsnav_tools::draw_capsule({canvas, camera, depth}, body, {0.05f, 0.30f, 0.85f}, 0.85f);
-  return canvas.bytes();
+/// Pose of the agent at one moment.
+struct Moment {
+  double time = 0;  ///< seconds on the scene's clock
+  gsnav::AgentPose agent;
+};
+
+/// The moment between a (t = 0) and b (t = 1). The agent moves in a straight line and turns by the
+/// smaller angle.
+Moment between(const Moment& a, const Moment& b, double t) {
+  Moment m = b;
+  if (t == 1) return m;
+  m.time = a.time + t * (b.time - a.time);
+  m.agent.position = a.agent.position + (b.agent.position - a.agent.position) * t;
+  m.agent.yaw = a.agent.yaw + t * std::remainder(b.agent.yaw - a.agent.yaw, 2 * std::numbers::pi);
+  m.agent.pitch = a.agent.pitch + t * (b.agent.pitch - a.agent.pitch);
+  return m;
 }
 
 /// Draws pictures of moments of an episode.
@@ -148,7 +95,7 @@ class Painter {
     return p;
   }
 
-  /// [height][width][3] bytes: what the chosen camera sees.
+  /// Picture of the chosen camera, [height][width][3] bytes.
   gsnav::Result<std::vector<std::uint8_t>> paint(const Moment& m) {
     if (!fixed_) return view(own_camera(m, 1), m.time);
     auto rgb = view(*fixed_, m.time);
@@ -177,7 +124,7 @@ class Painter {
  private:
   explicit Painter(gsnav::Renderer renderer) : renderer_(std::move(renderer)) {}
 
-  /// The agent's own camera, its image `share` times smaller.
+  /// The agent's own camera with an image that is `share` times smaller.
   gsnav::Camera own_camera(const Moment& m, int share) const {
     gsnav::SensorSpec spec = own_;
     for (int& side : spec.resolution) side /= share;
@@ -191,14 +138,14 @@ class Painter {
   }
 
   gsnav::Renderer renderer_;
-  gsnav::Frames<float> frames_;  // its memory is used again
+  gsnav::Frames<float> frames_;  // reused for every picture
   gsnav::SensorSpec own_;
   std::optional<gsnav::Camera> fixed_;
   double radius_ = 0, height_ = 0;
   bool inset_ = false;
 };
 
-/// Follows a replay: keeps its track, and hands pictures to a folder or a video.
+/// Follows a replay: records its track, and writes pictures to a folder or a video.
 class Recorder {
  public:
   Recorder(const Options& o, const ReplayOptions& r, Painter painter)
