@@ -216,8 +216,8 @@ struct SweepBody {
 };
 
 #if defined(GSNAV_HAS_FCL)
-/// FCL on the mixed pairs: the error of its distances against ours in double, and the contacts that it
-/// misses.
+/// FCL on the mixed pairs: the errors of its distances against our kernel in double, and its missed
+/// contacts.
 void fcl_row(benchmark::State& state, bool moving, bool all_meet) {
   const CapsulePairs& pairs = all_meet ? CapsulePairs::meeting() : CapsulePairs::mixed();
   constexpr std::size_t kSome = 20000;

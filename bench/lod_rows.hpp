@@ -18,7 +18,7 @@ enum class LodDraw {
   direct,  ///< every Gaussian, with the asset's own filter
   photo,   ///< every Gaussian, with the photo's filter
   lod,     ///< a cut
-  seen,    ///< with the asset's own filter, only what is visible from the camera's cell
+  seen,    ///< with the asset's own filter, only Gaussians visible from the camera's cell
 };
 
 /// Views, and the image that a photo of each would have: O_photo(kLodPhoto).

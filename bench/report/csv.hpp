@@ -109,7 +109,7 @@ gsnav::Result<std::vector<Row>> parse_csv(const std::string& text, const std::st
 class CsvFile {
  public:
   /// Starts the file; with `resume` it keeps the rows of an existing file. Errors: file_not_found
-  /// (cannot be written), invalid_file (the file to resume is not one of the report's).
+  /// (cannot be written), invalid_file (the file to resume is not a CSV of the report).
   static gsnav::Result<CsvFile> open(const std::filesystem::path& path, bool resume);
 
   gsnav::Status add(Row row);

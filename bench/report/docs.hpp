@@ -9,8 +9,8 @@
 
 namespace gsnav_report {
 
-/// The page docs/notes/approximations.md as Markdown: each approximation, its knob, its measured error and its
-/// gain in speed. `command`: the command that made the page, for its first line.
+/// The page docs/notes/approximations.md as Markdown: each approximation, its knob, its measured error
+/// and its gain in speed. `command`: the command that made the page, for its first line.
 std::string approximations_page(const Table& table, const std::string& command);
 
 /// Writes approximations_page. Errors: file_not_found if the file cannot be written.

@@ -11,8 +11,8 @@
 namespace gsnav_report {
 
 /// Rows of a Google Benchmark JSON file: one per benchmark and counter, with the counter's name in
-/// `error_unit` and its value in `error_max`. A benchmark without counters gets one row. Of repetitions,
-/// only the median is used if the file has it. Errors: file_not_found, invalid_file naming the
+/// `error_unit` and its value in `error_max`. A benchmark without counters gets one row. If the file has
+/// the median of repetitions, only the median gets rows. Errors: file_not_found, invalid_file naming the
 /// benchmark.
 gsnav::Result<std::vector<Row>> kernel_rows(const std::filesystem::path& path);
 

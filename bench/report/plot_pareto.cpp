@@ -28,8 +28,8 @@ const Measure kMeasures[] = {
     {"flip_mean", "FLIP, mean", "", 1, false, {"rgbd", "rgb", ""}},
 };
 
-/// Whether a row measures an approximation. The knobs `response` and `compat` change what is correct, so
-/// that their difference from the contract is no error.
+/// Whether a row measures an approximation. The knobs `response` and `compat` change the correct image,
+/// so that their difference from the contract is no error.
 bool is_approximation(const Row& r) {
   return is_plain(r) || (r.get("knob") != "response" && r.get("knob") != "compat");
 }

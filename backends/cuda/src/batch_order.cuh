@@ -6,8 +6,8 @@
 
 #include "batch_args.cuh"
 
-// Sorting of a tile's list, as far as it is read (docs/notes/cuda.md). All threads of a block must call every
-// function together. Before a call they must have finished using memory lent to them.
+// Sorting of a tile's list, as far as it is read (docs/notes/cuda.md). All threads of a block must call
+// every function together. Before a call they must have finished using memory lent to them.
 
 namespace gsnav::cuda {
 

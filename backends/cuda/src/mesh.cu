@@ -6,8 +6,8 @@
 #include "gsnav/backends/cuda/device.cuh"
 #include "mesh_work.cuh"
 
-// Meshes on the device (docs/reference/composition.md), with one vertex, triangle or pixel per thread. There are
-// no tile lists: an atomic maximum of PixelWord finds the triangle that a pixel shows.
+// Meshes on the device (docs/reference/composition.md), with one vertex, triangle or pixel per thread.
+// There are no tile lists: an atomic maximum of PixelWord finds the triangle that a pixel shows.
 
 namespace gsnav {
 

@@ -27,6 +27,8 @@ struct ImageError {
 };
 
 /// Compares two images of colours or alphas, shape [pixels][channels].
+/// @param reference, test The images.
+/// @param channels Values per pixel.
 /// @param excluded Shape [pixels] or empty. Pixels with a nonzero value are excluded from everything
 /// except `psnr`. Fractions refer to the remaining pixels.
 /// @return invalid_argument if sizes disagree or no pixel remains.

@@ -161,6 +161,7 @@ class NavMesh {
   using Triangle = std::array<std::uint32_t, 3>;
 
   /// Builds a NavMesh from triangles. The result is bit-identical for any number of threads.
+  /// @param settings Agent, cell sizes and limits.
   /// @param vertices Positions, metres, Y up, at any distance from the world origin.
   /// @param triangles Indices. A triangle can be walked on if it is counter-clockwise seen from above.
   /// @param threads Threads that build tiles if `settings.tile_size` is set. 0: one thread per core, at
@@ -247,6 +248,8 @@ class NavMesh {
   /// @param height World height, metres. A cell is walkable if surface lies within `max_height_delta`
   /// metres of it.
   /// @param metres_per_cell Cell size, metres.
+  /// @param max_height_delta Largest distance of a walkable surface from `height`, metres.
+  /// @param layout Position of the grid and of the tests.
   /// @return invalid_argument if the cell size is not positive, if the grid has more than 2^28 cells, or
   /// if, with TopDownLayout::habitat, a cell is larger than the mesh.
   Result<TopDownMap> top_down_map(double height, double metres_per_cell, double max_height_delta = 0.5,
@@ -290,6 +293,8 @@ class NavMesh {
   /// If `start.poly` is unknown or does not contain the position, the start is snapped first:
   /// horizontally within the agent's radius plus 0.1 m, vertically within twice its climb height plus
   /// 0.1 m. If that fails, `points` is empty.
+  /// @param start Point to start from.
+  /// @param displacement Displacement in world coordinates, metres.
   /// @param slide True: slide along edges of the mesh. False: stop at the first edge.
   SurfaceWalk walk(const NavPoint& start, const Vec3d& displacement, bool slide) const;
 

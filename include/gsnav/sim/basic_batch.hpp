@@ -39,6 +39,10 @@ template <Backend B>
 class BasicBatchSimulator {
  public:
   /// Creates a batch over scenes in memory.
+  /// @param backend Backend that renders. It must outlive the batch.
+  /// @param scenes Scenes that episodes refer to by index.
+  /// @param config Settings for all environments.
+  /// @param environments Number of environments.
   /// @param next_episode Called for each new episode of each environment. See EpisodeSource.
   /// @return invalid_argument, with the field, sensor or scene at fault; unsupported, with the sensor,
   /// if its images cannot stay where BatchConfig::images asks for them.
@@ -297,7 +301,7 @@ Result<BasicBatchSimulator<B>> make_batch_simulator(
                                         std::move(next_episode));
 }
 
-/// Calls BasicBatchSimulator<B>::create_from_library.
+/// Calls `BasicBatchSimulator<B>::create_from_library`, whose comment describes the arguments.
 template <Backend B>
 Result<BasicBatchSimulator<B>> make_batch_simulator_from_library(B& backend,
                                                                  std::shared_ptr<SceneLibrary> library,

@@ -45,6 +45,9 @@ class BasicSimulator {
     return create(backend, std::make_shared<const SimulatorScene>(std::move(scene)), std::move(config));
   }
   /// Creates a simulator that shares a scene with others.
+  /// @param backend Backend that renders. It must outlive the simulator.
+  /// @param scene Scene to simulate.
+  /// @param config Settings.
   /// @param others Adds bodies to the scene's avatars. They are numbered after the avatars.
   /// @return invalid_argument, with the field, sensor or asset at fault.
   static Result<BasicSimulator> create(B& backend, std::shared_ptr<const SimulatorScene> scene,
@@ -143,6 +146,7 @@ class BasicSimulator {
 
   /// Renders the scene at the current time from any camera, for a map or a spectator view. The images
   /// are valid until the next call.
+  /// @param camera Camera in world coordinates.
   /// @param outputs Bitmask of kRgb, kAlpha, ...
   /// @return the errors of BasicRenderer::render.
   Result<const Frames<float>*> render(const Camera& camera, unsigned outputs = kRgb) {

@@ -29,9 +29,9 @@ struct SimulatorConfig {
   /// How sensors render. Leave `outputs` at its default, because the sensors determine it. `sort_order`
   /// comes from the first asset of the scene; any value other than the default or that one is an error.
   RenderConfig render{};
-  /// Render the assets at a level of detail that depends on the distance (profile `lod`, docs/concepts/scene.md).
-  /// Implies Exponential::fast. Every asset needs a tree (SceneAsset::lod). There is no hysteresis: an
-  /// image depends only on its camera.
+  /// Render the assets at a level of detail that depends on the distance (profile `lod`,
+  /// docs/concepts/scene.md). Implies Exponential::fast. Every asset needs a tree (SceneAsset::lod).
+  /// There is no hysteresis: an image depends only on its camera.
   std::optional<LodChoice> lod{};
   /// Render only the Gaussians that are visible from the camera's cell (VisibleSets), with the rules of
   /// the profile `fast`. Every asset needs visible sets (SceneAsset::visible). From positions outside

@@ -141,6 +141,7 @@ class EpisodeTracker {
   }
 
   /// Metrics as if the episode ended now.
+  /// @param stop_called True if the agent has called stop.
   /// @param geodesic, euclidean Remaining distance to the goal, along the surface and straight, metres.
   /// @param success_distance The episode succeeds if `geodesic` is below it, metres.
   EpisodeMetrics finish(bool stop_called, double geodesic, double euclidean,

@@ -73,6 +73,7 @@ Status validate_assets(const SimulatorScene& scene);
 Status validate_detail(const SimulatorScene& scene, const DetailChoice& choice);
 
 /// Appends the motion of the scene's avatars over [t0, t1], numbered in scene order.
+/// @param scene Scene with the avatars.
 /// @param t0, t1 Interval on the scene's clock, seconds.
 /// @param out Receives the moving capsules.
 /// @param before The capsules of an interval that ended at t0, or null. They halve the time and do not

@@ -93,6 +93,7 @@ class World {
   /// @return the errors of step(Action).
   Result<StepInfo> step(const VelocityCommand& command);
   /// Performs one action among bodies that the caller provides, so that several worlds can share them.
+  /// @param action Action to perform.
   /// @param bodies Shape [substeps]. Element k covers [tick(k), tick(k + 1)].
   /// @return the errors of step(Action); invalid_argument for a wrong number of sets.
   Result<StepInfo> step(Action action, std::span<const CapsuleSet* const> bodies);

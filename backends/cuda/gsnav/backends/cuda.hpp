@@ -40,13 +40,15 @@ struct CudaSpace {};
 
 /// Backend for one NVIDIA GPU.
 /// It uses the same kernels as the CPU. Keys, footprints, and float32 images of the profile `exact` are
-/// bit-identical to those of the CPU. Images of `fast` differ by the CPU's exponential (docs/notes/cuda.md).
-/// All work goes to one stream, in order. Link gsnav::cuda; the header itself does not need CUDA.
+/// bit-identical to those of the CPU. Images of `fast` differ by the CPU's exponential
+/// (docs/notes/cuda.md). All work goes to one stream, in order. Link gsnav::cuda; the header itself does
+/// not need CUDA.
 ///
 /// If the driver rejects a call, the next `synchronize()` returns the error. Later calls before that do
 /// nothing.
 class CudaBackend {
  public:
+  /// Memory of the backend's arrays.
   using memory_space = CudaSpace;
   /// Renderer for many cameras at once (optional member of a backend). Defined in
   /// gsnav/backends/cuda/batch.hpp, which is included below.
@@ -104,19 +106,33 @@ class CudaBackend {
                   std::uint32_t* values_alt, std::size_t n, int bits);
 
   // Stages with their own kernels (core/stages.hpp).
+  /// Projects a set.
   void run(stage::Project, const ViewedSet<float>& args, const ProjectOutputs<float>& out);
+  /// Counts the splats of each tile.
   void run(stage::CountTiles, const BinArgs<float>& args, const NoCull& cull);
+  /// Counts the splats of each tile that are not behind a mesh.
   void run(stage::CountTiles, const BinArgs<float>& args, const MeshCull<float>& cull);
+  /// Writes the splats to the lists of their tiles.
   void run(stage::ScatterTiles, const BinArgs<float>& args, const NoCull& cull);
+  /// Writes the splats that are not behind a mesh to the lists of their tiles.
   void run(stage::ScatterTiles, const BinArgs<float>& args, const MeshCull<float>& cull);
+  /// Blends the splats of each tile.
   void run(stage::Blend, const RasterArgs<float>& args);
+  /// Blends splats and meshes.
   void run(stage::BlendWithMeshes, const RasterArgs<float>& args);
+  /// Rasterizes the triangles of meshes.
   void run(stage::RasterizeMesh, const MeshRasterArgs<float>& args);
+  /// Projects the vertices of meshes.
   void run(stage::Each, std::size_t chunks, const ProjectMeshVertices<float>& k);
+  /// Counts the pieces of triangles in each chunk.
   void run(stage::Each, std::size_t chunks, const CountMeshTriangles<float>& k);
+  /// Computes the index of each chunk's first piece.
   void run(stage::Each, std::size_t one, const ScanMeshTriangles<float>& k);
+  /// Writes the pieces of triangles in each chunk.
   void run(stage::Each, std::size_t chunks, const WriteMeshTriangles<float>& k);
+  /// Shades rows of pixels of meshes.
   void run(stage::Each, std::size_t rows, const ShadeMeshRow<float>& k);
+  /// Skins one avatar.
   void run(stage::Skin, const SkinningArgs<float>& args) { run(stage::SkinAll{}, std::span(&args, 1)); }
   /// Skins several avatars: one launch for all with four influences, one for all with eight.
   void run(stage::SkinAll, std::span<const SkinningArgs<float>> avatars);

@@ -32,6 +32,8 @@ struct DepthError {
 
 /// Compares two depth images, shape [pixels], metres. A value that is 0, negative or not finite means no
 /// return.
+/// @param reference, test The depth images.
+/// @param reference_alpha Alpha of the reference, shape [pixels].
 /// @param excluded Shape [pixels] or empty. Pixels with a nonzero value are not compared.
 /// @param options Further limits. Pixels without a return in the reference are not subject to
 /// `max_range`.

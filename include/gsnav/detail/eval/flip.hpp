@@ -25,6 +25,7 @@ struct Flip {
 /// Computes LDR-FLIP (Andersson et al. 2020) with the parameters of the paper and replicated borders.
 /// @param reference, test Shape [height][width][3], sRGB-encoded. Values are clamped to [0, 1]; NaN
 /// counts as 0.
+/// @param width, height Size of both images in pixels.
 /// @param pixels_per_degree Resolution of the view, in [1, 1000].
 /// @return invalid_argument if a size is not positive or disagrees, or the resolution is out of range.
 Result<Flip> flip(Samples reference, Samples test, int width, int height,
@@ -35,6 +36,7 @@ Result<Flip> flip(Samples reference, Samples test, int width, int height,
 std::array<std::uint8_t, 3> magma(double t) noexcept;
 
 /// Converts an error map to colours.
+/// @param error Error map, shape [N].
 /// @param full_scale Errors of this value and above are light yellow.
 /// @return bytes, shape [N][3].
 std::vector<std::uint8_t> colorize_error(std::span<const float> error, float full_scale = 1.0f);

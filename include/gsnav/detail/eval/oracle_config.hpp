@@ -32,11 +32,15 @@ enum class OracleOrder : std::uint8_t {
 
 /// Half-open rectangle of pixels: [x0, x1) x [y0, y1).
 struct PixelRect {
-  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;  ///< Bounds, pixels. x1 and y1 are excluded.
 
+  /// Whether the rectangle has no pixels.
   bool empty() const noexcept { return x0 >= x1 || y0 >= y1; }
+  /// Width in pixels, 0 if empty.
   std::size_t width() const noexcept { return empty() ? 0 : static_cast<std::size_t>(x1 - x0); }
+  /// Height in pixels, 0 if empty.
   std::size_t height() const noexcept { return empty() ? 0 : static_cast<std::size_t>(y1 - y0); }
+  /// Pixels that both rectangles have.
   PixelRect intersection(const PixelRect& o) const noexcept {
     return {max(x0, o.x0), max(y0, o.y0), min(x1, o.x1), min(y1, o.y1)};
   }
@@ -69,8 +73,8 @@ struct OracleConfig {
   /// kNegligibleAlpha. False: evaluate every Gaussian at every pixel.
   bool boxed = true;
   PixelRect crop{};  ///< Part of the image to render. All 0: everything.
-  /// Mesh to composite: it hides the Gaussians behind it and closes its pixels (docs/reference/composition.md).
-  /// May be null. Must outlive the call.
+  /// Mesh to composite: it hides the Gaussians behind it and closes its pixels
+  /// (docs/reference/composition.md). May be null. Must outlive the call.
   const OracleMesh* mesh = nullptr;
 };
 
@@ -79,12 +83,13 @@ struct OracleConfig {
 /// (background included). Omitting n Gaussians therefore changes the colour by less than n c 2^-40 and
 /// alpha by less than n 2^-40, or 9.1e-7 c for a million.
 inline constexpr double kLog2NegligibleAlpha = -40;
+/// The alpha itself, 2^kLog2NegligibleAlpha.
 inline constexpr double kNegligibleAlpha = 0x1p-40;
 
-/// Margins within which float32 may rightly decide a comparison differently. kUndecidedRelative:
-/// relative distance of alpha from alpha_min, and of T from transmittance_min. kUndecidedCrossing:
-/// absolute distance of T from the crossing that defines a depth.
+/// Margin within which float32 may rightly decide a comparison differently: relative distance of alpha
+/// from alpha_min, and of T from transmittance_min.
 inline constexpr double kUndecidedRelative = 1e-5;
+/// The same for depths: absolute distance of T from the crossing that defines a depth.
 inline constexpr double kUndecidedCrossing = 1e-3;
 /// Margin between a Gaussian's depth along the ray and that of the mesh, metres.
 inline constexpr double kUndecidedMesh = 1e-4;
@@ -98,6 +103,7 @@ struct OracleCounts {
   std::uint64_t evaluations = 0;  ///< Number of pairs blended, which no renderer can avoid.
   std::uint64_t order_flips = 0;  ///< Number of pixels marked in order_flip.
 
+  /// Adds the counts of another image.
   OracleCounts& operator+=(const OracleCounts& o) noexcept {
     gaussians += o.gaussians;
     visible += o.visible;
@@ -111,7 +117,7 @@ struct OracleCounts {
 /// Reference images of one camera or its crop, in float64, row-major from the top-left pixel. Masks are
 /// 0 or 1.
 struct OracleFrames {
-  std::size_t width = 0, height = 0;
+  std::size_t width = 0, height = 0;      ///< Size of the images in pixels.
   std::vector<double> rgb;                ///< Shape [height][width][3], over the background, not
                                           ///< clamped.
   std::vector<double> alpha;              ///< Shape [height][width], 1 - transmittance.
@@ -132,8 +138,9 @@ struct OracleFrames {
   /// the float32 key, else the float32 key. The test is exact, because a list is out of order if and
   /// only if two neighbours are.
   std::vector<std::uint8_t> order_flip;
-  OracleCounts counts;
+  OracleCounts counts;  ///< Work that the images took.
 
+  /// Sets the size and fills all images with zeros.
   void resize(std::size_t w, std::size_t h) {
     width = w;
     height = h;

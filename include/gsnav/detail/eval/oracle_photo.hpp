@@ -99,6 +99,9 @@ class PhotoReducer {
 ///
 /// Works in bands of about 2^20 fine pixels, which take 90 MB in addition to the memory of
 /// oracle_render.
+/// @param backend Backend on the host that runs the reference renderer.
+/// @param sets Gaussians to render.
+/// @param camera Camera, with the resolution of the result.
 /// @param k Factor, in [1, 16].
 /// @param config `crop` is in pixels of `camera`. Counts are those of the fine image.
 /// @return the errors of oracle_render; invalid_argument if k is out of range or the fine image too

@@ -19,6 +19,7 @@ struct Ssim {
 /// completely inside the image count. Along a side shorter than 11 the window is cut to the largest odd
 /// length that fits.
 /// @param reference, test Shape [height][width][3]. Values are clamped to [0, 1]; NaN counts as 0.
+/// @param width, height Size of both images in pixels.
 /// @return invalid_argument if a size is not positive or disagrees.
 Result<Ssim> ssim(Samples reference, Samples test, int width, int height);
 

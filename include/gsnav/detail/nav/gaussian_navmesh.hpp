@@ -74,8 +74,8 @@ struct GaussianNavReport {
 
 /// A NavMesh and the statistics of its construction.
 struct NavMeshFromGaussians {
-  NavMesh mesh;
-  GaussianNavReport report;
+  NavMesh mesh;              ///< The mesh.
+  GaussianNavReport report;  ///< Statistics of its construction.
 };
 
 /// Default settings for a floor made of Gaussians: NavMeshSettings with a voxel height of 0.05 m.
@@ -115,7 +115,10 @@ Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
 /// Builds a NavMesh from Gaussians and triangles together, both in world coordinates. Obstacles and
 /// floors may come from either, for example furniture made of Gaussians in a room that is a mesh. Where
 /// both have a floor, the height is that of the triangles.
+/// @param settings Agent and cell sizes.
+/// @param sets Gaussians, with their transforms to the world.
 /// @param vertices, triangles See NavMesh::build.
+/// @param options Rules by which Gaussians become solid.
 /// @return the errors of the other overload; invalid_argument for a vertex or index out of range.
 Result<NavMeshFromGaussians> build_navmesh(const NavMeshSettings& settings,
                                            std::span<const GaussianSet> sets,

@@ -19,6 +19,9 @@ namespace gsnav {
 class GeodesicField {
  public:
   /// Computes the field.
+  /// @param mesh Mesh of the field. It must outlive the field.
+  /// @param goals Goals, world coordinates, metres.
+  /// @param options Limits of snapping the goals to the mesh.
   /// @param relative_error Distances are never below the exact ones, and at most this fraction above
   /// them. 0 to 0.1; 0 is exact up to rounding.
   /// @return invalid_argument if there are no goals or the error is out of range; nothing_navigable,

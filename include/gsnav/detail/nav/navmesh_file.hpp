@@ -24,11 +24,14 @@ namespace gsnav {
 Result<NavMesh> load_navmesh(const std::filesystem::path& path);
 
 /// Reads a NavMesh file from memory.
+/// @param bytes Content of the file.
 /// @param name Name of the file in error messages.
 Result<NavMesh> parse_navmesh(std::span<const std::byte> bytes, const std::string& name);
 
 /// Writes a NavMesh file with 32-bit references, which Habitat can read. Coordinates are world
 /// coordinates in float32.
+/// @param mesh Mesh to write.
+/// @param path File to write.
 /// @param version 2 stores the settings. 1, for RecastDemo and the first releases of Habitat, stores
 /// only the agent's size in each tile.
 /// @return invalid_argument for another version; file_not_found if the file cannot be created;

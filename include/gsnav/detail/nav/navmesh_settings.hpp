@@ -51,7 +51,7 @@ struct NavMeshSettings {
 
   /// Compares the settings that a NavMesh file stores, rounded to float32. Settings that were saved and
   /// loaded therefore compare equal. `tile_size` and `max_cells` are not stored and not compared; they
-  /// do not change what can be walked on.
+  /// do not change the walkable surface.
   friend bool operator==(const NavMeshSettings& a, const NavMeshSettings& b) noexcept;
 };
 

@@ -50,8 +50,8 @@ class CapsuleSet {
 
   /// Consecutive capsules of one avatar, with the box that they sweep during the interval.
   struct Group {
-    std::size_t first = 0, count = 0;
-    Aabb<double> swept{};
+    std::size_t first = 0, count = 0;  ///< Index of the first capsule; number of capsules.
+    Aabb<double> swept{};              ///< Box that the capsules sweep, metres.
   };
   /// All groups.
   std::span<const Group> groups() const noexcept { return groups_; }

@@ -26,7 +26,9 @@ struct ClearPath {
 /// Moves a shortest path away from the corners that it touches. The path is treated as an elastic band
 /// (Quinlan and Khatib, 1993) that edges within `clearance` push away. Its ends stay in place, every leg
 /// lies on the surface, and it passes obstacles on the same side as before.
+/// @param mesh Mesh that the path lies on.
 /// @param points Points of the path, metres, as returned by find_path.
+/// @param options Clearance and limits.
 /// @return invalid_argument for an option out of range, fewer than two points or a value that is not
 /// finite; nothing_navigable if a point is off the mesh or two are on different islands.
 Result<ClearPath> keep_clear(const NavMesh& mesh, std::span<const Vec3d> points,

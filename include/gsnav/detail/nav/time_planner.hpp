@@ -65,7 +65,11 @@ struct TimedPlan {
 /// The plan is the fastest on the lattice. If no body is in the way, it is the shortest path; it takes
 /// the length divided by the speed, plus at most one tick per corner and one for the end. The function
 /// has no state and is thread-safe.
+/// @param mesh Mesh that the agent walks on.
+/// @param agent Position and size of the agent at the beginning.
+/// @param goal Goal, world coordinates, metres.
 /// @param ticks Bodies in consecutive intervals; each begins where the one before ends.
+/// @param options Speed and limits of the search.
 /// @param field Distances to `goal`. Null: computed here.
 TimedPlan plan_in_time(const NavMesh& mesh, const AgentState& agent, const Vec3d& goal,
                        std::span<const CapsuleSet> ticks, const TimePlannerOptions& options = {},

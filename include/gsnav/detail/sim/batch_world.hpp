@@ -114,6 +114,8 @@ class BatchWorld {
   /// a mask of the wrong size or a mask before the first reset.
   Status reset(const ParallelFor& run, std::span<const std::uint8_t> mask = {});
   /// Performs one action per environment.
+  /// @param run Runs the environments in parallel.
+  /// @param actions One action per environment.
   /// @param before_reset With AutoReset::same_step, called when episodes have ended. info().finished is
   /// then set and the worlds still show the end of their episodes.
   /// @return invalid_argument, or errors of World::step or of the callback, with the environment.

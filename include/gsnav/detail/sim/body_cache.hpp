@@ -17,13 +17,13 @@ class BodyCache {
  public:
   /// A scene and an interval.
   struct Key {
-    std::size_t scene = 0;
+    std::size_t scene = 0;      ///< Index of the scene.
     double t0 = 0.0, t1 = 0.0;  ///< Interval, seconds.
     bool operator==(const Key&) const = default;
   };
   /// Bodies of one key.
   struct Entry {
-    CapsuleSet bodies;
+    CapsuleSet bodies;                 ///< The bodies during the interval.
     bool made = false;                 ///< Set by the caller once `bodies` is filled in.
     std::list<Key>::iterator place{};  ///< Position in the list of use.
   };

@@ -15,6 +15,7 @@ namespace gsnav {
 
 /// Viewing direction of a pixel of a sensor: a unit vector in the camera's frame (x right, y down, z
 /// forward). Nothing if the model does not see there.
+/// @param spec Sensor with its camera model and resolution.
 /// @param u, v Position in pixels from the top-left corner of the image. Pixel centres are at
 /// half-integers.
 std::optional<Vec3d> sensor_ray(const SensorSpec& spec, double u, double v) noexcept;
@@ -43,6 +44,8 @@ class CubeMap {
   /// Writes the colour image of the sensor.
   /// @param face_images Images of the faces, shape [side][side][channels]. Only the elements in faces()
   /// are read.
+  /// @param channels Number of channels of the images.
+  /// @param out Image of the sensor, shape [height][width][channels].
   void sample_color(const std::array<const float*, kFaces>& face_images, std::size_t channels,
                     std::span<float> out) const;
   /// Writes the depth image of the sensor. Planar z of the faces becomes distance along the ray.

@@ -43,7 +43,7 @@ class FrameBatch {
   }
 
   /// Draws frames, all of which must be supported. `to` says whether their images are in host memory or
-  /// in the backend's. Waits for the backend. Errors: those of rendering. Throws gsnav::Error
+  /// in backend memory. Waits for the backend. Errors: those of rendering. Throws gsnav::Error
   /// (out_of_memory).
   Status render(std::span<const FrameJob<float>> jobs, CopyKind to) {
     for (Known& k : known_) k.jobs.clear();
@@ -137,8 +137,8 @@ class FrameBatch {
     return {};
   }
 
-  /// Fills sets_ and cameras_ and the lists that the cameras refer to. A set of several frames, such as
-  /// a scene's, is listed once.
+  /// Fills sets_ and cameras_ and the lists that the cameras refer to. A set that several frames share
+  /// is listed once.
   void list_sets(std::span<const std::size_t> which, std::span<const FrameJob<float>> jobs) {
     sets_.clear();
     places_.clear();
@@ -211,7 +211,7 @@ class FrameBatch {
   B* backend_;
   std::vector<Known> known_;
   Buffer<float, B> scratch_;
-  // Of the current group:
+  // Data of the current group:
   std::vector<GaussianSet> sets_;
   std::unordered_multimap<const float*, std::uint32_t> places_;  // index in sets_ by address of means
   std::vector<std::uint32_t> lists_;

@@ -15,6 +15,8 @@ namespace gsnav {
 /// For an avatar that stays outside the agent's personal space and farther away than another avatar, the
 /// result is only a lower bound, which is all that the metrics need.
 /// @param path Path of the agent (StepResult::path). It stands still after the last point.
+/// @param radius, height Size of the agent, metres.
+/// @param bodies Motion of the avatars during the tick, one group per avatar.
 /// @param out Resized to bodies.groups().size(). Element k belongs to group k.
 void closest_approach(std::span<const WalkPoint> path, double radius, double height,
                       const CapsuleSet& bodies, std::vector<double>& out);

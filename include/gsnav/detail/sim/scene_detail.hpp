@@ -13,8 +13,8 @@
 
 namespace gsnav {
 
-/// Selects which part of a scene's assets is drawn: by level of detail (docs/concepts/scene.md), by visibility from
-/// the camera's cell, or both.
+/// Selects which part of a scene's assets is drawn: by level of detail (docs/concepts/scene.md), by
+/// visibility from the camera's cell, or both.
 struct SceneDetail {
   /// Data of one asset.
   struct Asset {

@@ -32,6 +32,7 @@ struct SceneEntry {
 class SceneLibrary {
  public:
   /// Creates a library.
+  /// @param scenes Names of the scenes, with the functions that load them.
   /// @param budget Memory budget in bytes, as counted by scene_bytes(). Scenes in use may exceed it.
   /// @return invalid_argument if there are no scenes or one has no load function.
   static Result<std::shared_ptr<SceneLibrary>> create(std::vector<SceneEntry> scenes,

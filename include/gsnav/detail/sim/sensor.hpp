@@ -93,6 +93,7 @@ bool same_camera(const SensorSpec& a, const SensorSpec& b) noexcept;
 
 /// Camera of a pinhole sensor on an agent. This is the only place where Habitat's camera (x right, y up,
 /// looking along -z) becomes the library's (x right, y down, looking along +z).
+/// @param spec Sensor with SensorModel::pinhole.
 /// @param base World position of the agent's base, metres.
 /// @param rotation Orientation of the agent.
 /// @param pitch Tilt of the sensor, radians, positive upwards.

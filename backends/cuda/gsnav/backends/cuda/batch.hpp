@@ -17,7 +17,8 @@ struct BatchCamera {
   /// Indices into the sets of the call, each at most once. They are blended in one depth order; equal
   /// depths are ordered by position in this list. Empty: all sets in order. Read during the call only.
   std::span<const std::uint32_t> sets;
-  /// Meshes to composite with these Gaussians (docs/reference/composition.md). Arrays are in device memory.
+  /// Meshes to composite with these Gaussians (docs/reference/composition.md). Arrays are in device
+  /// memory.
   MeshFrame meshes{};
   /// Selection::seen of each of `sets` (of all sets if that is empty) for this camera. It lets cameras
   /// at different positions share one set. Empty: use the sets' own. Read during the call; the bits are
@@ -47,8 +48,8 @@ struct BatchStats {
   MeshStats meshes;       ///< Statistics of the meshes.
 };
 
-/// Renders many cameras in one call on one GPU (docs/notes/cuda.md). Images are bit-identical to those of
-/// `BasicRenderer<float, CudaBackend>` for each camera alone, whatever the batch.
+/// Renders many cameras in one call on one GPU (docs/notes/cuda.md). Images are bit-identical to those
+/// of `BasicRenderer<float, CudaBackend>` for each camera alone, whatever the batch.
 ///
 /// @code
 /// gsnav::CudaBatchRenderer batch(cuda, config);

@@ -26,8 +26,10 @@ namespace gsnav {
 class GlImage {
  public:
   /// Registers a texture.
+  /// @param backend Backend whose images are written. It must outlive this object.
   /// @param texture Name of a GL_TEXTURE_2D of width x height texels with format GL_RGBA8 (for
   /// write_rgb8) or GL_R32F (for write_depth). It must outlive this object.
+  /// @param width, height Size of the texture in texels.
   /// @return invalid_argument for another size or format; backend_failure, with the driver's message,
   /// for example if no context is current or it belongs to another GPU.
   static Result<GlImage> create(CudaBackend& backend, unsigned texture, int width, int height);
