@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// Many cameras in one call on a GPU: milliseconds a frame, its error against float64 and its memory in
-// one row.
+// Many cameras in one call on a GPU. Each row has the milliseconds per frame, the error against float64
+// and the memory.
 //
 //   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_batch [--size 256x256]
-//   [--compact] [--balls 8]
-//       [--rgb] [--visible] [--visible-rows 8] [--visible-weight 0.001] [batch sizes...]
+//       [--compact] [--balls 8] [--rgb] [--visible] [--visible-rows 8] [--visible-weight 0.001]
+//       [batch sizes...]
 //
-// Without the variables: the embedded flat from its four viewpoints. A batch larger than the number of
-// views repeats them from slightly different places. Times are the device's, between events on the
-// stream; `host us` is how long the call takes that asks for them. --balls: so many meshes of 4000
-// triangles stand before the first cameras, seen by all. --rgb: colours alone, as most renderers have
-// them, no depth (its error is nan) and no alpha. --visible: each camera draws only what is seen from
-// its cell (VisibleSettings::rows, min_weight); the images of all views are compared with those of all
-// that is there.
+// Without the variables, the scene is the embedded flat from its four viewpoints. A batch larger than
+// the number of views repeats the views from slightly different places. Times are measured on the
+// device, between events on the stream. `host us` is the duration of the call that enqueues the work.
+//
+// --balls N: N meshes of 4000 triangles stand in front of the first cameras, and all cameras see them.
+// --rgb: colours alone, without depth (its error is nan) and alpha, as most renderers measure.
+// --visible: each camera draws only the Gaussians that are visible from its cell (VisibleSettings::rows,
+// min_weight). The images of all views are then compared with images of the whole scene.
 #include <cuda_runtime.h>
 
 #include <algorithm>
@@ -42,7 +43,7 @@ int g_width = 256, g_height = 256;
 bool g_rgb_alone = false;
 constexpr std::size_t kReferenceViews = 4;  ///< compared with float64
 std::vector<MeshInstance> g_meshes;         ///< on the device
-VisibleSets g_visible;                      ///< none: all is drawn
+VisibleSets g_visible;                      ///< empty: every camera draws the whole scene
 
 /// A ball of radius 1.
 SurfaceMesh ball() {
@@ -65,8 +66,8 @@ SurfaceMesh ball() {
   return m;
 }
 
-/// `count` cameras from `first` on: the views, and when they are all taken the views moved by
-/// centimetres.
+/// `count` cameras, the first one with index `first`. Indices beyond the number of views give the same
+/// views again, moved by some centimetres.
 std::vector<BatchCamera> cameras_of(std::size_t first, std::size_t count) {
   const std::vector<Camera> views = gsnav_bench::sized(g_width, g_height);
   std::vector<BatchCamera> batch;
@@ -79,12 +80,12 @@ std::vector<BatchCamera> cameras_of(std::size_t first, std::size_t count) {
   return batch;
 }
 
-/// What cells see, on the device.
+/// Visible sets of the cameras' cells, on the device.
 struct Seen {
   explicit Seen(CudaBackend& cuda) : bits(cuda) {
     bits.upload(g_visible.bits.data(), g_visible.bits.size());
   }
-  /// Has each camera draw what its cell sees, of the call's one set.
+  /// Sets each camera's visible set to the one of its cell. The call has one Gaussian set.
   void choose(std::vector<BatchCamera>& cameras) {
     if (g_visible.cells() == 0) return;
     views.assign(cameras.size(), {});
@@ -126,7 +127,8 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
   const std::size_t batches = std::max<std::size_t>(1, views / count);
   std::vector<double> ms, host_us;
   double pairs = 0;
-  for (int repeat = -1; repeat < kRepeats; ++repeat) {  // the first finds the scratch it takes
+  for (int repeat = -1; repeat < kRepeats; ++repeat) {  // the first one is not counted: it allocates the
+                                                        // scratch
     for (std::size_t b = 0; b < batches; ++b) {
       std::vector<BatchCamera> cameras = cameras_of(b * count, count);
       seen.choose(cameras);
@@ -176,7 +178,7 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
   cudaEventDestroy(end);
 }
 
-/// What sets change: every view with them beside the same without, in `fast`.
+/// Effect of visible sets: draws every view with and without them, in the profile `fast`, and compares.
 void compare_visible(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays) {
   const std::size_t views = gsnav_bench::workload().cameras.size();
   const std::size_t values = 3 * static_cast<std::size_t>(g_width) * static_cast<std::size_t>(g_height);

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames with meshes among the Gaussians: time and error against the float64 merged oracle, in one row.
+// Frames with meshes among the Gaussians. Each row has the time and the error against the float64 oracle
+// of merged images.
 //
 //   bench_composite [WIDTHxHEIGHT]
 //   GSNAV_BENCH_SCENE and GSNAV_BENCH_CAMERAS as for bench_render
 //
-// Before each view stands a ball of triangles, 2 m away: what a sensor that meets furniture sees.
-// `alone`: the frame without meshes; `meshes`: without Gaussians; `glass`: the balls seen through, front
-// and back, whose errors tests/hard_cases has; `hard_depth`: Habitat-GS's rule on the same scene. Errors
-// are the worst of the views; median_ms is over views, each by its median, from call to images in host
-// memory; pairs of (tile, Gaussian) are means. On a GPU too, where there is one.
+// A ball of triangles stands 2 m in front of each view, as furniture would. Rows: `alone` is the frame
+// without meshes, `meshes` the frame without Gaussians. `glass` has transparent balls whose front and
+// back are both drawn; tests/hard_cases has its errors. `hard_depth` is Habitat-GS's rule on the same
+// scene.
+//
+// Errors are the worst of the views. median_ms is the median over views of each view's median, from the
+// call until the images are in host memory. Numbers of (tile, Gaussian) pairs are means. Where there is
+// a GPU, it has rows too.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -38,7 +42,7 @@ namespace {
 
 constexpr int kRepeats = 15;
 
-/// A ball with a wavy surface: no two of its triangles look alike.
+/// A ball with a wavy surface, so that no two of its triangles look alike.
 SurfaceMesh ball(std::uint32_t around, std::uint32_t down) {
   using std::numbers::pi;
   SurfaceMesh m;
@@ -67,7 +71,7 @@ struct Row {
   const char* name;
   bool gaussians, meshes;
   Composite composite;
-  bool through = false;  ///< balls of glass, front and back
+  bool through = false;  ///< transparent balls, front and back drawn
 };
 
 struct Shown {
@@ -75,7 +79,7 @@ struct Shown {
   const MeshScene& scene;
   const std::vector<MeshInstance>& instances;  ///< of the scene's first mesh
   const std::vector<Camera>& cameras;
-  const std::vector<eval::OracleFrames>& truth;  ///< one a camera
+  const std::vector<eval::OracleFrames>& truth;  ///< one per camera
 };
 
 template <class B>

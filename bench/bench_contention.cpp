@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// A frame's time beside threads that do nothing but keep cores busy, one and as many as there are cores:
-// what is left of the speed, against a fair share.
+// Time of a frame while other threads keep cores busy (one thread, or one per core), compared with a
+// fair share of the cores.
 //
 //   [OMP_WAIT_POLICY=active|passive] [GOMP_SPINCOUNT=n] bench_contention [WIDTHxHEIGHT]
 //   GSNAV_BENCH_SCENE and GSNAV_BENCH_CAMERAS as for bench_render
 //
-// With T rendering and L busy threads on C cores, whoever schedules fairly gives the frame T / (T + L)
-// of the cores; alone it had as many as it has threads, at most all. From that follows its fair time,
-// and `of fair share` is the measured time over it: 1 is what can be had. A renderer whose threads wait
-// for each other by spinning, or whose barriers each cost a slice of the scheduler, is far above it, and
-// worst beside one busy thread: two threads that spin on one core look to the scheduler as if they had
-// work. `empty region` is a parallel region that does nothing.
+// With T rendering threads and L busy threads on C cores, a fair scheduler gives the frame T / (T + L)
+// of the cores. Without other load the frame has one core per thread, at most C. The fair time follows
+// from both, and `of fair share` is the measured time divided by it: 1 is ideal.
+//
+// A renderer is far above 1 if its threads wait for each other by spinning, or if each of its barriers
+// costs a time slice of the scheduler. It is worst beside one busy thread, because the scheduler cannot
+// tell a spinning thread from a working one. `empty region` is a parallel region that does nothing.
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -32,7 +33,7 @@ namespace {
 
 constexpr int kFrames = 60;
 
-/// Threads that do nothing but add.
+/// Threads that only add numbers.
 class BusyLoad {
  public:
   explicit BusyLoad(unsigned threads) {

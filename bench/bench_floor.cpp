@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The floor of a frame on this machine (floor.hpp): what each unit of work costs by the survey and by
-// loops measured here, and the least time of the workload's frames by both. bench_render divides its
-// times by it.
+// The floor of a frame on this machine (floor.hpp): the cost of each unit of work by the survey and by
+// loops that are measured here, and by both the least time of the workload's frames. bench_render
+// divides its times by the floor.
 //
 //   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_floor [threads]
 #include <algorithm>

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// How much of what is in view lies behind something: the share of the visible Gaussians, and of their
-// chunks, that take part of a pixel's light (alpha times transmittance) somewhere in a 256x256 image.
-// What visible sets could leave out. And what culling leaves out: rows touched for each that reaches a
-// tile (count_culled).
+// Share of the Gaussians in view, and of their chunks, that contribute to an image, which is an upper
+// bound on the work that visible sets can save. A Gaussian contributes if it takes part of some pixel's
+// light (alpha times transmittance) in a 256x256 image. It also prints how much culling saves, as the
+// number of rows that are read for each Gaussian that reaches a tile (count_culled).
 //
 //   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_hidden [views]
 //
-// Without the variables: the embedded flat from its four viewpoints; without a number: 16 views.
+// Without the variables, the scene is the embedded flat from its four viewpoints. The default is 16
+// views.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -28,11 +29,11 @@ namespace {
 constexpr int kSide = 256;
 constexpr float kParts[] = {1e-4f, 1e-3f, 1.0f / 255};
 
-/// Of one view, or of all.
+/// Counts of one view, or sums over all views.
 struct Shares {
   CullCounts culled;
   double visible = 0, chunks = 0;            ///< in view
-  double seen[3] = {}, seen_chunks[3] = {};  ///< with more than kParts of a pixel
+  double seen[3] = {}, seen_chunks[3] = {};  ///< contribute more than kParts of a pixel's light
 
   void add(const Shares& other) {
     culled.rows += other.culled.rows;
@@ -60,7 +61,7 @@ Shares shares_of(OpenMPBackend& backend, const GaussianCloud& cloud, const Camer
   const GaussianSet set = cloud.set();
   out.culled = count_culled(backend, std::span(&set, 1), camera, config);
   for (std::size_t i = 0; i < bins.order.size; ++i) {
-    const std::uint32_t slot = bins.order[i];  // of a chunk's, as many as it has rows
+    const std::uint32_t slot = bins.order[i];  // a chunk has one slot for each of its rows
     const SplatBounds& b = bins.bounds[slot];
     const SplatRecords<float> splat{&bins.geometry[slot], nullptr, nullptr, nullptr};
     float most = 0;

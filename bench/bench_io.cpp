@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// bench_io [--scene FILE] [--formats ply,spz] [--load] [--markdown] [--folder DIR]: writes a scene in
-// every format, reads it back and prints a row for each: size, speed, peak memory beside what the result
-// takes, and the error that the format adds.
+// Writes a scene in every format and reads it back. Prints one row per format: the file's size, the
+// speed, the peak memory beside the memory of the result, and the error that the format adds.
+//
+//   bench_io [--scene FILE] [--formats ply,spz] [--load] [--markdown] [--folder DIR]
 #include <malloc.h>
 #include <unistd.h>
 
@@ -32,7 +33,7 @@ double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-/// A line of /proc/self/status, bytes; 0 where there is none.
+/// Value of a line of /proc/self/status, bytes; 0 where there is no such line.
 double memory(const char* key) {
   std::ifstream in("/proc/self/status");
   for (std::string line; std::getline(in, line);) {
@@ -43,17 +44,17 @@ double memory(const char* key) {
 
 struct Reading {
   LoadedCloud made;
-  double seconds = 1e9, peak = 0;  ///< the least, the last
+  double seconds = 1e9, peak = 0;  ///< least of all runs, and of the last run
 };
 
 /// Loads a scene three times. `sort`: in spatial order, as it is rendered.
 Reading read(const std::string& path, bool sort) {
   Reading out;
-  out.made = io::load_scene(path, {.sort = sort}).value();  // from now on the file is in the cache
+  out.made = io::load_scene(path, {.sort = sort}).value();  // brings the file into the cache
   for (int run = 0; run < 3; ++run) {
     out.made = {};
-    ::malloc_trim(0);                               // what was freed is no longer counted
-    std::ofstream("/proc/self/clear_refs") << "5";  // the peak counts from here
+    ::malloc_trim(0);                               // so that freed memory no longer counts
+    std::ofstream("/proc/self/clear_refs") << "5";  // resets the peak
     const double before = memory("VmRSS"), start = now();
     out.made = io::load_scene(path, {.sort = sort}).value();
     out.seconds = std::min(out.seconds, now() - start);
@@ -87,7 +88,8 @@ Row measure(const GaussianCloud& source, const std::vector<Camera>& cameras, con
   row.read = reading.seconds;
   row.peak = reading.peak;
   row.result = static_cast<double>(made.cloud.bytes());
-  // The format of chunks is written as the rows lie in memory, the others as they were read.
+  // The chunk format is written in the order of the rows in memory, the others in the order of the file
+  // that was read.
   std::vector<std::uint32_t> rows = rows_as_read(source);
   if (path.ends_with(".compressed.ply")) std::iota(rows.begin(), rows.end(), 0u);
   row.fields = gsnav_convert::largest_field_errors(source, rows, made.cloud, rows_as_read(made.cloud));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One row a kernel, scalar and backend: time with the error against the same kernel in float64 beside
-// it.
+// One row per kernel, scalar type and backend: its time, and its error against the same kernel in
+// float64.
 #include "kernel_bench.hpp"
 
 int main(int argc, char** argv) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Kernels of a body's joints: polar rotation and forward kinematics.
+// Kernels of the joints of a body: polar rotation and forward kinematics.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -17,7 +17,8 @@ namespace gsnav_bench {
 
 namespace {
 
-/// Blends of four rotations as skinning makes them, all with determinants above its limit.
+/// Blends of four rotations as skinning makes them. All have determinants above the limit of
+/// polar_rotation.
 std::vector<Mat3<double>> blended_matrices(std::size_t n) {
   Rng rng(9);
   std::vector<Mat3<double>> matrices;
@@ -34,7 +35,7 @@ constexpr std::size_t kMatrices = 32768;
 struct PolarErrors {
   double rotation = 0, orthogonality = 0;
 
-  /// `r` is what came out for the matrix m.
+  /// Adds the errors of `r`, the computed polar rotation of the matrix m.
   void add(const Mat3<double>& m, const Mat3<double>& r) {
     const Mat3<double> truth = polar_rotation(m), gram = r * transpose(r);
     for (int i = 0; i < 3; ++i) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Kernels of agents among people: capsule distance, time of impact.
+// Kernels for agents among people: capsule distance and time of impact.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -19,12 +19,13 @@ namespace {
 
 constexpr std::size_t kPairs = 100000;
 
-/// An agent's step of 0.25 m and a limb that translates by up to 0.3 m meanwhile.
+/// Pairs of an agent and a limb: the agent moves by a step of 0.25 m, the limb meanwhile translates by
+/// up to 0.3 m.
 struct CapsulePairs {
   std::vector<MovingCapsule<double>> agents, bodies;
 
-  /// Mixed: limbs anywhere within 3 m to each side; one pair in some hundred that start apart meets. Or
-  /// all of those that meet on a step of 1 m.
+  /// Limbs anywhere within 3 m to each side. About one in some hundred of the pairs that start apart
+  /// meets.
   static const CapsulePairs& mixed() {
     static const CapsulePairs pairs(3.0, 0.25, false);
     return pairs;
@@ -37,7 +38,7 @@ struct CapsulePairs {
  private:
   CapsulePairs(double size, double step, bool all_meet) {
     Rng rng(5);
-    // What a float holds: every scalar gets the same pairs.
+    // Values that a float holds exactly, so that all scalar types get the same pairs.
     const auto near_float = [](const Vec3d& v) { return vec_cast<double>(vec_cast<float>(v)); };
     const auto motion = [&](const Vec3d& p, const Vec3d& q, double r, const Vec3d& move) {
       const auto capsule = [&](const Vec3d& by) {
@@ -75,7 +76,7 @@ std::vector<MovingCapsule<S>> converted(const std::vector<MovingCapsule<double>>
   return out;
 }
 
-/// Moving capsules by planes.
+/// Moving capsules by planes: one array per coordinate and radius.
 template <class S>
 class MotionPlanes {
  public:
@@ -106,8 +107,8 @@ class MotionPlanes {
   std::vector<S> values_;
 };
 
-/// Nanoseconds a pair that FCL takes on one thread: the median of some runs over a part of the pairs,
-/// measured in the process that measures the row beside it; 0 without FCL.
+/// Time of FCL for one pair on one thread, ns: the median of some runs over a part of the pairs. It is
+/// measured in the same process as our row. 0 without FCL.
 [[maybe_unused]] double fcl_ns([[maybe_unused]] const CapsulePairs& pairs,
                                [[maybe_unused]] bool moving) {
 #if defined(GSNAV_HAS_FCL)
@@ -129,7 +130,7 @@ class MotionPlanes {
 #endif
 }
 
-/// FCL's time, and how many times as fast the row is: of one thread, a pair.
+/// Adds FCL's time per pair on one thread, and how many times as fast our row is.
 void compare_with_fcl(benchmark::State& state, const CapsulePairs& pairs, bool moving) {
   const double ns = fcl_ns(pairs, moving);
   if (ns == 0) return;
@@ -138,8 +139,8 @@ void compare_with_fcl(benchmark::State& state, const CapsulePairs& pairs, bool m
       benchmark::Counter(ns * 1e-9 * kPairs, benchmark::Counter::kIsIterationInvariantRate);
 }
 
-/// Gaps of a batch, with their errors against double: absolute, and of the distance of the axes relative
-/// to at least 1 cm.
+/// Distances of a batch of pairs. Errors are against double: absolute, and those of the distance between
+/// the axes relative to that distance or 1 cm, whichever is larger.
 struct DistanceBody {
   template <class S, class B>
   void operator()(benchmark::State& state, B& backend) const {
@@ -167,13 +168,14 @@ struct DistanceBody {
     }
     state.counters["gap_max_m"] = absolute;
     state.counters["gap_rel_max"] = relative;
-    state.counters["differ"] = differ;  // from one pair alone
+    state.counters["differ"] = differ;  // pairs whose result differs from that of one pair alone
     compare_with_fcl(state, pairs, false);
   }
 };
 
-/// Sweeps of a batch. Errors in double: how deep an agent that started free gets by the reported time,
-/// and how many pairs are called otherwise than in double.
+/// Sweeps of a batch of pairs. Errors are computed in double: the depth to which an agent that started
+/// free enters a limb by the reported time, and the number of pairs whose outcome is not the one in
+/// double.
 struct SweepBody {
   bool all_meet;
   template <class S, class B>
@@ -214,8 +216,8 @@ struct SweepBody {
 };
 
 #if defined(GSNAV_HAS_FCL)
-/// What FCL makes of the mixed pairs: its distance against ours in double, and the contacts that it
-/// misses.
+/// FCL on the mixed pairs: the errors of its distances against our kernel in double, and its missed
+/// contacts.
 void fcl_row(benchmark::State& state, bool moving, bool all_meet) {
   const CapsulePairs& pairs = all_meet ? CapsulePairs::meeting() : CapsulePairs::mixed();
   constexpr std::size_t kSome = 20000;
@@ -241,7 +243,7 @@ void fcl_row(benchmark::State& state, bool moving, bool all_meet) {
 }
 #endif
 
-/// One agent's step against all limbs of a crowd, as an environment does it. Items are limbs.
+/// One agent's step against all limbs of a crowd, as an environment computes it. Items are limbs.
 struct CrowdBody {
   std::size_t people;
   template <class S, class B>

@@ -74,7 +74,7 @@ struct ProjectBody {
 struct ShInput {
   GaussianCloud cloud;
   std::vector<Vec3<float>> deltas;
-  std::vector<double> truth;  // red, green, blue of each
+  std::vector<double> truth;  // red, green and blue of each Gaussian
 
   ShInput(std::size_t n, int degree) : cloud(wall(n, degree)) {
     Rng rng(7);
@@ -113,7 +113,7 @@ struct ShBody {
   }
 };
 
-/// The same in lanes, coefficients by planes.
+/// The same kernel in lanes, with coefficients by planes.
 struct ShLanesBody {
   int degree;
   template <class S, class B>
@@ -152,7 +152,7 @@ struct ShLanesBody {
   }
 };
 
-/// The sort key of each Gaussian; in double the depth that it stands for.
+/// The sort key of each Gaussian; in double, the depth that the key encodes.
 struct KeyBody {
   template <class S, class B>
   void operator()(benchmark::State& state, B& backend) const {
@@ -235,7 +235,7 @@ struct SortBody {
   }
 };
 
-/// The baseline: pairs by std::stable_sort.
+/// The baseline: sorts pairs with std::stable_sort.
 struct StableSortBody {
   std::size_t n;
   int bits;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Linear blend skinning.
 #include <algorithm>
 #include <chrono>
 #include <memory>
@@ -35,10 +34,10 @@ std::vector<Affine3<double>> random_joints(Rng& rng) {
 
 /// One variant of skinning.
 struct SkinWork {
-  int influences;  ///< joints of each Gaussian
-  bool rotations;  ///< also written, as SH of degree 1 and above need them
+  int influences;  ///< per Gaussian
+  bool rotations;  ///< rotations are written too, which SH of degree 1 and above need
 
-  /// Bytes read and written for each Gaussian, at least.
+  /// Bytes that must be read and written for each Gaussian.
   std::size_t bytes() const {
     return (7 + 7 + (rotations ? 4u : 0u)) * sizeof(float) +
            static_cast<std::size_t>(influences) * 2 * sizeof(std::uint16_t);
@@ -93,7 +92,7 @@ class Skinning {
     backend_->synchronize().throw_if_error();
   }
   const SkinningArgs<S, Out>& args() const noexcept { return args_; }
-  /// Plane k: x y z of the means, then w x y z of the quaternions.
+  /// Output plane k: 0 to 2 are x, y, z of the means; 3 to 6 are w, x, y, z of the quaternions.
   std::vector<Out> plane(std::size_t k) const {
     std::vector<Out> values(out_[k].size());
     out_[k].download(values.data(), values.size());
@@ -141,7 +140,7 @@ void report_errors(benchmark::State& state, const People<S, B>& people, std::siz
   state.counters["quat_max"] = quats;
 }
 
-/// Values whose bits differ from those of the scalar form.
+/// Number of values whose bits differ from those of the scalar form.
 template <class B>
 double different_values(const Skinning<float, float, B>& skinning, const GaussianCloud& cloud,
                         const SkinWork& work) {
@@ -156,7 +155,7 @@ double different_values(const Skinning<float, float, B>& skinning, const Gaussia
   return differ;
 }
 
-/// Threads of a backend on this processor; 0 for a device.
+/// Number of threads of a backend on this processor; 0 for a device.
 template <class B>
 int processor_threads([[maybe_unused]] const B& backend) {
   if constexpr (requires { backend.threads(); }) return backend.threads();
@@ -168,7 +167,8 @@ struct SkinBody {
   template <class S, class B>
   void operator()(benchmark::State& state, B& backend) const {
     const GaussianCloud cloud = wall(200000, 0);
-    // People in turn, who together exceed the caches: each is read from memory.
+    // The loop takes one person after the other. Together they exceed the caches, so that each one is
+    // read from memory.
     constexpr std::size_t kPeople = 6;
     const People<S, B> people = make_people<S>(backend, cloud, work, kPeople);
     people[0]->run();
@@ -180,7 +180,8 @@ struct SkinBody {
     }
     count(state, cloud.size(), work.bytes());
     if (const int threads = processor_threads(backend); threads > 0) {
-      // The time over that in which as many threads stream as many bytes from memory.
+      // Ratio of the measured time to the time in which the same number of threads stream the same
+      // number of bytes from memory.
       const double gigabytes = measure_bandwidth(threads);
       const double seconds = static_cast<double>(cloud.size() * work.bytes()) * 1e-9 / gigabytes;
       state.counters["stream_GB/s"] = gigabytes;
@@ -191,8 +192,8 @@ struct SkinBody {
 };
 
 #if defined(GSNAV_HAS_CUDA)
-/// Ten people in one call. The time is that of all together on the device; synchronised_us is that of
-/// the call until its work is done.
+/// Ten people in one call. The row's time is that of all ten together on the device. synchronised_us is
+/// the time from the call until its work is done.
 struct CrowdBody {
   SkinWork work;
   template <class S, class B>

@@ -1,15 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// Levels of detail against direct rendering: error and time in one row, 256x256, the error against
+// Levels of detail against direct rendering: error and time in one row, 256x256. Errors are against
 // O_photo(4).
 //
 //   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_lod [views [first [each]]]
 //
-// Without the variables: the embedded flat from its four viewpoints; without a number: 8 views.
-// Processor time of RGB frames on one thread, the least of five runs a view; `least +dB` is the smallest
-// gain of a view, `below` how many views are below direct rendering. Of depths (frames of their own, not
-// timed): pixels that are off by more than 2 % from every median depth of the photo's rays within them,
-// and the 99th percentile. A streamed set's own levels have rows beside those of the tree that is built.
-// "seen": only what is seen from the camera's cell (VisibleSets). Where there is a GPU, rows of it.
+// Without the variables, the scene is the embedded flat from its four viewpoints. The default is 8
+// views.
+//
+// Times are processor times of RGB frames on one thread, the least of five runs per view. `least +dB` is
+// the smallest gain of a view over direct rendering, `below` the number of views below direct rendering.
+//
+// Depths come from separate frames that are not timed. Their columns are the share of pixels that differ
+// by more than 2 % from the median depths of all of the photo's rays in the pixel, and the 99th
+// percentile. If a streamed scene brings its own levels, they have rows beside those of the tree that is
+// built. "seen": only the Gaussians visible from the camera's cell is drawn (VisibleSets). Where there
+// is a GPU, it has rows too.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -48,7 +53,7 @@ void row(LodViews& views, const GaussianCloud& cloud, const LodTree& tree, const
   LodCut cut(tree, cloud);
   LodChoice choice;
   choice.pixels = std::max(pixels, 1e-3);
-  choice.hysteresis = 0;  // views that have nothing to do with one another
+  choice.hysteresis = 0;  // the views are unrelated
   LodRow out(views, draw);
   Frames<float> frames, depths;
   for (const Camera& camera : views.cameras) {

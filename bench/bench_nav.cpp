@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// NavMesh queries beside Detour's on the same mesh: random connected pairs of all islands, by area.
+// NavMesh queries beside Detour's on the same mesh. The pairs are random and connected; they lie on all
+// islands, in proportion to area.
 #include <DetourNavMeshQuery.h>
 #include <benchmark/benchmark.h>
 
@@ -24,9 +25,9 @@ using namespace gsnav_bench;
 
 namespace {
 
-/// Detour's snap of both ends, findPath and straight path, as Habitat calls them. The sum of chords
-/// between the corners, which do not follow the floor: on hills it is 5 to 6 % below the length on the
-/// surface (undulating), so that its error says nothing of the path there.
+/// Length by Detour as Habitat calls it: snaps both ends, then runs findPath and findStraightPath. It is
+/// the sum of chords between the corners, which do not follow the floor. On hills it is 5 to 6 % below
+/// the length on the surface (undulating), so its error there does not measure the quality of the path.
 double detour_geodesic(const NavMesh::Impl& impl, dtNavMeshQuery& query, const Vec3d& a,
                        const Vec3d& b) {
   const float extents[3] = {2, 4, 2};
@@ -64,9 +65,9 @@ void pairs(benchmark::State& state, const Scene* (*make)(), F&& f) {
   state.counters["polygons"] = static_cast<double>(scene->mesh->polygon_count());
 }
 
-/// pairs() of a length, with its error against the search over windows, which needs no tables:
-/// `worst_error` in metres, `mean_error` in parts of the length, `mean_short` the part that it is too
-/// short by (chords that leave the surface).
+/// pairs() for a function that returns a length, with its error against the search over windows, which
+/// needs no tables. `worst_error` is in metres, `mean_error` relative to the length. `mean_short` is the
+/// relative amount by which lengths are too short, because of chords that leave the surface.
 template <class F>
 void lengths(benchmark::State& state, const Scene* (*make)(), F&& f) {
   pairs(state, make, f);
@@ -105,7 +106,7 @@ void geodesic_with_handles(benchmark::State& state, const Scene* (*make)()) {
   });
   if (const Scene* scene = make()) state.counters["prepare_ms"] = scene->prepare_ms;
 }
-/// The same of pairs of 1 to 30 m.
+/// detour() for pairs of 1 to 30 m.
 void detour_near(benchmark::State& state, const Scene* (*make)()) {
   pairs(state, make, [](const Scene& s, std::size_t i) {
     return detour_geodesic(s.mesh->impl(), *s.detour, s.near_points[i].position,
@@ -117,8 +118,8 @@ void near_with_handles(benchmark::State& state, const Scene* (*make)()) {
     return s.mesh->distance_between(s.near_points[i], s.near_goals[i]);
   });
 }
-/// To an error of 1e-3, with a proven lower bound (the same where the exact distance is not searched
-/// for).
+/// Length to a relative error of 1e-3 with a proven lower bound. If the exact distance needs no search,
+/// that distance.
 double to_an_error(const Scene& s, const NavPoint& a, const NavPoint& b) {
   return s.mesh->distance_between(a, b, {.relative_error = 1e-3})->length;
 }
@@ -130,7 +131,7 @@ void bounded_near(benchmark::State& state, const Scene* (*make)()) {
   pairs(state, make,
         [](const Scene& s, std::size_t i) { return to_an_error(s, s.near_points[i], s.near_goals[i]); });
 }
-/// Pairs of one island alone, by its number: the smaller ones of nav_test are hills.
+/// Pairs of one island alone, by its number. The smaller islands of nav_test are hills.
 template <class F>
 void island_pairs(benchmark::State& state, const Scene* (*make)(), F&& f) {
   const Scene* scene = make();
@@ -233,8 +234,8 @@ Triangles data_triangles(const char* name) {
 Triangles nav_test_triangles() { return data_triangles("nav_test.obj"); }
 Triangles dungeon_triangles() { return data_triangles("dungeon.obj"); }
 
-/// A build of one tile and one of tiles of so many cells by some threads, in turns, at Habitat's
-/// settings; `ratio` is of wall time, `cpu_ratio` of the time of all processors.
+/// Builds a mesh as one tile and as tiles of a given number of cells, in turns, at Habitat's settings.
+/// `ratio` compares wall times, `cpu_ratio` the times of all processors.
 void build(benchmark::State& state, Triangles (*make)()) {
   const auto threads = static_cast<int>(state.range(0));
   const Triangles soup = make();

@@ -18,7 +18,7 @@ using namespace gsnav_bench;
 
 namespace {
 
-/// `avatars` walkers of 20 capsules spread over the mesh.
+/// `avatars` walkers of 20 capsules each, spread over the mesh.
 CapsuleSet walkers(const Scene& scene, std::size_t avatars) {
   Rng rng(3);
   std::vector<DynamicCapsule> list;
@@ -43,7 +43,7 @@ Vec3d quarter_metre(std::size_t i) {
   return {0.25 * std::cos(a), 0, 0.25 * std::sin(a)};
 }
 
-/// Steps of 0.25 m of agents that keep their polygons.
+/// Steps of 0.25 m for agents that keep their polygons from step to step.
 void steps(benchmark::State& state, const Scene* (*make)()) {
   const Scene* scene = make();
   if (scene == nullptr) return state.SkipWithError("the mesh is not in GSNAV_DATA_DIR");
@@ -73,7 +73,7 @@ void thousand_agents(benchmark::State& state, const Scene* (*make)()) {
   }
 }
 
-/// Velocities for the next tick.
+/// Velocities of agents for the next tick.
 void local_plan(benchmark::State& state, const Scene* (*make)()) {
   const Scene* scene = make();
   if (scene == nullptr) return state.SkipWithError("the mesh is not in GSNAV_DATA_DIR");
@@ -86,7 +86,7 @@ void local_plan(benchmark::State& state, const Scene* (*make)()) {
   }
 }
 
-/// Plans of 10 s, in ticks of 0.25 s, among walkers of 20 capsules that go to and fro on the mesh.
+/// Plans of 10 s in ticks of 0.25 s, among walkers of 20 capsules that go back and forth on the mesh.
 void plan_in_time_among(benchmark::State& state, const Scene* (*make)()) {
   const auto avatars = static_cast<std::size_t>(state.range(0));
   const Scene* scene = make();

@@ -25,7 +25,7 @@ Scene::Scene(NavMesh m) : mesh(std::make_unique<NavMesh>(std::move(m))) {
   constexpr int kNodes = 65535;
   detour->init(mesh->impl().mesh.get(), kNodes);
   const std::clock_t begin = std::clock();
-  (void)mesh->distance_between(points[0], goals[0]);  // prepares all others, once a mesh
+  (void)mesh->distance_between(points[0], goals[0]);  // fills tables for all later queries
   prepare_ms = 1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   while (near_points.size() < 4096) {
     const NavPoint a = mesh->random_point(rng);
@@ -37,7 +37,7 @@ Scene::Scene(NavMesh m) : mesh(std::make_unique<NavMesh>(std::move(m))) {
   }
   const Vec3d goal = main_points[0].position;
   field = std::make_unique<GeodesicField>(GeodesicField::make(*mesh, std::span(&goal, 1)).value());
-  // 16 walks, each of a point that turns a little at every step and where it meets a wall.
+  // 16 walks. Each is a point that turns a little at every step, and also where it meets a wall.
   for (std::size_t i = 0; i < 16; ++i) {
     NavPoint at = main_points[i];
     double heading = rng.uniform(0, 6.28);
@@ -53,7 +53,7 @@ Scene::Scene(NavMesh m) : mesh(std::make_unique<NavMesh>(std::move(m))) {
 
 namespace {
 
-/// A mesh of the data folder with Habitat's settings; null where it is not there.
+/// A mesh of the data folder, built with Habitat's settings; null if the folder does not have it.
 const Scene* data(const char* name) {
   const auto mesh = io::load_mesh(std::string(GSNAV_DATA_DIR "/nav/") + name);
   if (!mesh) return nullptr;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// NavMesh from Gaussians over the extent of an outdoor capture: time, processor time and peak memory.
+// Builds a NavMesh from Gaussians over the extent of an outdoor capture: time, processor time and peak
+// memory.
 #include <sys/resource.h>
 
 #include <chrono>

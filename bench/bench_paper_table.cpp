@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The two performance tables of the Habitat-GS paper by this simulator: a PointNav loop with 256 x 256
-// RGB and depth, frames a second, milliseconds and memory, by the number of Gaussians and by the number
-// of people among 2M, for each backend. Scenes and people are the project's own: the embedded flat, made
-// as dense as the row says.
+// The two performance tables of the Habitat-GS paper, for this simulator. It runs a PointNav loop with
+// 256 x 256 RGB and depth. Columns are frames per second, milliseconds and memory, for each backend. One
+// table is by the number of Gaussians, the other by the number of people in a scene of 2M Gaussians.
+// Scenes and people are the project's own: the embedded flat at the density that the row needs.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -31,7 +31,7 @@ using Clock = std::chrono::steady_clock;
 
 namespace {
 
-constexpr double kGaussiansAtOne = 390000;  // of the flat with density 1, about
+constexpr double kGaussiansAtOne = 390000;  // Gaussians of the flat at density 1, about
 constexpr int kSide = 256, kWarmUp = 10;
 
 struct Options {
@@ -49,10 +49,10 @@ struct Place {
 };
 
 struct Row {
-  double ms = 0, rendering = 0;  // of a frame; the share of it
+  double ms = 0, rendering = 0;  // ms per frame; rendering: its share of that time
 };
 
-/// Most bytes that a GPU's backends held at once, counted anew by `restart`; 0 without one.
+/// Peak of the bytes that GPU backends have held; 0 without a GPU. `restart` begins a new peak.
 double peak_gpu_bytes([[maybe_unused]] bool restart) {
 #if defined(GSNAV_HAS_CUDA)
   cudaMemPool_t pool = nullptr;
@@ -82,7 +82,8 @@ Place make_place(double millions, std::size_t people) {
   return p;
 }
 
-/// One simulator plays episodes by the follower; the first actions find the scratch that is taken.
+/// One simulator plays episodes with the follower. The first actions allocate scratch and are not
+/// counted.
 template <class B>
 Row play_one(B& backend, const Options& o, const Place& place) {
   auto sim = BasicSimulator<B>::create(backend, place.scene, place.config).value();
@@ -106,8 +107,8 @@ Row play_one(B& backend, const Options& o, const Place& place) {
   return {1e3 * total / o.steps, 1.0 - beside / total};
 }
 
-/// Many at once, at as many times; their images stay where they were drawn. Every second step draws
-/// nothing: that is what the others take beside drawing.
+/// Many simulators in one batch, whose images stay in the backend's memory. Every second step draws
+/// nothing: its time is that of all work but rendering.
 template <class B>
 Row play_many(B& backend, const Options& o, const Place& place) {
   BatchConfig config;

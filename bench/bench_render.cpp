@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whole frames: time, error against float64 by the contract, and memory in one row.
+// Whole frames. Each row has the time, the error against float64 by the contract, and the memory.
 //
 //   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_render
 //
-// Without the variables: the embedded flat from its four viewpoints. GSNAV_BENCH_REFERENCES names a
-// folder that keeps float64 images; GSNAV_BENCH_REPEATS draws every view that many times, for medians of
-// a fixed number of frames; GSNAV_BENCH_TIMES_ONLY leaves out error and floor.
+// Without the variables, the scene is the embedded flat from its four viewpoints. GSNAV_BENCH_REFERENCES
+// names a folder that caches float64 images. GSNAV_BENCH_REPEATS draws every view that many times, for
+// medians of a fixed number of frames. GSNAV_BENCH_TIMES_ONLY leaves out error and floor.
 //
-// median_ms is over views, each by its median; floor_ratio the median over views of a frame's time over
-// the least that it could take on this machine by the survey's constants, floor_ratio_best by the
-// smallest ones (floor.hpp).
+// median_ms is the median over views of each view's median. floor_ratio is the median over views of a
+// frame's time divided by its least possible time on this machine by the survey's constants;
+// floor_ratio_best divides by the time from the smallest constants (floor.hpp).
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -47,8 +47,7 @@ struct Variant {
   unsigned outputs;
   Quality quality;
   bool base_color = false;  ///< of a scene of SH degree 0
-  bool axes =
-      false;  ///< with axes computed beforehand in place of quaternions and scales (processors only)
+  bool axes = false;  ///< with precomputed axes in place of quaternions and scales (processors only)
 
   const GaussianCloud& cloud() const {
     return base_color ? gsnav_bench::base_color_cloud() : workload().cloud;
@@ -71,7 +70,7 @@ constexpr Variant kVariants[] = {{"rgbd/exact", kRgb | kAlpha | kMedianDepth, Qu
                                  {"depth/fast", kMedianDepth, Quality::fast()},
                                  {"alpha/fast", kAlpha, Quality::fast()}};
 
-/// The workload's axes: what a static scene could keep in place of quaternions and scales.
+/// Axes of the workload's Gaussians, which a static scene could keep in place of quaternions and scales.
 const std::vector<float>* axes_of_workload() {
   static std::vector<float> axes[9];
   const GaussianCloud& cloud = workload().cloud;
@@ -95,7 +94,8 @@ double to_ms(std::chrono::steady_clock::duration d) {
   return std::chrono::duration<double, std::milli>(d).count();
 }
 
-/// Work of every view, counted once a size and kind of output: the floor does not depend on the profile.
+/// Work of every view, counted once per size and kind of output, since the floor does not depend on the
+/// profile.
 const std::vector<gsnav_bench::FrameWork>& work_of_views(const Variant& v, int width, int height) {
   static std::map<std::tuple<int, int, bool, bool>, std::vector<gsnav_bench::FrameWork>> cache;
   const auto [entry, added] = cache.try_emplace({width, height, (v.outputs & kRgb) != 0, v.base_color});
@@ -111,8 +111,8 @@ const std::vector<gsnav_bench::FrameWork>& work_of_views(const Variant& v, int w
   return entry->second;
 }
 
-/// What images are off by: the worst of the judged views. Pixels that rounding alone decides count in
-/// the PSNR only.
+/// Adds the errors of the images, the worst of the judged views. Pixels that rounding alone decides
+/// count only in the PSNR.
 template <class B>
 void judge(benchmark::State& state, BasicRenderer<float, B>& renderer, std::span<const GaussianSet> sets,
            const Variant& v, const std::vector<Camera>& cameras) {
@@ -142,7 +142,7 @@ void judge(benchmark::State& state, BasicRenderer<float, B>& renderer, std::span
   }
 }
 
-/// `threads`: of the processor; 0 for a row that is not the processor's, which has no floor here.
+/// Times frames. `threads`: threads of the processor; 0 for a GPU, whose rows have no floor.
 template <class B>
 void render_frames(benchmark::State& state, B& backend, const Variant& v, int width, int height,
                    int threads) {
@@ -159,7 +159,7 @@ void render_frames(benchmark::State& state, B& backend, const Variant& v, int wi
   const auto draw = [&](std::size_t c) {
     renderer.render(sets, std::span(&cameras[c], 1), frames).throw_if_error();
   };
-  for (std::size_t c = 0; c < cameras.size(); c += 4) draw(c);  // buffers reach their size
+  for (std::size_t c = 0; c < cameras.size(); c += 4) draw(c);  // all buffers reach their size
   std::vector<std::vector<double>> ms(cameras.size());
   std::size_t next = 0;
   for (auto _ : state) {
@@ -195,8 +195,9 @@ void render_frames(benchmark::State& state, B& backend, const Variant& v, int wi
   state.counters["scene_MB"] = static_cast<double>(v.cloud().bytes()) / 1e6;
 }
 
-/// 64 cameras in one call against as many calls, which alternate. `gain`: frames a second of the batch
-/// over those of the calls; `bits_differ`: values of the images that are not the same.
+/// 64 cameras in one call against 64 calls of one camera, in turns. `gain`: frames per second of the
+/// batch divided by those of the single calls. `bits_differ`: number of image values that are not the
+/// same.
 template <class B>
 void render_batch(benchmark::State& state, B& backend, const Variant& v, int width, int height) {
   constexpr std::size_t kBatch = 64;
@@ -296,7 +297,7 @@ void register_all() {
 
 int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
-  // On stderr: stdout may be asked for as JSON.
+  // On stderr, because stdout may be JSON.
   std::fprintf(stderr, "%zu Gaussians, %zu views, lanes: %s x%d\n", workload().cloud.size(),
                workload().cameras.size(), lane_kernels().name, lane_kernels().width);
   register_all();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the simulator costs beside rendering: one action in many environments, one in one, and ten people
-// posed; and what a frame of it costs on a GPU (bench_sim_cuda.cpp).
+// Cost of the simulator without rendering: one action in many environments, one action in one
+// environment, and the posing of ten people. On a GPU also the cost of a frame (bench_sim_cuda.cpp).
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -46,7 +46,7 @@ BatchConfig without_pictures() {
   return c;
 }
 
-/// When episodes begin.
+/// Times at which episodes begin.
 enum Times : std::int64_t { kAnywhen, kAtOnce, kAtMultiples };
 
 EpisodeSource generated(const std::shared_ptr<const SimulatorScene>& scene, std::int64_t times) {
@@ -60,8 +60,8 @@ EpisodeSource generated(const std::shared_ptr<const SimulatorScene>& scene, std:
   };
 }
 
-/// Arguments: environments, people, threads, when episodes begin. A minute has gone by when it is
-/// measured.
+/// Arguments: environments, people, threads, times at which episodes begin. The measurement starts one
+/// minute into the run.
 void step_batch(benchmark::State& state) {
   const auto scene = flat(static_cast<int>(state.range(1)));
   const auto n = static_cast<std::size_t>(state.range(0));
@@ -90,7 +90,7 @@ BENCHMARK(step_batch)
     ->Args({256, 5, 2, kAtMultiples})
     ->Args({256, 5, 2, kAnywhen})
     ->Unit(benchmark::kMillisecond)
-    ->MeasureProcessCPUTime()  // of all threads: what it costs also where the machine is busy
+    ->MeasureProcessCPUTime()  // of all threads: the cost is right also on a busy machine
     ->UseRealTime();
 
 /// One simulator, or its World alone.
@@ -124,8 +124,8 @@ BENCHMARK(step_one)
     ->Unit(benchmark::kMicrosecond);
 
 /// Ten people of one body walk: forward kinematics and skinning of all. Arguments: Gaussians of the
-/// body, threads, Skinning. Counters: error against float64, and memory: what they share, and what each
-/// of them has.
+/// body, threads, Skinning. Counters: the error against float64, and the memory that they share and that
+/// each of them has.
 void pose_crowd(benchmark::State& state) {
   constexpr std::size_t kPeople = 10;
   HumanoidOptions look;
@@ -163,8 +163,8 @@ void pose_crowd(benchmark::State& state) {
   const double row = static_cast<double>(body->influences);
   const bool stretched = body->skinning == Skinning::linear_stretched;
   state.counters["mean_max_m"] = worst;
-  // Means, quaternions, scales, opacities, colours, joints and weights; means and quaternions of each,
-  // or its axes too.
+  // Shared: means, quaternions, scales, opacities, colours, joints and weights. Each person has its own
+  // means and quaternions, or also axes.
   state.counters["shared_MB"] = n * 1e-6 * (4 * 14 + 4 * row + (stretched ? 12 * (row - 1) : 0));
   state.counters["each_MB"] = n * 1e-6 * 4 * (stretched ? 16 : 7);
   state.counters["Gaussians/s"] =

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the time of a simulator's frame on a GPU goes.
+// Parts of the time of a simulator's frame on a GPU.
 #include <benchmark/benchmark.h>
 
 #include <chrono>
@@ -19,14 +19,17 @@ namespace {
 using namespace gsnav;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kGaussiansAtOne = 390000;  // of the flat with density 1, about
+constexpr double kGaussiansAtOne = 390000;  // Gaussians of the flat at density 1, about
 constexpr int kSide = 256;
 constexpr std::size_t kPixels = std::size_t{kSide} * kSide;
 
-/// BasicSimulator::observe() of RGB and depth, 256 x 256, along a follower's way; the time is that of
-/// the call. Counters, all medians: draw_us, what the device takes for the scene from the same cameras,
-/// without people; copy_us, for their images to page-locked memory; host_us, what is left of the call;
-/// world_us, an action without a picture, outside of it. Arguments: thousands of Gaussians, people.
+/// BasicSimulator::observe() of RGB and depth, 256 x 256, on a follower's path. The time is that of the
+/// call.
+///
+/// Counters, all medians: draw_us is the device's time for drawing the scene from the same cameras
+/// without people. copy_us is its time for copying the images to page-locked memory. host_us is the
+/// remainder of the call. world_us is the time of an action without images, which the call does not
+/// contain. Arguments: thousands of Gaussians, people.
 void observe_cuda(benchmark::State& state) {
   if (CudaBackend::device_count() == 0) {
     state.SkipWithError("no GPU");
@@ -85,7 +88,7 @@ void observe_cuda(benchmark::State& state) {
     copy.push_back(copied);
     return took.count();
   };
-  for (int i = 0; i < 20; ++i) frame(false);  // find the scratch that it takes
+  for (int i = 0; i < 20; ++i) frame(false);  // these allocate the scratch
   for (auto _ : state) state.SetIterationTime(frame(true));
   const double median = gsnav_bench::median(wall),
                device_us = gsnav_bench::median(draw) + gsnav_bench::median(copy);

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a frame's time goes: median milliseconds of each stage over all views, with its share, on one
-// thread and on two, and how many times faster two are; by what is asked for, so that what an output
-// saves is seen.
+// Stages of a frame: median milliseconds of each stage over all views with its share, on one thread and
+// on two, and the speedup of two. There are rows for each combination of outputs, which show what
+// leaving out an output saves.
 //
 //   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_stages [WIDTHxHEIGHT ...]
 //
-// Without the variables: the embedded flat from its four viewpoints; without sizes: 256x256, 640x480,
-// 1920x1080. `whole` is the frame without the stage clocks, in frames that alternate with those with
-// them.
+// Without the variables, the scene is the embedded flat from its four viewpoints. The default sizes are
+// 256x256, 640x480 and 1920x1080. `whole` is the time of a frame without the stage clocks; such frames
+// alternate with frames that have them.
 #include <array>
 #include <chrono>
 #include <cstdio>
@@ -46,7 +46,7 @@ constexpr Variant kVariants[] = {
 
 constexpr int kRepeats = 3;
 
-/// Medians: the stages, and the whole frame.
+/// Medians of the stages and of the whole frame.
 struct Measured {
   StageTimes stages{};
   double whole = 0;
@@ -64,7 +64,7 @@ Measured measure(const Variant& v, const std::vector<Camera>& cameras, int threa
   Frames<float> frames;
   std::array<std::vector<double>, kStages> stages;
   std::vector<double> whole;
-  for (int round = 0; round <= kRepeats; ++round) {  // the first one only warms up
+  for (int round = 0; round <= kRepeats; ++round) {  // the first round only warms up
     for (const Camera& camera : cameras) {
       const std::span sets(&set, 1);
       const std::span view(&camera, 1);

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// bench_storage [--scene FILE] [--cameras FILE] [--threads N]: compares the ways of keeping a scene in
-// memory. A row each: bytes, time of a frame (RGB, median over views and repeats), and how much images
-// change. Then what each packed plane changes by itself (docs/notes/speed.md).
+// Compares the ways of keeping a scene in memory. A row each: bytes, time of a frame (RGB, median over
+// views and repeats), and the change of the images. A second table has the change by each packed plane
+// alone (docs/notes/speed.md).
+//
+//   bench_storage [--scene FILE] [--cameras FILE] [--threads N]
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -47,7 +49,7 @@ std::vector<Camera> resized(const std::vector<Camera>& cameras, const Size& size
   return out;
 }
 
-/// Milliseconds of a frame, the median of `repeats` of each camera.
+/// Milliseconds per frame: the median of `repeats` frames of each camera.
 double frame_time(OpenMPBackend& backend, const GaussianSet& set, const std::vector<Camera>& cameras,
                   int repeats) {
   RenderConfig config;
@@ -67,17 +69,17 @@ double frame_time(OpenMPBackend& backend, const GaussianSet& set, const std::vec
   return times[times.size() / 2];
 }
 
-/// The ways of keeping a cloud in memory that are compared.
+/// A cloud in all the ways of keeping it in memory.
 struct Storages {
   GaussianCloud full, compact;
-  PackedCloud packed, packed_means;  ///< the latter with means in 16 bits
+  PackedCloud packed, packed_means;  ///< packed_means: with means in 16 bits
   PackErrors errors;                 ///< of packed_means
 
   explicit Storages(GaussianCloud cloud)
       : full(std::move(cloud)), compact(full), packed(pack_cloud(full)) {
     compact_sh(compact);
     PackLimits limits;
-    limits.mean = 0.1;  // of a Gaussian's deviation, which no mean moves by more than
+    limits.mean = 0.1;  // no mean moves by more than this part of its Gaussian's standard deviation
     packed_means = pack_cloud(full, limits, &errors);
   }
 };
@@ -124,14 +126,14 @@ void print_pack_errors(const PackErrors& e) {
       e.mean, e.mean_deviations, e.scale, e.rotation, e.opacity, e.sh0, e.sh, e.sh_rms);
 }
 
-/// What each packed plane changes in an image by itself.
+/// Prints the change of images by each packed plane alone.
 void print_planes(const Storages& s, const std::vector<Camera>& cameras) {
   const GaussianCloud unpacked = unpack_cloud(s.packed_means);
   std::printf("\n| packed alone | PSNR, dB | worst view, dB |\n| --- | --- | --- |\n");
   const auto alone = [&](const char* name, auto GaussianCloud::*plane) {
     GaussianCloud one = s.full;
     one.*plane = unpacked.*plane;
-    one.chunk_bounds.clear();  // they are those of the planes together
+    one.chunk_bounds.clear();  // these bounds are of all planes together
     const auto images = image_errors(s.full, one, cameras);
     std::printf("| %s | %.1f | %.1f |\n", name, images.psnr, images.worst);
   };

@@ -10,7 +10,7 @@
 
 namespace gsnav_bench {
 
-/// The Gaussians of a scene's file, or those of the embedded flat where no file is named.
+/// The Gaussians of a scene file, or of the embedded flat if `path` is empty.
 inline gsnav::Result<gsnav::GaussianCloud> cloud_or_flat(const std::string& path) {
   if (path.empty()) {
     gsnav::GaussianCloud flat = gsnav::make_default_scene(1.0).value().cloud;

@@ -7,7 +7,7 @@
 
 namespace gsnav_bench {
 
-/// Time between two points of a backend's stream, which is the device's.
+/// Device time between two points of a backend's stream.
 class DeviceTime {
  public:
   explicit DeviceTime(gsnav::CudaBackend& cuda) : stream_(cuda.stream()) {
@@ -20,7 +20,7 @@ class DeviceTime {
   }
   DeviceTime(const DeviceTime&) = delete;
   DeviceTime& operator=(const DeviceTime&) = delete;
-  /// Microseconds that the device takes for what f() asks of it; waits for it.
+  /// Device time of the work that f() enqueues, microseconds. Waits for the work.
   template <class F>
   double us(const F& f) {
     cudaEventRecord(begin_, stream_);

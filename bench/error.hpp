@@ -8,7 +8,7 @@
 
 namespace gsnav_bench {
 
-/// Differences of an array from its float64 reference: what stands beside every time.
+/// Differences of an array from its float64 reference, reported beside every time.
 struct Error {
   double max = 0, p99 = 0, p999 = 0, psnr = 0;
 };

@@ -15,7 +15,7 @@ using gsnav::Capsule;
 using gsnav::MovingCapsule;
 using Transform = fcl::Transform3d;
 
-/// FCL's capsule lies along z about the origin.
+/// FCL's capsule lies along z, centred on the origin.
 Transform placement(const Capsule<double>& c) {
   const fcl::Vector3d p(c.p0.x, c.p0.y, c.p0.z), q(c.p1.x, c.p1.y, c.p1.z);
   Transform t = Transform::Identity();

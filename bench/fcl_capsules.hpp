@@ -7,8 +7,8 @@
 
 #include "gsnav/math/capsule.hpp"
 
-// The Flexible Collision Library (libfcl-dev) on pairs of capsules, as a peer to be measured against.
-// Built where CMake finds it.
+// The Flexible Collision Library (libfcl-dev) on pairs of capsules, for comparison. Compiled if CMake
+// finds it.
 
 namespace gsnav_bench {
 
@@ -21,11 +21,11 @@ class FclPairs {
   FclPairs(const FclPairs&) = delete;
   FclPairs& operator=(const FclPairs&) = delete;
 
-  /// Distance at the begin of pair i by fcl::distance, which treats two capsules as a case of its own; 0
-  /// or less where they overlap.
+  /// Distance at the start of the motion of pair i by fcl::distance, which has a special case for two
+  /// capsules; 0 or less if they overlap.
   double distance(std::size_t i) const;
-  /// When pair i comes into contact by fcl::continuousCollide with conservative advancement on
-  /// translations, tolerance 1e-4; 2 without contact.
+  /// Time at which pair i comes into contact, as a part of its motion, by fcl::continuousCollide with
+  /// conservative advancement on translations, tolerance 1e-4; 2 without contact.
   double contact(std::size_t i) const;
 
  private:

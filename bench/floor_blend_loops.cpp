@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What bounds the blending of a frame: finding the blocks that an ellipse reaches, and blending them.
+// Loops that bound the blending of a frame: they find the blocks that an ellipse reaches, and blend
+// them.
 #include <memory>
 #include <utility>
 
@@ -17,7 +18,8 @@ using Ints = F::ints;
 constexpr __mmask16 kAll = 0xffff;  // g++ 12 warns of the unmasked forms' undefined source
 #endif
 
-/// Square root to at least 14 bits: enough for a footprint that is padded by a thousandth of a pixel.
+/// Square root to at least 14 bits, which is enough for a footprint that is padded by a thousandth of a
+/// pixel.
 F root(F x) noexcept {
 #if defined(__AVX512F__)
   if constexpr (kLanes == 16) {
@@ -31,13 +33,14 @@ F root(F x) noexcept {
 
 Ints truncated(F x) noexcept { return __builtin_convertvector(x.v, Ints); }
 
-/// Ellipses of many pairs (splat, tile) by planes, relative to the tile's corner: mean, half width, the
-/// height at which the right edge is farthest, 1 / half height, and the slope of the middle line.
+/// Ellipses of many pairs (splat, tile) by planes, relative to the tile's corner. Planes: mean, half
+/// width, height at which the right edge is farthest, 1 / half height, slope of the middle line.
 struct Ellipses {
   const float *x, *y, *half_width, *widest, *inv_height, *slope;
 };
 
-/// Bits of the 4x4 blocks of a 16x16 tile that kLanes ellipses reach.
+/// Masks of kLanes ellipses: each has one bit for each 4x4 block of a 16x16 tile that the ellipse
+/// reaches.
 Ints block_masks(const Ellipses& e, std::size_t i) noexcept {
   const F x = F::load(e.x + i), y = F::load(e.y + i), half = F::load(e.half_width + i);
   const F widest = F::load(e.widest + i), inv = F::load(e.inv_height + i), slope = F::load(e.slope + i);
@@ -46,14 +49,15 @@ Ints block_masks(const Ellipses& e, std::size_t i) noexcept {
   for (int strip = 0; strip < 4; ++strip) {
     const float first = 4.0f * static_cast<float>(strip) + 0.5f;
     const F low = F(first) - y, high = F(first + 3.0f) - y;  // rows of pixel centres
-    // The right edge is farthest at `widest` and the left one at -widest, each clamped to the strip.
+    // The right edge is farthest at `widest` and the left one at -widest; both are clamped to the strip.
     const auto edge = [&](F at) {
       const F n = at * inv;
       return std::pair<F, F>(half * root(fma(-n, n, F(1.0f))), fma(slope, at, x));
     };
     const auto [right_half, right_mid] = edge(gsnav::clamp(widest, low, high));
     const auto [left_half, left_mid] = edge(gsnav::clamp(-widest, low, high));
-    // Block c holds the centres 4c + 0.5 to 4c + 3.5; shifted by 4 so that truncation rounds down.
+    // Block c holds the centres 4c + 0.5 to 4c + 3.5. Values are shifted by 4 so that truncation rounds
+    // down.
     const F begin = gsnav::clamp(fma(left_mid - left_half, F(0.25f), F(1.125f)), F(1.0f), F(5.0f));
     const F reached = gsnav::clamp(fma(right_mid + right_half, F(0.25f), F(0.875f)), F(0.0f), F(4.0f));
     const F nearest = gsnav::clamp(F(0.0f), low, high) * inv;  // the strip's row nearest to the mean
@@ -67,7 +71,7 @@ Ints block_masks(const Ellipses& e, std::size_t i) noexcept {
 }  // namespace
 
 double measure_mask_ns() {
-  constexpr std::size_t kPairs = 1024;  // in the first-level cache, as a tile's batch is
+  constexpr std::size_t kPairs = 1024;  // in the first-level cache, like the batch of a tile
   const std::unique_ptr<float[]> planes(new float[6 * kPairs]);
   const std::unique_ptr<std::int32_t[]> masks(new std::int32_t[kPairs]);
   Rng rng(3);
@@ -93,7 +97,7 @@ double measure_mask_ns() {
 
 namespace {
 
-/// What blending reads of a splat, relative to its block: half a cache line and the colour.
+/// The data of a splat that blending reads, relative to its block: half a cache line, and the colour.
 struct alignas(64) BlockSplat {
   float a, w1, k, b, w2, log2_opacity, r, g, blue;
 };
@@ -103,7 +107,7 @@ F alpha_of(F e) noexcept {
   const auto hit = e >= F(-7.9943534f);
 #if defined(__AVX512DQ__)
   if constexpr (kLanes == 16) {
-    // 2^f of f = e - floor(e) by a cubic (relative error 1e-4), scaled by 2^floor(e).
+    // 2^f for f = e - floor(e) by a cubic polynomial (relative error 1e-4), scaled by 2^floor(e).
     const __m512 v = reinterpret_cast<__m512>(e.v);
     const F f(reinterpret_cast<F::vector>(_mm512_maskz_reduce_ps(kAll, v, 0x01)));
     F p = fma(f, F(0.078967257f), F(0.22469316f));
@@ -121,7 +125,7 @@ F alpha_of(F e) noexcept {
 }
 
 /// Blends splats onto one block of 8x8 pixels. A pack holds rows of eight columns, or half a row. The
-/// first square of the exponent depends on the column only, so that the packs of a splat share it.
+/// first square of the exponent depends only on the column, so that all packs of a splat share it.
 template <bool Color>
 void blend_block(const BlockSplat* splats, std::size_t n, float* out) noexcept {
   constexpr int kPacks = 64 / kLanes, kColumnPacks = kLanes < 8 ? 8 / kLanes : 1;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compiled with -march=native: as floor_loops.cpp.
+// Compiled with -march=native, like floor_loops.cpp.
 #include <bit>
 #include <cmath>
 
@@ -10,8 +10,7 @@ namespace gsnav_bench {
 
 namespace {
 
-/// Where an ellipse alpha >= alpha_min lies in a strip of rows: an interval of x, empty where left >
-/// right.
+/// Interval of x that the ellipse alpha >= alpha_min covers in a strip of rows; empty if left > right.
 struct Span {
   double left = 1, right = 0;
 };

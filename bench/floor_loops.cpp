@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What bounds a frame outside of its blending: the clock, memory, sorting, binning.
+// Loops that bound the rest of a frame: clock, memory, sorting, binning.
 #include "floor_loops.hpp"
 
 #include <omp.h>
@@ -22,7 +22,7 @@ double measure_clock() {
     for (std::size_t i = 0; i < kSteps / 16; ++i) {
       for (int k = 0; k < 16; ++k) {
         sum += step;
-        asm volatile("" : "+r"(sum));  // one addition after the other
+        asm volatile("" : "+r"(sum));  // makes each addition wait for the one before it
       }
     }
   });
@@ -31,7 +31,7 @@ double measure_clock() {
 }
 
 double measure_bandwidth(int threads) {
-  constexpr std::size_t kFloats = std::size_t{64} << 20;  // 256 MiB: no cache holds it
+  constexpr std::size_t kFloats = std::size_t{64} << 20;  // 256 MiB, more than any cache holds
   const std::unique_ptr<float[]> data(new float[kFloats]);
   const std::size_t pieces = static_cast<std::size_t>(threads), piece = kFloats / pieces / 256 * 256;
 #pragma omp parallel num_threads(threads)
@@ -59,7 +59,7 @@ double measure_sort_ns(int threads) {
   const std::unique_ptr<std::uint64_t[]> input(new std::uint64_t[kKeys]), a(new std::uint64_t[kKeys]),
       b(new std::uint64_t[kKeys]);
   const std::size_t pieces = static_cast<std::size_t>(threads);
-  // Counts of both passes and all threads; those of a thread lie together.
+  // Counts of both passes and of all threads; the counts of a thread lie together.
   const std::unique_ptr<std::uint32_t[]> counts(new std::uint32_t[2 * pieces * kDigits]);
   Rng rng(1);
   for (std::size_t i = 0; i < kKeys; ++i) {
@@ -77,7 +77,8 @@ double measure_sort_ns(int threads) {
         const std::uint64_t* from = pass == 0 ? input.get() : a.get();
         std::uint64_t* to = pass == 0 ? a.get() : b.get();
         std::uint32_t* own = counts.get() + (static_cast<std::size_t>(pass) * pieces + t) * kDigits;
-        // One thread counts for both passes in one reading. Several read their parts anew in each pass.
+        // One thread counts for both passes in one reading. Several threads read their parts anew in
+        // each pass.
         if (pass == 0 || pieces > 1) {
           for (std::size_t d = 0; d < kDigits * (pieces == 1 ? 2 : 1); ++d) own[d] = 0;
           for (std::size_t i = begin; i < end; ++i) {
@@ -117,7 +118,8 @@ double measure_bin_ns() {
   Rng rng(2);
   std::size_t count = 0;
   for (std::size_t i = 0; i < kSplats; ++i) {
-    // 1.5 pairs a splat: three in ten span a second tile one way or the other, one in ten both.
+    // 1.5 pairs per splat on average: three in ten splats span a second tile in one direction, one in
+    // ten in both.
     const std::size_t kind = rng.below(10);
     ranges[i] = {static_cast<std::uint8_t>(rng.below(kColumns - 1)),
                  static_cast<std::uint8_t>(rng.below(kColumns - 1)),
@@ -128,8 +130,8 @@ double measure_bin_ns() {
   const std::unique_ptr<Pair[]> pairs(new Pair[count + 4]);
   const std::unique_ptr<std::uint32_t[]> lists(new std::uint32_t[count]);
   const double ns = best_ns(20, [&] {
-    // Always write four pairs and keep as many as there are tiles: a branch on their number could not be
-    // predicted. More than 2x2 tiles are rare and not counted here.
+    // The loop always writes four pairs and keeps one per tile, because a branch on their number would
+    // be mispredicted. Footprints of more than 2x2 tiles are rare and not counted here.
     Pair* end = pairs.get();
     for (std::uint32_t i = 0; i < kSplats; ++i) {
       const Range r = ranges[i];

@@ -12,9 +12,9 @@
 
 namespace gsnav_bench {
 
-/// The stages of one camera's frame, each on its own, on any backend: what `render_camera` runs in a
-/// row. One cloud, one origin, Response::ewa. Every stage reads what the one before it left and may be
-/// run any number of times; the constructor runs all but the blending once.
+/// The stages of one camera's frame as separate calls, on any backend; `render_camera` runs them one
+/// after the other. One cloud, one origin, Response::ewa. Every stage reads the results of the stage
+/// before it and may run any number of times. The constructor runs all stages but the blending once.
 template <class S, gsnav::Backend B>
 class FrameStages {
  public:
@@ -59,7 +59,7 @@ class FrameStages {
     sync();
   }
 
-  /// RGB of the bins.
+  /// Blends the RGB of the bins.
   void blend() {
     gsnav::RasterArgs<S> raster;
     raster.grid = bin_.grid;
@@ -79,7 +79,7 @@ class FrameStages {
   std::size_t pixels() const noexcept { return images_.size() / 3; }
   const gsnav::BinArgs<S>& bins() const noexcept { return bin_; }
 
-  /// Records of the survivors, slot by slot of the chunks.
+  /// Records of the Gaussians that survive culling, in the order of the chunks' slots.
   std::vector<gsnav::SplatGeometry<S>> survivors_geometry() const { return survivors(geometry_); }
   std::vector<gsnav::SplatColor<S>> survivors_colors() const { return survivors(colors_); }
   std::vector<std::uint64_t> tile_offsets() const { return all_of(tile_offsets_); }
@@ -142,7 +142,7 @@ class FrameStages {
                            static_cast<std::size_t>(camera.height));
   }
 
-  /// Depth order of the survivors, on the host: the sort has a benchmark of its own.
+  /// Computes the depth order of the survivors on the host, because the sort has its own benchmark.
   void set_order() {
     const std::vector<std::uint32_t> keys = all_of(chunk_keys_), counts = all_of(counts_);
     std::vector<std::uint32_t> order;

@@ -20,17 +20,17 @@
 #include "gsnav/math/quat.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
-// What the families of kernel benchmarks share: how rows are named and which backends they run on.
+// Shared by the kernel benchmarks: names of rows, and the backends that they run on.
 
 namespace gsnav_bench {
 
-// One function a family, called by main.
+// One function per family of kernels, called by main.
 void register_frame_kernels();    // projection, SH, keys, sort, bin, blend
 void register_skin_kernels();     // linear blend skinning
 void register_body_kernels();     // polar rotation, forward kinematics
 void register_capsule_kernels();  // distance, time of impact
 
-/// Its time is what the body says (SetIterationTime), or else that of a clock.
+/// Source of a row's time: a clock, or the body's SetIterationTime.
 enum class TimedBy { clock, body };
 
 template <class S, class Backend, class Body, class... Args>
@@ -57,7 +57,8 @@ void add_row(const std::string& kernel, const std::string& variant, const std::s
                             backend_args...);
 }
 
-/// The openmp backend on one thread and on two. `scalar` is what stands in the name.
+/// Adds rows for the openmp backend on one thread and on two. `scalar`: name of the scalar type in the
+/// row's name.
 template <class Body>
 void add_openmp_rows(const std::string& kernel, const std::string& variant, const std::string& scalar,
                      const Body& body) {
@@ -68,8 +69,8 @@ void add_openmp_rows(const std::string& kernel, const std::string& variant, cons
   }
 }
 
-/// The GPU, where the build has the backend and the machine the device. Only for bodies whose work
-/// gsnav::cuda has compiled: a functor of this program's own needs nvcc.
+/// Adds a row for the GPU, if the build has the backend and the machine has a device. Only for bodies
+/// whose kernels gsnav::cuda has compiled, since a functor of this program would need nvcc.
 template <class Body>
 void add_cuda_row([[maybe_unused]] const std::string& kernel,
                   [[maybe_unused]] const std::string& variant, [[maybe_unused]] const Body& body,
@@ -81,8 +82,8 @@ void add_cuda_row([[maybe_unused]] const std::string& kernel,
 #endif
 }
 
-/// Rows of one kernel: the float64 reference, the same template in float, and openmp. `body` is called
-/// as body.operator()<S>(state, backend).
+/// Adds the rows of one kernel: the float64 reference, the same template in float, and openmp. `body` is
+/// called as body.operator()<S>(state, backend).
 template <class Body>
 void add_cpu_rows(const std::string& kernel, const std::string& variant, const Body& body) {
   add_row<double, gsnav::SerialBackend>(kernel, variant, "double", "SerialBackend", body);
@@ -90,7 +91,7 @@ void add_cpu_rows(const std::string& kernel, const std::string& variant, const B
   add_openmp_rows(kernel, variant, "float", body);
 }
 
-/// Items (and bytes, where the kernel is bound by them) of all iterations.
+/// Counts the items of all iterations, and their bytes if the kernel is bound by them.
 inline void count(benchmark::State& state, std::size_t items, std::size_t bytes_per_item = 0) {
   const std::int64_t total =
       static_cast<std::int64_t>(state.iterations()) * static_cast<std::int64_t>(items);
@@ -112,13 +113,13 @@ void time_items(benchmark::State& state, B& backend, std::size_t n, const F& f,
 /// Joints of an SMPL-X body.
 inline constexpr std::size_t kJoints = 55;
 
-/// A rotation about any axis by up to `most` radians.
+/// A rotation about a random axis by up to `most` radians.
 inline gsnav::Quat<double> random_turn(gsnav::Rng& rng, double most) {
   return gsnav::axis_angle(gsnav::normalized(gsnav::Vec3d{rng.normal(), rng.normal(), rng.normal()}),
                            rng.uniform(0, most));
 }
 
-/// A wall of n Gaussians three metres ahead, one in ten a needle.
+/// A wall of n Gaussians three metres ahead; one in ten is a needle.
 inline gsnav::GaussianCloud wall(std::size_t n, int sh_degree) {
   gsnav::Rng rng(1);
   gsnav::GaussianCloudBuilder builder(sh_degree);
@@ -134,7 +135,7 @@ inline gsnav::GaussianCloud wall(std::size_t n, int sh_degree) {
     for (float& c : g.sh0) c = static_cast<float>(rng.normal());
     for (float& c : rest) c = static_cast<float>(0.2 * rng.normal());
     g.shN = sh_degree > 0 ? rest.data() : nullptr;
-    if (builder.add(g)) ++i;  // the builder drops what is too faint to be seen
+    if (builder.add(g)) ++i;  // the builder drops Gaussians that are too faint to be seen
   }
   return builder.cloud();
 }

@@ -7,18 +7,18 @@
 #include "gsnav/core/rng.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
-// A made outdoor capture, for what depends on its extent: hilly ground of 170 x 230 m with houses,
-// towers and trees up to 110 m, a shell of sky 1.3 km away, z up, positions on a 16-bit grid (many
-// coordinates are equal).
+// A synthetic outdoor capture, for costs that depend on a scene's extent. It has hilly ground of 170 x
+// 230 m with houses, towers and trees up to 110 m high, and a shell of sky 1.3 km away. Z is up.
+// Positions lie on a 16-bit grid, so that many coordinates are equal.
 
 namespace gsnav_bench {
 
-/// Height of the ground: slopes of up to 12 degrees.
+/// Height of the ground, metres: slopes of up to 12 degrees.
 inline double ground_height(double x, double y) {
   return 3.0 * std::sin(x / 23.0) + 2.5 * std::cos(y / 31.0);
 }
 
-/// `count` Gaussians: a half of it ground, a quarter buildings, a fifth trees, the rest sky.
+/// `count` Gaussians: half of them ground, a quarter buildings, a fifth trees, the rest sky.
 inline gsnav::GaussianCloud large_capture(std::size_t count) {
   using namespace gsnav;
   constexpr double kPi = 3.14159265358979323846, kX = 170, kY = 230;
@@ -36,7 +36,7 @@ inline gsnav::GaussianCloud large_capture(std::size_t count) {
     g.opacity_logit = std::log(opacity / (1 - opacity));
     builder.add(g);
   };
-  // Ground: disks that overlap, along the slope.
+  // Ground: overlapping disks along the slope.
   const double spacing = std::sqrt(kX * kY / (0.5 * static_cast<double>(count)));
   const auto nx = static_cast<std::size_t>(kX / spacing), ny = static_cast<std::size_t>(kY / spacing);
   for (std::size_t i = 0; i < nx; ++i) {
@@ -48,7 +48,7 @@ inline gsnav::GaussianCloud large_capture(std::size_t count) {
           rng.uniform(0.6, 0.99));
     }
   }
-  // Buildings: four walls and a roof each, three of them towers.
+  // Buildings: four walls and a roof each; three are towers.
   const auto facade = static_cast<std::size_t>(0.25 * static_cast<double>(count) / 24);
   for (int b = 0; b < 24; ++b) {
     const double w = rng.uniform(8, 16), d = rng.uniform(8, 16), x0 = 10 + 40.0 * (b % 4),
@@ -69,7 +69,7 @@ inline gsnav::GaussianCloud large_capture(std::size_t count) {
       }
     }
   }
-  // Trees: a trunk and a crown of leaves that point anywhere.
+  // Trees: a trunk, and a crown of leaves in all orientations.
   const auto leaves = static_cast<std::size_t>(0.2 * static_cast<double>(count) / 150);
   for (int t = 0; t < 150; ++t) {
     const double x = rng.uniform(2, kX - 2), y = rng.uniform(2, kY - 2), z = ground_height(x, y),

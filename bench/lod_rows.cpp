@@ -28,7 +28,7 @@ double psnr(const std::vector<float>& a, const std::vector<float>& b) {
   return -10 * std::log10(std::max(sum / static_cast<double>(a.size()), 1e-30));
 }
 
-/// The k x k rays of pixel p: f(index into a fine image).
+/// Calls f(index into the fine image) for the k x k rays of pixel p.
 template <class F>
 void for_each_ray(std::size_t p, const F& f) {
   const std::size_t x = p % kSide, y = p / kSide;
@@ -36,9 +36,9 @@ void for_each_ray(std::size_t p, const F& f) {
     f((y * kPhoto + i / kPhoto) * kFine + x * kPhoto + i % kPhoto);
 }
 
-/// How far a depth is, relatively, from the nearest of those that a pixel's rays have: at an edge any of
-/// them is right, and one between them is not. A return where no ray has one, and none where all
-/// have: 1.
+/// Relative difference of a depth from the nearest depth among the rays of its pixel. At an edge the
+/// depth of any ray is right, and a value between them is wrong. The difference is 1 if there is a depth
+/// but no ray has one, or if there is none but all rays have one.
 double depth_error(float depth, const std::vector<float>& fine, std::size_t pixel) {
   double least = std::numeric_limits<double>::infinity();
   for_each_ray(pixel, [&](std::size_t i) {

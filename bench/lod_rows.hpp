@@ -13,34 +13,35 @@ namespace gsnav_bench {
 
 inline constexpr int kLodSide = 256, kLodPhoto = 4;
 
-/// What a row of bench_lod draws.
+/// Content of a row of bench_lod.
 enum class LodDraw {
-  direct,  ///< every Gaussian, by the asset's own filter
-  photo,   ///< every Gaussian, by the photo's
+  direct,  ///< every Gaussian, with the asset's own filter
+  photo,   ///< every Gaussian, with the photo's filter
   lod,     ///< a cut
-  seen,    ///< by the asset's own filter, what is seen from the camera's cell
+  seen,    ///< with the asset's own filter, only Gaussians visible from the camera's cell
 };
 
-/// Views and what a photo of each would be: O_photo(kLodPhoto).
+/// Views, and the image that a photo of each would have: O_photo(kLodPhoto).
 struct LodViews {
   std::vector<gsnav::Camera> cameras;
-  std::vector<std::vector<float>> rgb;  ///< [H][W][3] a view
+  std::vector<std::vector<float>> rgb;  ///< [H][W][3] per view
   std::vector<std::vector<float>>
-      depths;                  ///< [k H][k W] a view: the median depths of the photo's own rays, metres
-  std::vector<double> direct;  ///< PSNR of direct rendering, once its row was drawn
+      depths;                  ///< [k H][k W] per view: the median depths of the photo's rays, metres
+  std::vector<double> direct;  ///< PSNR of direct rendering, set when its row is drawn
   double direct_ms = 0;
   std::size_t first = 0;  ///< number of the first camera
   bool each = false;      ///< print every view
 };
 
-/// Renders the photos: exactly, on all threads.
+/// Renders the photos exactly, on all threads.
 LodViews lod_views(const gsnav::GaussianCloud& cloud, const std::vector<gsnav::Camera>& cameras);
 
-/// One row of the table, view by view.
+/// One row of the table. It is filled view by view.
 class LodRow {
  public:
   LodRow(LodViews& views, LodDraw draw) : views_(&views), draw_(draw) {}
-  /// The next view: its images, [H][W][3] and [H][W] metres (0: no return), and milliseconds.
+  /// Adds the next view. Images are [H][W][3] and [H][W] metres (0: no return); `ms` is its time,
+  /// milliseconds.
   void add(const std::vector<float>& rgb, const std::vector<float>& median_depth, double ms,
            double visible, double pairs);
   void print(const char* name, double pixels) const;
@@ -55,7 +56,7 @@ class LodRow {
 };
 
 #if defined(GSNAV_HAS_CUDA)
-/// The table's rows on the first GPU; a line that says so where there is none.
+/// Prints the table's rows for the first GPU, or a line that there is none.
 void lod_rows_on_gpu(LodViews& views, const gsnav::GaussianCloud& cloud, const gsnav::LodTree& tree,
                      const gsnav::VisibleSets& visible, const std::vector<double>& pixels);
 #endif

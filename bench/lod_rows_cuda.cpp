@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// bench_lod on a GPU: one camera a call, then all views in one, milliseconds a frame between events on
-// the stream, the copy of the cut's chunks among them; the cut itself is the host's.
+// bench_lod on a GPU: one camera per call, then all views in one call. Times are milliseconds per frame
+// between events on the stream. They include the copy of the cut's chunks, but not the cut itself, which
+// the host makes.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -148,7 +149,7 @@ class GpuRows {
     config.quality = Quality::fast();
     return config;
   }
-  /// lod_config where a cut is mostly of merged ones.
+  /// lod_config of a cut that consists mostly of merged Gaussians.
   static RenderConfig closing() {
     LodStats merged;
     merged.shown = merged.merged = 1;

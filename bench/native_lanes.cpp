@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compiled with -march=native. Only functions that are always inlined are called: no other object can
-// pick up code of this one's instruction set.
+// Compiled with -march=native. It calls only functions that are always inlined, so that no other object
+// file can link to code with this instruction set.
 #include "native_lanes.hpp"
 
 #include "gsnav/detail/math/pack.hpp"

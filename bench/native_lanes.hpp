@@ -3,8 +3,8 @@
 
 #include <cstddef>
 
-// Kernels over the lane pack that this processor has, compiled with its own instruction set: what an
-// isolated kernel gives in lanes, whatever the instruction set of the rest.
+// Kernels over the processor's own lane pack, compiled with its own instruction set. They measure a
+// kernel in lanes whatever the instruction set of the rest of the program.
 
 namespace gsnav_bench {
 
@@ -19,12 +19,12 @@ struct ShPlanes {
 /// Floats in a pack.
 int native_width() noexcept;
 
-/// SH colours of the Gaussians [begin, end), both multiples of native_width(): the bits of
-/// gaussian_color.
+/// SH colours of the Gaussians [begin, end), with the same bits as gaussian_color. `begin` and `end` are
+/// multiples of native_width().
 void native_sh(const ShPlanes& planes, int degree, std::size_t begin, std::size_t end) noexcept;
 
-/// Polar rotations of the matrices [begin, end), both multiples of native_width(): the bits of
-/// polar_rotation. `in`, `out`: nine planes, row by row.
+/// Polar rotations of the matrices [begin, end), with the same bits as polar_rotation. `begin` and `end`
+/// are multiples of native_width(). `in`, `out`: nine planes, row by row.
 void native_polar(const float* const (&in)[9], float* const (&out)[9], std::size_t begin,
                   std::size_t end) noexcept;
 

@@ -5,22 +5,23 @@
 
 #include "gsnav/detail/math/pack.hpp"
 
-// What timed loops share that are compiled with -march=native. Only such sources may include it: a
-// linker keeps one copy of a template, which another processor could not run. For the same reason they
-// use templates of the standard library for memory and clocks only.
+// Shared by timed loops that are compiled with -march=native; no other source may include it. A linker
+// keeps one copy of a template, which another processor could not run. For the same reason these sources
+// use standard library templates only for memory and clocks.
 
 namespace gsnav_bench {
 
 inline constexpr int kLanes = GSNAV_PACK_WIDTH;
 using F = gsnav::Pack<float, kLanes>;
 
-/// Keeps a value from being computed away.
+/// Prevents the compiler from removing the computation of a value.
 template <class T>
 void keep(const T& value) {
   asm volatile("" : : "r"(&value) : "memory");
 }
 
-/// The best of several runs, nanoseconds: nothing makes a run faster than the machine is.
+/// Time of the fastest of several runs, ns. The fastest is the best estimate, because disturbances only
+/// slow a run down.
 template <class Run>
 double best_ns(int repeats, const Run& run) {
   double best = 1e300;

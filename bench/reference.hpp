@@ -10,14 +10,14 @@
 
 namespace gsnav_bench {
 
-/// At most this many views of a workload are judged.
+/// Most views of a workload that are judged.
 inline constexpr std::size_t kJudgedViews = 4;
 
-/// Which: evenly spread.
+/// The judged views of `cameras`, evenly spread.
 std::vector<gsnav::Camera> judged_views(const std::vector<gsnav::Camera>& cameras);
 
-/// Float64 images of a scene by the contract's oracle, view after view; kept in the folder that
-/// GSNAV_BENCH_REFERENCES names, where it does. Throws gsnav::Error.
+/// Float64 images of a scene by the contract's oracle, one per view. GSNAV_BENCH_REFERENCES, if set,
+/// names a folder that caches them. Throws gsnav::Error.
 const std::vector<gsnav_report::Reference>& references(const gsnav::GaussianCloud& cloud,
                                                        const std::vector<gsnav::Camera>& cameras);
 

@@ -8,8 +8,8 @@
 
 namespace gsnav_bench {
 
-/// The q-quantile (0 to 1) of values in any order; of none, 0. The median of an even number is the upper
-/// one.
+/// The q-quantile (0 to 1) of values in any order; 0 if there are none. The median of an even number of
+/// values is the upper one.
 inline double quantile(std::vector<double> values, double q) {
   if (values.empty()) return 0;
   const auto at =

@@ -12,8 +12,7 @@
 
 namespace gsnav_bench {
 
-/// Where a frame's time goes. `other`: what the calling thread does between kernels (validation,
-/// uploads, sums).
+/// Stages of a frame. `other`: the calling thread's work between kernels (validation, uploads, sums).
 enum class Stage { project, sort, bin, blend, other };
 inline constexpr std::size_t kStages = 5;
 inline constexpr const char* kStageNames[kStages] = {"project", "sort", "bin", "blend", "other"};
@@ -23,9 +22,9 @@ using StageTimes = std::array<double, kStages>;
 
 inline double sum_of(const StageTimes& t) noexcept { return t[0] + t[1] + t[2] + t[3] + t[4]; }
 
-/// A host backend whose calls are timed: what `render_camera` does is measured as it is, call by call,
-/// so that the stages with `other` are the whole frame. A new stage of the table needs a line in
-/// stage_of_run, or is `other`.
+/// A host backend whose calls are timed. It measures `render_camera` as it is, call by call, so that the
+/// stages and `other` together make up the whole frame. A new stage counts as `other` until it has a
+/// line in stage_of_run.
 template <gsnav::Backend Base>
 class TimedBackend : public Base {
  public:
@@ -36,7 +35,7 @@ class TimedBackend : public Base {
     times_ = {};
     mark_ = Clock::now();
   }
-  /// Ends it: milliseconds by stage since begin().
+  /// Ends the frame. @return Milliseconds by stage since begin().
   StageTimes end() noexcept {
     add(Stage::other);
     return times_;
@@ -64,7 +63,7 @@ class TimedBackend : public Base {
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// The stage of a functor that a generic fallback launches.
+  /// The stage that a functor of a generic fallback belongs to.
   template <class F>
   static constexpr Stage stage_of() noexcept {
     using S = float;
@@ -83,7 +82,7 @@ class TimedBackend : public Base {
     }
   }
 
-  /// The stage of a stage that the backend has a form of its own of.
+  /// The stage of a kernel that the backend implements itself.
   template <class S, class... Args>
   static constexpr Stage stage_of_run() noexcept {
     namespace stage = gsnav::stage;

@@ -21,7 +21,7 @@ namespace gsnav_bench {
 
 namespace {
 
-/// Takes the axis that is most upwards in the images to Y.
+/// Rotation that takes the axis that is most upwards in the images to Y.
 Quatd upright(const std::vector<Camera>& cameras) {
   Vec3d up;
   for (const Camera& c : cameras) up = up - c.viewmat.linear.row[1];
@@ -58,7 +58,7 @@ VisibleSets workload_visible_sets(VisibleSettings settings) {
   }));
   const std::vector<Vec3d> viewpoints =
       navmesh_viewpoints(built.mesh, heights, settings.spacing()).value();
-  settings.most_share = 1;  // measured also where nothing is gained
+  settings.most_share = 1;  // measured even if visible sets save nothing
   OpenMPBackend backend;
   const auto start = std::chrono::steady_clock::now();
   const char* scene = std::getenv("GSNAV_BENCH_SCENE");

@@ -5,9 +5,11 @@
 
 namespace gsnav_bench {
 
-/// What is seen of the workload from where its cameras could be: at their heights above the floor of a
-/// NavMesh read off its Gaussians, 0.3 m or more from what stands there. Up is what is up in most of its
-/// images. Kept beside GSNAV_BENCH_SCENE. Prints what it takes. `settings`: the camera's are set here.
+/// Visible sets of the workload for all places where its cameras could be. These are at the cameras'
+/// heights above the floor of a NavMesh built from the workload's Gaussians, at least 0.3 m from
+/// obstacles. The up axis is the one that is up in most of the images. The sets are cached beside
+/// GSNAV_BENCH_SCENE. Prints their cost. `settings`: this function overwrites those that describe the
+/// camera.
 gsnav::VisibleSets workload_visible_sets(gsnav::VisibleSettings settings = {});
 
 }  // namespace gsnav_bench

@@ -8,19 +8,19 @@
 
 namespace gsnav_bench {
 
-/// What is rendered: the files that GSNAV_BENCH_SCENE and GSNAV_BENCH_CAMERAS name, or without them the
-/// embedded flat from its four viewpoints.
+/// The rendered scene: the files that GSNAV_BENCH_SCENE and GSNAV_BENCH_CAMERAS name, or without them
+/// the embedded flat from its four viewpoints.
 struct Workload {
   gsnav::GaussianCloud cloud;
-  std::vector<gsnav::Camera> cameras;  ///< at some size; `sized` gives the others
+  std::vector<gsnav::Camera> cameras;  ///< at some size; sized() gives other sizes
 };
 
 const Workload& workload();
 
-/// Its cloud without the SH bands above degree 0.
+/// The workload's cloud without the SH bands above degree 0.
 const gsnav::GaussianCloud& base_color_cloud();
 
-/// The cameras at another size: the same horizontal field of view, centred.
+/// The cameras at another size, centred, with the same horizontal field of view.
 std::vector<gsnav::Camera> sized(int width, int height);
 
 }  // namespace gsnav_bench

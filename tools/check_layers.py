@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks that no include points up or sideways (CONTRIBUTING.md, "Layout of the repository"). Examples,
-tools and the report may use public headers and names only: nothing of detail/ or src/, and no `detail::`.
+"""Checks that no file includes a header of a higher layer or of another module of its layer (CONTRIBUTING.md,
+"Layout of the repository"). Examples, tools and the report may use only public headers and names: nothing of
+detail/ or src/, and no `detail::`.
 
 usage: check_layers.py [root]      check a source tree (default: this one)
        check_layers.py --self-test plant violations in a scratch tree and expect to find each
@@ -14,13 +15,13 @@ import tempfile
 RANK = {"base": 0, "math": 1, "core": 2, "image": 3, "frame": 4, "skin": 4, "sweep": 4, "mesh": 5, "lanes": 6,
         "render": 6, "scene": 7, "avatar": 7, "nav": 7, "rigging": 8, "io": 8, "interop": 8, "sim": 8,
         "eval": 8, "demo": 9, "device": 9, "open": 10}
-# avatar may include these
+# headers that avatar may include too
 DATA_ONLY = {"scene/gaussian_cloud.hpp", "scene/load_report.hpp", "scene/surface_material.hpp"}
-# Not standard, but there wherever the code that includes them is compiled.
+# Headers that are not standard, but exist on every platform that compiles the code that includes them.
 PLATFORM_HEADERS = {"immintrin.h", "arm_neon.h", "fcntl.h", "sys/mman.h", "sys/stat.h", "unistd.h"}
-# headers that include what users need
+# modules with a header <module>.hpp that includes their public headers
 MODULES = {"render", "avatar", "rigging", "nav", "sim", "io", "eval", "demo", "open", "gsnav"}
-# Public headers: of the library in include/, and those that backends add for who names a backend.
+# Largest number of public headers: of the library in include/, and those that backends add.
 MOST_PUBLIC, MOST_PUBLIC_OF_BACKENDS = 70, 8
 SOURCES = {".hpp", ".cpp", ".h", ".inl", ".cu", ".cuh"}
 NO_CODE = re.compile(r'//[^\n]*|/\*.*?\*/|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"', re.DOTALL)
@@ -50,7 +51,7 @@ def allowed(layer, target, target_path):
 
 
 def private(root, file, name):
-    """Whether this include of a program leads to what is not for users."""
+    """Whether this include of a program names a header that is not public."""
     places = [root / top / name for top in ("include", "src")] + list(root.glob(f"backends/*/{name}"))
     for place in (file.parent / name, *places):
         if place.is_file():
@@ -61,14 +62,14 @@ def private(root, file, name):
 
 
 def public_headers(root):
-    """Those of the library and those of backends."""
+    """Public headers of the library, and those of backends."""
     library = [p for p in (root / "include/gsnav").rglob("*.hpp")
                if p.relative_to(root / "include/gsnav").parts[0] != "detail"]
     return library, [p for p in root.glob("backends/*/gsnav/**/*") if p.suffix in SOURCES]
 
 
 def check_program(root, file):
-    """What an example or a tool uses that is not for users."""
+    """Includes and names in an example or a tool that are not public."""
     text, path = file.read_text(encoding="utf-8"), file.relative_to(root)
     wrong = [f"{path}: {name} is not for users; its module header is" for _, name in INCLUDE.findall(text)
              if private(root, file, name)]
@@ -78,7 +79,7 @@ def check_program(root, file):
 
 
 def check(root):
-    """Lines 'file: what is wrong', one per include that may not be."""
+    """Lines 'file: problem', one for each include that is not allowed."""
     wrong = []
     files = [p for top in ("include/gsnav", "src", "backends") for p in sorted((root / top).rglob("*"))
              if p.suffix in SOURCES]

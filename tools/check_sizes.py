@@ -29,10 +29,10 @@ REQUIRES = re.compile(r"\brequires *(?:\(\))?$")
 
 
 def without(text, opened, closed):
-    """The text with what stands between these brackets taken out."""
+    """The text without everything between these brackets."""
     out, depth = [], 0
     for at, char in enumerate(text):
-        if char == closed and depth > 0 and text[at - 1] != "-":  # not the arrow
+        if char == closed and depth > 0 and text[at - 1] != "-":  # not the arrow ->
             depth -= 1
         if depth == 0:
             out.append(char)
@@ -42,7 +42,7 @@ def without(text, opened, closed):
 
 
 def is_body(head, inside_parentheses):
-    """Whether a brace behind this text, where no function is open, opens the body of one."""
+    """Whether a brace behind this text opens the body of a function. The text is outside functions."""
     head = without(without(without(head, "(", ")"), "[", "]"), "{", "}")
     head = " ".join(re.sub(r"\boperator *(?:<=>|<<|>>|<=|>=|->|<|>)", "operator", head).split())
     head = without(head, "<", ">")
@@ -57,21 +57,21 @@ def is_body(head, inside_parentheses):
         head = re.sub(r"\b(class|struct|union) +[A-Z][A-Z0-9_]+ *\(\)", r"\1", OF_TYPE.sub("", head))
     if "(" not in head or head.endswith(("=", ",", "(")):
         return False
-    # A constructor's list of initialisers: the body comes after one that is closed.
+    # In a constructor's list of initialisers, the body comes after a closed initialiser.
     listed = re.search(r"\).*?(?<!:):(?!:)", head)
     return not listed or head.endswith((")", "}"))
 
 
 def functions(text):
-    """(first line, lines, head) of each function body; what is inside of one counts as its own. A macro of several
-    lines is one."""
+    """(first line, number of lines, head) of each function body, including nested functions. A macro of several
+    lines counts as a function body."""
     text = SEPARATED.sub(lambda m: m.group().replace("'", " "), text)
     code = NO_CODE.sub(lambda m: re.sub(r"[^\n]", " ", m.group()), text)
     found = [(code.count("\n", 0, m.start()) + 1, m.group().count("\n") + 1, " ".join(m.group().split("\\")[0].split()))
              for m in DIRECTIVE.finditer(code) if re.match(r"[ \t]*#[ \t]*define\b", m.group())]
     code = DIRECTIVE.sub(lambda m: re.sub(r"[^\n]", " ", m.group()), code)
-    # (bracket, its place, where the declaration around it began, it opens a body, the declaration goes on behind it)
-    opened, begin, inside = [], 0, 0  # inside: braces that are open in a body
+    # (bracket, its position, start of the declaration around it, opens a body, declaration continues behind it)
+    opened, begin, inside = [], 0, 0  # inside: number of open braces in a body
     for at, char in enumerate(code):
         if inside and char in "{}":
             inside += 1 if char == "{" else -1
@@ -105,7 +105,7 @@ def functions(text):
 
 
 def too_long(name, text):
-    """Lines 'file: what is wrong' of one file, named from the root of the tree."""
+    """Lines 'file: problem' of one file, whose path is relative to the root of the tree."""
     of_tests = name.startswith("tests/")
     most, lines = MOST_LINES_OF_TESTS if of_tests else MOST_LINES, text.count("\n")
     wrong = [f"{name}: {lines} lines, more than {most}"] if lines > most else []
@@ -141,7 +141,7 @@ def self_test():
                  "template <class T>\n  requires requires(T t) { t.a; }\nvoid f(T t) ",
                  "struct A {\n  operator bool() const ", "auto f() -> std::vector<int> ", "A::~A() noexcept(true) ",
                  "[[nodiscard]] int f() ", "struct A {\n public:\n  A() "):
-        # A brace in a string or a comment is none.
+        # A brace in a string or a comment does not count.
         if not found(head + '{  // {\n  g("{");\n' + body + "}\n}\n"):
             sys.exit(f"not found: {head}")
     if not found("#define F(a) \\\n" + "  f(a); \\\n" * 80 + "  f(a)\n"):

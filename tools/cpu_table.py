@@ -31,8 +31,8 @@ FLATS = {"flat 100K": 100_000, "flat 300K": 300_000, "flat 1M": 1_000_000}
 SHOWROOMS = {"LaCadiere 3": "3_0,3_1", "LaCadiere 2": "2_0,2_1,2_2"}
 MARKS = ("<!-- cpu-table: begin -->", "<!-- cpu-table: end -->")
 TIMEOUT_S = 900
-# Of GNU's OpenMP, for all renderers alike: without a bound a waiting thread may keep the core that the working one
-# needs, for 8 ms at every barrier.
+# Bound on spinning in GNU's OpenMP, for all renderers alike. Without it a waiting thread may occupy the core that
+# the working thread needs, for 8 ms at every barrier.
 SPIN_BOUND = {"GOMP_SPINCOUNT": os.environ.get("GOMP_SPINCOUNT", "20000")}
 
 
@@ -41,7 +41,7 @@ def stop(message):
 
 
 def run(command, env=None, **kwargs):
-    """Standard output of a command; ends the program with its last words where it fails."""
+    """Standard output of a command. If it fails, ends the program with the end of its error output."""
     try:
         done = subprocess.run([str(c) for c in command], env={**os.environ, **SPIN_BOUND, **(env or {})}, text=True,
                               capture_output=True, timeout=TIMEOUT_S, **kwargs)
@@ -54,7 +54,7 @@ def run(command, env=None, **kwargs):
 
 
 def busy_share(seconds):
-    """Of all cores."""
+    """Share of all cores that was busy during `seconds`."""
     def ticks():
         fields = [int(f) for f in pathlib.Path("/proc/stat").read_text().split("\n")[0].split()[1:]]
         return sum(fields), fields[3] + fields[4]
@@ -65,7 +65,7 @@ def busy_share(seconds):
 
 
 def wait_until_quiet(limit_s, what):
-    """Other programs' work would be measured too. Returns the share of the cores that they still take."""
+    """Waits until other programs are idle, since they would disturb times. Returns the share of cores still busy."""
     end = time.monotonic() + limit_s
     while (busy := busy_share(0.5)) > 0.1 and time.monotonic() < end:
         pass
@@ -83,7 +83,7 @@ def program(build, name):
 
 
 def compiled(source, cache, flags):
-    """The binary of a C++ source, built once."""
+    """Path of the binary of a C++ source, which is built once."""
     binary = cache / source.stem
     if not binary.exists() or binary.stat().st_mtime < source.stat().st_mtime:
         run(["g++", "-O3", "-fopenmp", "-std=c++17", "-w", *flags, source, "-o", binary])
@@ -96,7 +96,7 @@ def data_folder(build):
 
 
 def default_scenes(data, cache):
-    """(name, PLY, cameras) of the benchmark flats and the showroom, where they are there."""
+    """(name, PLY, cameras) of the benchmark flats and of the showroom, as far as their files exist."""
     scenes = []
     generator = data.parent / "bench_scene" / "make_bench_scene.cpp"
     if generator.exists():
@@ -147,7 +147,7 @@ def time_baseline(binary, ply, cameras, size, threads, repeats):
 
 
 def time_gsnav(bench, ply, cameras, size, threads, repeats, cache, judged):
-    """Rows of bench_render by profile and threads, and the batch's of the most threads at 256x256."""
+    """Rows of bench_render by profile and threads. At 256x256 also the row of a batch, with the most threads."""
     shape = f"{size[0]}x{size[1]}"
     names = "|".join(f"openmp{t}/rgb/({'|'.join(PROFILES)})/{shape}/" for t in threads)
     if judged and size == (256, 256):
@@ -165,8 +165,8 @@ def time_gsnav(bench, ply, cameras, size, threads, repeats, cache, judged):
 
 
 def best(rounds):
-    """Of rounds of one measurement the fastest: what disturbs only slows down. Only the first counts floor and
-    error."""
+    """The fastest of several rounds of one measurement, since disturbances only slow a round down. Only the first
+    round has floor and error."""
     first, fastest = rounds[0], min(rounds, key=lambda r: r.get("median_ms", r.get("ms", 0)))
     out = {**first, **fastest}
     for ratio in {"floor_ratio", "floor_ratio_best"} & first.keys():
@@ -245,7 +245,7 @@ def caption(options, baselines):
 
 
 def summary(rows, threads, baselines):
-    """What every row must hold, by the row that holds it least."""
+    """Lines on the limits that all rows must keep, each with the row that is worst."""
     most, lines = threads[-1], []
 
     def worst(title, value, limit, at_most):

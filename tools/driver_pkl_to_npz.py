@@ -22,7 +22,7 @@ except ImportError:
 
 
 def latin1(text, encoding):
-    """Bytes, which protocols 0 to 2 write as a text and its encoding."""
+    """Bytes from a text and its encoding, as protocols 0 to 2 write them."""
     if encoding != "latin1" or not isinstance(text, str):
         raise pickle.UnpicklingError("an encoding other than latin1")
     return text.encode("latin1")
@@ -31,14 +31,14 @@ def latin1(text, encoding):
 def allowed():
     """Functions that a pickle may call, by (module, name)."""
     arrays = numpy.empty(0)
-    rebuild = arrays.__reduce__()[0]  # where it lives differs between versions of NumPy
+    rebuild = arrays.__reduce__()[0]  # its module differs between versions of NumPy
     scalar = numpy.float64(0).__reduce__()[0]
     names = {("numpy", "ndarray"): numpy.ndarray, ("numpy", "dtype"): numpy.dtype, ("_codecs", "encode"): latin1,
-             ("__builtin__", "bytes"): bytes}  # protocols 0 to 2 write bytes of length 0 as a call
+             ("__builtin__", "bytes"): bytes}  # protocols 0 to 2 write empty bytes as a call
     for module in ("numpy.core.multiarray", "numpy._core.multiarray"):
         names[module, "_reconstruct"] = rebuild
         names[module, "scalar"] = scalar
-    # Protocol 5 stores an array's bytes beside it.
+    # Protocol 5 stores the bytes of an array separately.
     frombuffer = arrays.__reduce_ex__(5)[0]
     for module in ("numpy.core.numeric", "numpy._core.numeric"):
         names[module, "_frombuffer"] = frombuffer
@@ -46,7 +46,7 @@ def allowed():
 
 
 class ArrayUnpickler(pickle.Unpickler):
-    """Reads arrays and plain values and nothing that runs code."""
+    """Unpickler that reads arrays and plain values, and refuses everything that runs code."""
 
     def find_class(self, module, name):
         try:
@@ -62,7 +62,7 @@ def as_array(key, value):
         value = numpy.asarray(value)
     if isinstance(value, numpy.generic):
         value = numpy.asarray(value)
-    # Objects in an array may be anything, and an npz would hold them as a pickle again.
+    # Arrays of objects are refused: the objects may be anything, and an npz would store them as a pickle.
     if not isinstance(value, numpy.ndarray) or value.dtype.kind not in "biufUS":
         raise ValueError(f"'{key}' is {type(value).__name__} and no array of numbers or text")
     return value
@@ -95,7 +95,7 @@ def convert(source, target):
 
 
 class Hostile:
-    """Pickles to a call of `function`."""
+    """An object whose pickle calls `function`."""
 
     def __init__(self, function, *arguments):
         self.call = (function, arguments)

@@ -17,14 +17,14 @@ namespace {
 constexpr char kMagic[8] = {'G', 'S', 'N', 'A', 'V', 'R', 'E', 'F'};
 constexpr std::uint32_t kFormat = 1;
 
-/// What stands at the front of an entry; the arrays follow in the order of the counts.
+/// Header of an entry. The arrays follow in the order of their counts.
 struct Header {
   char magic[8];
   std::uint32_t format, header_size;
   std::int32_t width, height;
   std::uint64_t counts[5];  // rgb, alpha, depth, undecided, undecided_depth
   std::uint64_t evaluations;
-  std::uint64_t checksum;  // of all that comes back
+  std::uint64_t checksum;  // of all data that load() returns
 };
 static_assert(std::is_trivially_copyable_v<Header> && sizeof(Header) == 80);
 
@@ -74,7 +74,7 @@ std::optional<Reference> ReferenceCache::load(const std::string& hash, std::stri
   if (header.format != kFormat || header.header_size != sizeof(Header)) {
     return damaged("another version of the format");
   }
-  // Sizes are compared with the file's before anything is allocated.
+  // Sizes are compared with the size of the file before anything is allocated.
   constexpr std::int32_t kMaxSide = 1 << 16;
   if (header.width < 1 || header.height < 1 || header.width > kMaxSide || header.height > kMaxSide) {
     return damaged("an impossible image size");

@@ -38,7 +38,8 @@ void append_quoted(std::string& out, const std::string& field) {
   out += '"';
 }
 
-/// Reads one record that starts at `at` and moves `at` behind its line feed; false where it has no end.
+/// Reads the record that starts at `at` and moves `at` behind its line feed. @return False if the record
+/// has no end.
 bool next_record(const std::string& text, std::size_t& at, std::vector<std::string>& fields) {
   fields.assign(1, {});
   bool quoted = false;

@@ -15,9 +15,9 @@
 
 namespace gsnav_report {
 
-/// Columns of the report in the order they are written; rows of all kinds share them. Lengths are
-/// metres, shares 0 to 1, memory bytes; a field that does not apply is empty. `key` names the
-/// measurement (commit, scene, settings) for --resume.
+/// Columns of the report in the order of the file; rows of all kinds share them. Lengths are metres,
+/// shares 0 to 1, memory bytes. A field that does not apply is empty. `key` identifies the measurement
+/// (commit, scene, settings) for --resume.
 inline constexpr std::array<std::string_view, 55> kColumns{"kind",
                                                            "machine",
                                                            "commit",
@@ -74,11 +74,12 @@ inline constexpr std::array<std::string_view, 55> kColumns{"kind",
                                                            "note",
                                                            "key"};
 
-/// One row, by column name. Naming a column that does not exist throws gsnav::Error: a mistake in code.
+/// One row, by column name. A column name that does not exist is a mistake in code and throws
+/// gsnav::Error.
 class Row {
  public:
   const std::string& get(std::string_view column) const { return fields_[index(column)]; }
-  /// The number in a field, or nothing where it is empty or none ("inf" is one).
+  /// The number in a field ("inf" is one); nothing if the field is empty or not a number.
   std::optional<double> number(std::string_view column) const;
 
   Row& set(std::string_view column, std::string value);
@@ -87,10 +88,10 @@ class Row {
   Row& set(std::string_view column, std::uint64_t value);
   Row& set(std::string_view column, int value) { return set(column, std::to_string(value)); }
 
-  /// Takes over all fields of `other` that are not empty.
+  /// Copies all fields of `other` that are not empty.
   Row& fill(const Row& other);
 
-  /// One CSV line (RFC 4180) without its line feed.
+  /// The row as a CSV line (RFC 4180) without its line feed.
   std::string line() const;
 
  private:
@@ -99,23 +100,23 @@ class Row {
   friend gsnav::Result<std::vector<Row>> parse_csv(const std::string&, const std::string&);
 };
 
-/// Rows of CSV text with any subset of the columns in any order. A last line without its line feed was
-/// cut off while it was written and is left out. Errors: invalid_file naming `source` and the line.
+/// Rows of CSV text with any subset of the columns in any order. A last line without a line feed was cut
+/// off while it was written and is left out. Errors: invalid_file naming `source` and the line.
 gsnav::Result<std::vector<Row>> parse_csv(const std::string& text, const std::string& source);
 
-/// The report's CSV while it grows: every row is on disk once `add` returns, so that the file is valid
+/// The report's CSV while it grows. Every row is on disk once `add` returns, so that the file is valid
 /// whenever the run ends.
 class CsvFile {
  public:
-  /// Starts the file, or with `resume` takes up what is there. Errors: file_not_found (cannot be
-  /// written), invalid_file (resumed file is none of the report's).
+  /// Starts the file; with `resume` it keeps the rows of an existing file. Errors: file_not_found
+  /// (cannot be written), invalid_file (the file to resume is not a CSV of the report).
   static gsnav::Result<CsvFile> open(const std::filesystem::path& path, bool resume);
 
   gsnav::Status add(Row row);
-  /// Whether a row of this key is there.
+  /// Whether there is a row with this key.
   bool has(const std::string& key) const { return keys_.count(key) != 0; }
   const std::vector<Row>& rows() const noexcept { return rows_; }
-  /// Rows may be completed later (worst view's image); `save` then writes the file anew.
+  /// Rows for changes, for example the worst view's image. `save` then writes the whole file again.
   std::vector<Row>& rows() noexcept { return rows_; }
   gsnav::Status save();
 

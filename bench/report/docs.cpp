@@ -15,7 +15,7 @@ using gsnav_tools::format;
 using gsnav_tools::format_round;
 namespace {
 
-/// Text for a cell of a Markdown table: no markup, no column break.
+/// Text for a cell of a Markdown table, without markup and column breaks.
 std::string plain(const std::string& text) {
   std::string out;
   for (const char c : text) {
@@ -50,7 +50,8 @@ std::string mean_worst(const RowRefs& rows, const char* column, double scale, bo
 const std::vector<std::string> kErrorColumns{
     "against", "PSNR, dB", "colour max, LSB", "FLIP", "depth p99, mm", "time", "pairs", "evaluations"};
 
-/// Errors of some rows and what they save, by backend and oracle; `names` are each line's first cells.
+/// Lines of errors and speedups of some rows, by backend and oracle. `names`: the first cells of each
+/// line.
 std::string error_lines(const std::vector<std::string>& names, const RowRefs& rows, const RowRefs& all) {
   std::string out;
   for (const Group& g :

@@ -9,11 +9,11 @@
 
 namespace gsnav_report {
 
-/// docs/notes/approximations.md: each approximation, its knob, its measured error and what it buys, as
-/// Markdown. `command` is what made it, for its first line.
+/// The page docs/notes/approximations.md as Markdown: each approximation, its knob, its measured error
+/// and its gain in speed. `command`: the command that made the page, for its first line.
 std::string approximations_page(const Table& table, const std::string& command);
 
-/// Writes approximations_page. Errors: file_not_found where the file cannot be written.
+/// Writes approximations_page. Errors: file_not_found if the file cannot be written.
 gsnav::Status write_docs(const Table& table, const std::filesystem::path& path,
                          const std::string& command = "gsnav-report");
 

@@ -23,7 +23,7 @@ std::string read_png(const std::filesystem::path& path) {
 
 std::string image_section(const Table& table) {
   std::string out;
-  std::set<std::string> shown;  // rows of several oracles may share one
+  std::set<std::string> shown;  // rows of several oracles may share an image
   for (const Row* row :
        select(table.of_kind("render"), [](const Row& r) { return !r.get("image").empty(); })) {
     const std::string& name = row->get("image");

@@ -8,11 +8,11 @@
 
 namespace gsnav_report {
 
-/// A table of texts that are HTML already; the first `names` columns are left-aligned names.
+/// A table of cells that are HTML already. The first `names` columns are left-aligned names.
 std::string html_table(const std::vector<std::string>& header,
                        const std::vector<std::vector<std::string>>& rows, std::size_t names = 1);
 
-// Sections of the page as HTML; empty where the table has no rows for them.
+// Sections of the page as HTML; empty if the table has no rows for them.
 std::string budget_section(const Table& table);
 std::string target_section(const Table& table);    ///< one setting beside another
 std::string settings_section(const Table& table);  ///< all numbers of all settings

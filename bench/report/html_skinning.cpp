@@ -31,7 +31,7 @@ std::string influence_plot(const std::string& title, const RowRefs& rows, const 
            select(s.rows, [&](const Row& q) { return q.get("influences") == counts[i].name; })) {
         const double at = static_cast<double>(i), from = r->number(mean).value_or(0);
         const double to = r->number(worst).value_or(from);
-        if (!(from > 0)) continue;  // no error at all has no place on a log scale
+        if (!(from > 0)) continue;  // an error of 0 has no place on a log scale
         x.push_back(at);
         y.push_back(from);
         plot.whisker(at, from, to, series.color(name));
@@ -51,7 +51,8 @@ std::string skinning_section(const Table& table) {
   if (rows.empty()) return {};
   const Series series(group_by(rows, [](const Row& r) { return r.get("knob_value"); }));
   std::string plots;
-  // Rows of no backend are what the number of influences costs; those of a backend, what float32 adds.
+  // Rows without a backend measure the cost of the number of influences; rows with one, the error that
+  // float32 adds.
   const RowRefs cut =
       select(rows, [](const Row& r) { return r.get("backend").empty() && r.number("influences"); });
   for (const Group& quantity : group_by(cut, [](const Row& r) { return r.get("name"); })) {

@@ -14,7 +14,7 @@ using gsnav_tools::format;
 using gsnav_tools::format_round;
 namespace {
 
-/// A column of the table of settings; `lowest` where the worst view is the one with the least.
+/// A column of the table of settings. `lowest`: the worst view is the one with the least value.
 struct Column {
   const char *column, *title;
   double scale;
@@ -49,7 +49,7 @@ constexpr Column kSettingColumns[] = {
     {"peak_rss", "peak memory, MB", 1e-6, false, false},
 };
 
-/// Mean of a column, the worst in parentheses where it differs in print.
+/// Mean of a column, followed by the worst value in parentheses if it differs in print.
 std::string cell(const RowRefs& rows, const Column& c) {
   const Spread s = spread(rows, c.column);
   if (s.count == 0) return "\u2013";
@@ -58,7 +58,7 @@ std::string cell(const RowRefs& rows, const Column& c) {
   return c.worst && worst != mean ? mean + " (" + worst + ")" : mean;
 }
 
-/// Rows of a kind as they are, its columns where any row has something there.
+/// A column of a table that lists the rows of a kind. Columns that are empty in all rows are left out.
 struct Plain {
   const char *column, *title;
   bool number;
@@ -69,7 +69,7 @@ std::string plain_table(const RowRefs& rows, std::initializer_list<Plain> column
   std::vector<Plain> used;
   std::copy_if(columns.begin(), columns.end(), std::back_inserter(used),
                [&](const Plain& c) { return has(rows, c.column); });
-  // Names first: they are left-aligned.
+  // Names come first, since they are left-aligned.
   std::stable_partition(used.begin(), used.end(), [](const Plain& c) { return !c.number; });
   std::vector<std::string> header;
   for (const Plain& c : used) header.push_back(escape(c.title));
@@ -96,7 +96,7 @@ std::string html_table(const std::vector<std::string>& header,
   for (const std::vector<std::string>& row : rows) {
     out += "<tr>";
     for (std::size_t i = 0; i < row.size(); ++i) {
-      // Sentences may wrap, numbers and names may not.
+      // Sentences may wrap; numbers and names may not.
       const char* style = i >= names           ? "<td>"
                           : row[i].size() > 60 ? "<td class=\"name wide\">"
                                                : "<td class=\"name\">";

@@ -59,16 +59,16 @@ void add_profiles(const PlanOptions& o, std::size_t view, const ImageSize& size,
       for (const std::string& profile : o.profiles) {
         if (profile == "none") continue;
         Setting s{view, size, sensor, backend, profile, "none", {}, {}};
-        // Other judges where nothing but the profile differs, once.
+        // The other oracles judge only the first profile of the first sensor and backend.
         const bool first_sensor = first && sensor == o.sensors.front();
         const bool others = first_sensor && profile == o.profiles.front();
         const bool lod = profile == "lod";
-        // The report cuts in host memory, and has sets there.
+        // The report has levels of detail and visible sets in host memory only.
         if ((lod || profile == "visible") && backend == "cuda") continue;
         for (const Oracle q : o.oracles) {
           if (q == Oracle::photo4 &&
               (lod || (first_sensor && profile == "fast" && contains<std::string>(o.profiles, "lod")))) {
-            s.oracles.push_back(q);  // what levels of detail are judged by, and what they stand beside
+            s.oracles.push_back(q);  // oracles of levels of detail, and of the `fast` rows beside them
           } else if (lod) {
             continue;
           } else if (q == Oracle::contract ||

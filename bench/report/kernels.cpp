@@ -25,11 +25,11 @@ constexpr std::array<std::string_view, 10> kOwn{"family_index",     "per_family_
                                                 "real_time",        "cpu_time",
                                                 "items_per_second", "bytes_per_second"};
 
-/// How benchmarks name backends: by type.
+/// Names of backends in benchmarks (their types), and in the report.
 constexpr std::array<std::pair<std::string_view, const char*>, 3> kBackends{
     {{"OpenMPBackend", "openmp"}, {"SerialBackend", "serial"}, {"CudaBackend", "cuda"}}};
 
-/// The digits after `/threads:` in a benchmark's name; empty where it names no number of threads.
+/// The digits after `/threads:` in a benchmark's name; empty if it has none.
 std::string threads_of(const std::string& name) {
   constexpr std::string_view kKey = "/threads:";
   const std::size_t at = name.find(kKey);

@@ -10,12 +10,13 @@
 
 namespace gsnav_report {
 
-/// Rows of a Google Benchmark JSON: one a benchmark and counter (the counter's name in `error_unit`, its
-/// value in `error_max`), or one without where a benchmark has none. Repetitions count as their median
-/// where the file has it. Errors: file_not_found, invalid_file naming the benchmark.
+/// Rows of a Google Benchmark JSON file: one per benchmark and counter, with the counter's name in
+/// `error_unit` and its value in `error_max`. A benchmark without counters gets one row. If the file has
+/// the median of repetitions, only the median gets rows. Errors: file_not_found, invalid_file naming the
+/// benchmark.
 gsnav::Result<std::vector<Row>> kernel_rows(const std::filesystem::path& path);
 
-/// The same from text; `source` names it in messages.
+/// The same rows from text; `source` is its name in messages.
 gsnav::Result<std::vector<Row>> parse_benchmarks(const std::string& text, const std::string& source);
 
 }  // namespace gsnav_report

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// gsnav-report: speed against error, measured.
+// gsnav-report measures speed against error.
 #include <cstdio>
 #include <exception>
 

@@ -9,7 +9,7 @@
 
 namespace gsnav_report {
 
-/// The command line of gsnav-report, checked.
+/// The checked command line of gsnav-report.
 struct Options {
   std::vector<std::string> scenes, flats;
   std::vector<std::string> visible_sets;  ///< SCENE=FILE
@@ -25,7 +25,7 @@ struct Options {
   std::vector<Oracle> oracles{Oracle::contract, Oracle::contract_f64, Oracle::photo4,
                               Oracle::ray,      Oracle::ray_key,      Oracle::untruncated};
   int threads = 0, runs = 15;
-  double max_seconds = 3;  ///< of timing one setting
+  double max_seconds = 3;  ///< limit for timing one setting
   std::string out = "report", cache, docs, benchmarks, commit, machine;
   bool resume = false, no_html = false;
   bool acceptance = false;  ///< judge by the project's own budgets and targets
@@ -33,8 +33,8 @@ struct Options {
   bool wants(const std::string& kind) const;
 };
 
-/// Parses the command line. Nothing: `exit_code` says how to end (help was asked for, or an error
-/// printed).
+/// Parses the command line. @return Nothing if the program has to end with `exit_code`, because help was
+/// asked for or an error was printed.
 std::optional<Options> parse_options(int argc, char** argv, int& exit_code);
 
 }  // namespace gsnav_report

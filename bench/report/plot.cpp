@@ -15,12 +15,12 @@ using gsnav_tools::format;
 using gsnav_tools::format_round;
 namespace {
 
-// The drawing's size and the data's rectangle in it, SVG units.
+// Size of the drawing and the rectangle of the data in it, SVG units.
 constexpr double kWidth = 440, kHeight = 320, kLeft = 62, kRight = 426, kTop = 34, kBottom = 264;
-constexpr double kCharacter = 5.6, kLine = 11;  // of the labels' font, a little generous
+constexpr double kCharacter = 5.6, kLine = 11;  // upper bounds for the labels' font
 constexpr std::size_t kMostTicks = 7;
 
-/// 1, 2 or 5 times a power of ten, so that about five steps span `range`.
+/// 1, 2 or 5 times a power of ten, such that about five steps span `range`.
 double round_step(double range) {
   const double raw = range / 5, power = std::pow(10.0, std::floor(std::log10(raw)));
   for (const double factor : {1.0, 2.0, 5.0}) {
@@ -49,7 +49,8 @@ std::string tick_text(double mantissa, int exponent) {
                        : format(mantissa * std::pow(10.0, exponent), 1);
 }
 
-/// 1-2-5 within two decades, powers of ten beyond; every other one (third, ...) where they are many.
+/// Ticks at 1, 2 and 5 times powers of ten within two decades, else at powers of ten. If there are too
+/// many, only every second one (or third, ...) is kept.
 void log_ticks(Axis& axis) {
   const int first = static_cast<int>(std::floor(std::log10(axis.low))),
             last = static_cast<int>(std::ceil(std::log10(axis.high)));
@@ -104,7 +105,7 @@ Axis make_axis(std::string title, Scale scale, const std::vector<double>& values
     const double room = std::max(1.25, std::pow(axis.high / axis.low, 0.08));
     axis.low /= room;
     axis.high *= room;
-    // At least one tick lies within a factor of 2.5.
+    // Ticks are at most a factor of 2.5 apart, so that a wider axis has at least one.
     if (axis.high / axis.low < 2.5) {
       axis.low /= 1.6;
       axis.high *= 1.6;
@@ -206,7 +207,7 @@ std::string Plot::frame() const {
     out += "<line class=\"grid\" x1=\"" + x + "\" x2=\"" + x + "\" y1=\"" + coordinate(kTop) +
            "\" y2=\"" + coordinate(kBottom) + "\"/>\n";
   }
-  // Names that would run into each other are set aslant.
+  // Names that would overlap are slanted.
   double longest = 0;
   for (const Axis::Tick& t : x_.ticks) longest = std::max(longest, static_cast<double>(t.label.size()));
   const bool slanted =
@@ -227,7 +228,7 @@ std::string Plot::frame() const {
   }
   out += "<path class=\"axis\" d=\"M" + point(kLeft, kTop) + " L" + point(kLeft, kBottom) + " L" +
          point(kRight, kBottom) + "\"/>\n";
-  if (!slanted) {  // slanted names take its room
+  if (!slanted) {  // slanted names take the room of the title
     out += "<text class=\"axis-title\" x=\"" + coordinate((kLeft + kRight) / 2) + "\" y=\"" +
            coordinate(kHeight - 8) + "\" text-anchor=\"middle\">" + escape(x_.title) + "</text>\n";
   }

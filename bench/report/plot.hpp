@@ -9,7 +9,7 @@ namespace gsnav_report {
 
 enum class Scale { linear, log };
 
-/// An axis: where values lie, and which are written beside it.
+/// An axis: the positions of values, and its ticks.
 struct Axis {
   struct Tick {
     double value;
@@ -20,11 +20,12 @@ struct Axis {
   double low = 0.0, high = 1.0;
   std::vector<Tick> ticks;
 
-  /// 0 at `low`, 1 at `high`; on a log scale 0 for what is not positive.
+  /// Position of a value on the axis: 0 at `low`, 1 at `high`. On a log scale 0 for values that are not
+  /// positive.
   double fraction(double value) const noexcept;
 };
 
-/// An axis that holds all finite `values` (on a log scale: all positive ones) with some room, round
+/// An axis that holds all finite `values` (on a log scale all positive ones) with some room, and round
 /// ticks.
 Axis make_axis(std::string title, Scale scale, const std::vector<double>& values);
 /// An axis of names at 0, 1, 2, ...
@@ -32,21 +33,21 @@ Axis name_axis(std::string title, const std::vector<std::string>& names);
 
 enum class Marker { circle, square, diamond, triangle };
 
-/// A small chart as an <svg> element that scales with the page. Marks that are not numbers are left out;
-/// what lies beyond an axis, infinities too, is drawn at its end. Texts are escaped.
+/// A small chart as an <svg> element that scales with the page. Marks at NaN are left out; marks beyond
+/// an axis, also infinite ones, are drawn at its end. Texts are escaped.
 class Plot {
  public:
   Plot(std::string title, Axis x, Axis y);
 
-  /// A polyline. `dashed`: a guide rather than data.
+  /// Adds a polyline. `dashed`: for a guide rather than data.
   void line(const std::vector<double>& x, const std::vector<double>& y, std::string_view color,
             bool dashed = false);
-  /// A vertical bar from the mean to the worst case.
+  /// Adds a vertical bar from the mean to the worst case.
   void whisker(double x, double from, double to, std::string_view color);
-  /// A mark with a tooltip; `hollow` where it stands for less than its neighbours do.
+  /// Adds a mark with a tooltip. `hollow`: for a mark from fewer measurements than its neighbours.
   void mark(double x, double y, Marker marker, std::string_view color, bool hollow,
             std::string_view tooltip);
-  /// A name beside a mark, where there is room for it.
+  /// Adds a name beside a mark, if there is room for it.
   void label(double x, double y, std::string_view text, std::string_view color);
 
   std::string svg() const;
@@ -65,7 +66,7 @@ class Plot {
   std::vector<Box> taken_;
 };
 
-/// A legend line above plots: a mark and a name each.
+/// An entry of the legend above plots: a mark and a name.
 struct LegendEntry {
   Marker marker;
   std::string color, name;

@@ -16,7 +16,7 @@ namespace {
 constexpr const char* kExact = "exact";
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// A quantity of a knob's values, as one chart.
+/// A measured quantity over the values of a knob, drawn as one chart.
 struct Quantity {
   const char *column, *name, *title;
   double scale;
@@ -28,7 +28,7 @@ constexpr Quantity kErrors[] = {{"rgb_psnr", "colour", "PSNR, dB (higher is bett
 
 struct Curve {
   std::string name;
-  std::vector<double> mean, worst;  // by value of the knob
+  std::vector<double> mean, worst;  // one entry per value of the knob
   std::vector<std::string> tooltips;
 };
 
@@ -48,7 +48,7 @@ std::string chart(const std::string& title, const std::string& knob, const std::
   if (scale == Scale::log && std::none_of(all.begin(), all.end(), [](double v) { return v > 0; })) {
     scale = Scale::linear;
   }
-  // Between names there is nothing that a line could stand for.
+  // A line between names would have no meaning.
   const bool ordered = std::all_of(values.begin(), values.end(), [](const Group& v) {
     return v.name == kExact || v.rows.front()->number("knob_value").has_value();
   });
@@ -57,7 +57,7 @@ std::string chart(const std::string& title, const std::string& knob, const std::
     plot.line({-0.5, static_cast<double>(names.size()) - 0.5}, {*guide, *guide}, kGuideColor, true);
   for (std::size_t k = 0; k < curves.size(); ++k) {
     const Curve& c = curves[k];
-    // Curves that lie on each other stay visible side by side.
+    // A small shift keeps curves with equal values visible side by side.
     const double shift = 0.07 * (static_cast<double>(k) - 0.5 * static_cast<double>(curves.size() - 1));
     std::vector<double> shifted = x;
     for (double& v : shifted) v += shift;
@@ -111,7 +111,7 @@ std::string knob_section(const Table& table) {
       has_default = has_default || is_default;
     }
     if (const RowRefs exact = exact_rows(knob.rows, renders); !has_default && !exact.empty()) {
-      // At the end where the knob does least, so that the curve runs towards it.
+      // `exact` goes to the end where the knob has the least effect, so that the curve runs towards it.
       const bool last =
           spread(values.back().rows, "rgb_psnr").mean > spread(values.front().rows, "rgb_psnr").mean;
       values.insert(last ? values.end() : values.begin(), {kExact, exact});

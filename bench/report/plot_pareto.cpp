@@ -14,12 +14,12 @@ using gsnav_tools::escape;
 using gsnav_tools::format;
 namespace {
 
-/// What is drawn against time.
+/// A measure that is drawn against time.
 struct Measure {
   const char *column, *title, *unit;
   double scale;
   bool higher_is_better;
-  std::initializer_list<const char*> sensors;  // the first that was measured
+  std::initializer_list<const char*> sensors;  // the first one that was measured is drawn
 };
 
 const Measure kMeasures[] = {
@@ -28,12 +28,14 @@ const Measure kMeasures[] = {
     {"flip_mean", "FLIP, mean", "", 1, false, {"rgbd", "rgb", ""}},
 };
 
-/// A knob that changes what is right has no error against the contract.
+/// Whether a row measures an approximation. The knobs `response` and `compat` change the correct image,
+/// so that their difference from the contract is no error.
 bool is_approximation(const Row& r) {
   return is_plain(r) || (r.get("knob") != "response" && r.get("knob") != "compat");
 }
 
-/// Rows of the first sensor that has the column, against the contract's first order that was measured.
+/// Rows of the first sensor that has the column, against the first of the contract's orders that was
+/// measured.
 RowRefs comparable(const RowRefs& rows, const Measure& m) {
   for (const char* sensor : m.sensors) {
     for (const char* oracle : {"contract", "contract_f64"}) {
@@ -47,7 +49,8 @@ RowRefs comparable(const RowRefs& rows, const Measure& m) {
   return {};
 }
 
-/// A staircase a backend through what nobody beats there: the best that a time buys.
+/// Draws a staircase for each backend through the points that no other point beats. It shows the best
+/// result for a given time.
 void draw_fronts(Plot& plot, const std::vector<const ParetoPoint*>& points, const Series& series) {
   std::map<std::string, std::vector<const ParetoPoint*>> fronts;
   std::map<std::string, double> longest;
@@ -60,7 +63,7 @@ void draw_fronts(Plot& plot, const std::vector<const ParetoPoint*>& points, cons
               [](const ParetoPoint* a, const ParetoPoint* b) { return a->time < b->time; });
     std::vector<double> x, y;
     for (const ParetoPoint* p : front) {
-      if (!x.empty()) {  // until the next setting is affordable the last one is the best
+      if (!x.empty()) {  // up to the time of the next setting, the last one is the best
         x.push_back(p->time);
         y.push_back(y.back());
       }
@@ -84,7 +87,7 @@ std::string draw(const Measure& m, const std::string& title, const std::vector<P
             make_axis(m.title, m.higher_is_better ? Scale::linear : Scale::log, errors));
   std::vector<const ParetoPoint*> order;
   for (const ParetoPoint& p : points) order.push_back(&p);
-  // The best are drawn last, above the others.
+  // The best points are drawn last, on top of the others.
   std::stable_sort(order.begin(), order.end(), [](const ParetoPoint* a, const ParetoPoint* b) {
     return a->dominated && !b->dominated;
   });
@@ -100,7 +103,7 @@ std::string draw(const Measure& m, const std::string& title, const std::vector<P
   for (const ParetoPoint* p : order) {
     if (!p->dominated) plot.label(p->time, p->error, p->label, "#333c48");
   }
-  // The profiles are named even where something beats them.
+  // The profiles have labels even if another setting beats them.
   for (const ParetoPoint* p : order) {
     if (p->dominated && p->label == p->profile) plot.label(p->time, p->error, p->label, "#75808e");
   }
@@ -129,7 +132,7 @@ std::vector<ParetoPoint> pareto_points(const RowRefs& rows, const std::string& c
     const Spread error = spread(g.rows, column), time = spread(g.rows, "time_p50_ms");
     if (error.count == 0 || time.count == 0) continue;
     const Row& first = *g.rows.front();
-    // A knob at the value that exact has differs from it by the noise of timing only.
+    // A knob at the value that `exact` uses differs from `exact` only by noise of timing.
     if (!is_plain(first) && same_as_exact(g.rows, rows)) continue;
     points.push_back({setting_label(first), first.get("backend"), first.get("profile"), time.mean,
                       error.mean, higher_is_better ? error.min : error.max, error.count, false, false});

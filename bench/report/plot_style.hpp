@@ -14,13 +14,13 @@ namespace gsnav_report {
 inline constexpr const char* kDominatedColor = "#b4bcc6";
 inline constexpr const char* kGuideColor = "#8a94a3";
 
-/// Colours that stay apart for colour-blind eyes (Okabe and Ito 2008), darkened for white paper.
+/// Colours that colour-blind readers can tell apart (Okabe and Ito 2008), darkened for white paper.
 inline constexpr std::array<const char*, 6> kSeriesColors{"#0b6aa8", "#c2540a", "#00805e",
                                                           "#a8478c", "#5b4bb5", "#8a6d00"};
 inline constexpr std::array<Marker, 4> kSeriesMarkers{Marker::circle, Marker::square, Marker::diamond,
                                                       Marker::triangle};
 
-/// Gives the names of a page's series (backends, say) a colour and a mark each.
+/// Assigns a colour and a mark to each name of a page's series, for example to backends.
 class Series {
  public:
   explicit Series(const std::vector<Group>& groups) {

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-# What the target `report` runs: cmake -DREPORT=... -DOUT=... -DSCENES=... -DSOURCE=... [-DKERNELS=...] -P
+# Script of the target `report`:
+#   cmake -DREPORT=... -DOUT=... -DSCENES=... -DSOURCE=... [-DKERNELS=...] -P report.cmake
 execute_process(COMMAND git -C "${SOURCE}" describe --always --dirty
                 OUTPUT_VARIABLE commit OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
-# Cores may be shared: threads that wait do not spin.
+# Waiting threads do not spin, because cores may be shared.
 set(ENV{OMP_WAIT_POLICY} passive)
 set(options ${SCENES} --acceptance --out "${OUT}" --docs "${OUT}/approximations.md")
 if(commit)

@@ -78,7 +78,7 @@ Status render_scenes(const Options& o, CsvFile& csv, const Row& stamp) {
   const Result<std::vector<SceneSpec>> specs = scene_specs(o);
   if (!specs) return specs.status();
   const ReferenceCache cache(o.cache);
-  // Until a scene is loaded it counts as one of the largest plan.
+  // A scene that is not loaded yet counts as one with the largest plan.
   const std::size_t each =
       plan(plan_options(o, static_cast<std::size_t>(o.views), 3, !o.visible_sets.empty())).size();
   std::size_t total = each * specs->size(), done = 0;
@@ -105,7 +105,7 @@ Status render_scenes(const Options& o, CsvFile& csv, const Row& stamp) {
   return {};
 }
 
-/// Adds rows that have no settings of their own: the whole set is there, or is made.
+/// Adds rows of a kind that has no settings, unless the file already has the whole set of them.
 Status add_rows(const Options& o, CsvFile& csv, const Row& stamp, const std::string& kind,
                 const std::function<Result<std::vector<Row>>()>& make) {
   if (!o.wants(kind) || interrupted()) return {};
@@ -118,7 +118,7 @@ Status add_rows(const Options& o, CsvFile& csv, const Row& stamp, const std::str
   const Result<std::vector<Row>> rows = make();
   if (!rows) return rows.status();
   for (std::size_t i = 0; i < rows->size(); ++i) {
-    if (csv.has(key(i, rows->size()))) continue;  // the set was cut off before
+    if (csv.has(key(i, rows->size()))) continue;  // an interrupted run has added this row
     Row row = stamp;
     row.fill((*rows)[i]).set("key", key(i, rows->size()));
     if (Status s = csv.add(std::move(row)); !s) return s;

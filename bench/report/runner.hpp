@@ -6,8 +6,8 @@
 
 namespace gsnav_report {
 
-/// Makes all rows that the options ask for, then the pages. An interrupted run ends well, with the rows
-/// so far.
+/// Makes all rows that the options ask for, then the pages. An interrupted run succeeds with the rows so
+/// far.
 gsnav::Status run_report(const Options& options);
 
 }  // namespace gsnav_report

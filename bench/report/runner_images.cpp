@@ -18,7 +18,7 @@ namespace {
 
 float display(float v) { return std::clamp(v, 0.0f, 1.0f); }
 
-/// The greatest power of two that keeps `largest` within 1; 1 where nothing differs.
+/// The greatest power of two that keeps `largest` times it at most 1; 1 if nothing differs.
 double gain_for(double largest) {
   return largest > 0 ? std::exp2(std::clamp(std::floor(-std::log2(largest)), 0.0, 30.0)) : 1.0;
 }

@@ -18,7 +18,7 @@ using namespace gsnav;
 
 namespace {
 
-/// Largest relative error of 2^x in float32 over the exponents that a visible alpha has.
+/// Largest relative error of 2^x in float32 over the exponents of visible alphas.
 template <Exp2 M>
 double exp2_error() {
   double worst = 0;

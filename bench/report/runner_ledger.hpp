@@ -7,8 +7,8 @@
 
 namespace gsnav_report {
 
-/// What each profile approximates beyond the contract, and by how much: a bound, or measured here. A
-/// profile that changes what it approximates changes its entry.
+/// Rows of the approximations that each profile makes beyond the contract, each with its size: a bound,
+/// or measured here. A change to a profile's approximations must change its entry.
 std::vector<Row> ledger_rows();
 
 }  // namespace gsnav_report

@@ -11,15 +11,16 @@
 
 namespace gsnav_report {
 
-/// Depth is judged to this range, metres: budgets are stated up to it.
+/// Greatest depth that is judged, metres; the budgets hold up to it.
 inline constexpr double kDepthRange = 10.0;
 
-/// Judges images, and remembers: sensors and backends that give the same bits are judged once.
+/// Judges images and caches the results, so that equal bits from several sensors or backends are judged
+/// once.
 class Judge {
  public:
-  /// Fills the error columns of `row` with what `frames` (one camera; images not rendered are empty)
-  /// differs by from `reference`, which `hash` names. Pixels that rounding alone decides are left out of
-  /// all but PSNR, SSIM and FLIP.
+  /// Fills the error columns of `row` with the differences of `frames` from `reference`. `frames` has
+  /// one camera; images that were not rendered are empty. `hash` is the reference's hash. Pixels that
+  /// rounding alone decides count only in PSNR, SSIM and FLIP.
   gsnav::Status operator()(const gsnav::Frames<float>& frames, const Reference& reference,
                            const std::string& hash, Row& row);
 

@@ -10,10 +10,11 @@
 
 namespace gsnav_report {
 
-/// To be raised when an oracle's image changes: older cached references are then not found.
+/// Version of the oracles. Raise it when an oracle's image changes, so that older cached references are
+/// no longer found.
 inline constexpr int kOracleVersion = 1;
 
-/// Names a reference by all that it depends on.
+/// Hash of all data that a reference depends on.
 std::string reference_hash(const std::string& scene_hash, const gsnav::Camera& camera, Oracle oracle,
                            gsnav::SortOrder order);
 

@@ -197,7 +197,7 @@ Status SceneRunner::run(const Setting& s) {
       row.set("touched", outcome->culled.touched).set("emitting", outcome->culled.emitting);
     row.set("row_bytes", row_bytes(*cloud, s.sensor)).set("cloud_bytes", std::uint64_t{cloud_bytes});
     row.set("band_bytes", std::uint64_t{band_bytes});
-    // What the contract cannot do without; knobs have other counts of their own.
+    // Pairs that the contract needs; knobs have other counts of their own.
     if (s.knob == "none" && q == Oracle::contract) row.set("evaluations", named->reference->evaluations);
     row.set("bytes", static_cast<std::uint64_t>(outcome->scratch_bytes + cloud_bytes));
     if (read_peak != 0) row.set("read_peak", read_peak);
@@ -225,7 +225,9 @@ Status SceneRunner::save_worst_view(const ImageSize& size, const std::string& pr
   if (worst == nullptr || !worst->get("image").empty()) return {};
   Setting s;
   while (s.view < scene_.views.size() && scene_.views[s.view].name != worst->get("view")) ++s.view;
-  if (s.view == scene_.views.size()) return {};  // a resumed row of a view that this run has not
+  if (s.view == scene_.views.size())
+    return {};  // a resumed row may have a view that this run does not
+                // have
   s.size = size;
   s.sensor = worst->get("sensor");
   s.backend = worst->get("backend");

@@ -26,10 +26,10 @@
 
 namespace gsnav_report {
 
-/// The render rows of one scene.
+/// Makes the render rows of one scene.
 class SceneRunner {
  public:
-  /// `stamp` holds the columns that all rows of the run share. All arguments must outlive it.
+  /// `stamp` holds the columns that all rows of the run share. All arguments must outlive the runner.
   SceneRunner(const Options& options, const Scene& scene, const ReferenceCache& cache, CsvFile& csv,
               const Row& stamp)
       : options_(options),
@@ -39,22 +39,22 @@ class SceneRunner {
         stamp_(stamp),
         openmp_(options.threads) {}
 
-  /// Renders a setting and adds a row for each of its judges; rows that are there already are not made
-  /// again.
+  /// Renders a setting and adds a row for each of its oracles. Rows that the file already has are not
+  /// made again.
   gsnav::Status run(const Setting& setting);
 
-  /// Pictures of the worst view of each size and profile, by the largest colour error among the rows
-  /// there.
+  /// Saves pictures of the worst view for each size and profile, by the largest colour error among the
+  /// rows.
   gsnav::Status save_worst_views();
 
  private:
   struct Outcome {
     gsnav::Frames<float> frames;
     Timing timing;
-    gsnav::CullCounts culled;  ///< zeros where a knob is turned, and of arrays that are not the host's
+    gsnav::CullCounts culled;  ///< zeros if a knob is set, and for arrays outside host memory
     std::size_t scratch_bytes = 0;
     std::uint64_t peak_memory = 0;
-    bool cell_known = true;  ///< false: of the profile visible, where no cell has what the camera sees
+    bool cell_known = true;  ///< false: with the profile visible, no cell has what the camera sees
   };
   struct Named {
     std::string hash;
@@ -63,11 +63,11 @@ class SceneRunner {
 
   gsnav::Camera camera(const Setting& s) const;
   int threads(const Setting& s) const;
-  /// What a frame of a sensor reads of one Gaussian.
+  /// Bytes of one Gaussian that a frame of a sensor reads.
   static std::uint64_t row_bytes(const gsnav::GaussianCloud& cloud, const std::string& sensor) noexcept;
   std::string key(const Setting& s, Oracle oracle) const;
-  /// The scene's levels of detail: read from beside its file, or built. Null: the setting does not ask
-  /// for them.
+  /// The scene's levels of detail, read from the file beside the scene's or built. Null if the setting
+  /// does not use them.
   gsnav::Result<const gsnav::LodTree*> tree_of(const Setting& s);
   gsnav::Result<Outcome> render(const Setting& s, const gsnav::GaussianCloud& cloud, int runs);
   template <class B>
@@ -86,7 +86,7 @@ class SceneRunner {
   Judge judge_;
   std::optional<gsnav::LodTree> tree_;
   std::optional<PackedThrough> packed_;
-  std::deque<Named> recent_;  // references of the view at hand
+  std::deque<Named> recent_;  // references of the current view
 };
 
 }  // namespace gsnav_report

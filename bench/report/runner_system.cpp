@@ -65,7 +65,7 @@ std::uint64_t peak_memory() {
 
 void reset_peak_memory() {
 #if defined(__GLIBC__)
-  malloc_trim(0);  // what earlier measurements have freed goes back to the system first
+  malloc_trim(0);  // returns memory that earlier measurements have freed to the system first
 #endif
   std::ofstream("/proc/self/clear_refs") << "5";
 }

@@ -9,22 +9,21 @@ namespace gsnav_report {
 
 /// The processor's name and number of hardware threads.
 std::string machine_name();
-/// Today, UTC, YYYY-MM-DD.
+/// Today's date, UTC, YYYY-MM-DD.
 std::string today();
 
-/// Greatest resident memory of the process since `reset_peak_memory`, bytes; 0 where the system does not
-/// say.
+/// Greatest resident memory of the process since `reset_peak_memory`, bytes; 0 if the system does not
+/// report it.
 std::uint64_t peak_memory();
-/// Starts peak_memory anew where the system allows it (Linux); elsewhere the peak is that of the whole
-/// run.
+/// Resets peak_memory() where the system allows it (Linux). Elsewhere the peak is that of the whole run.
 void reset_peak_memory();
 
-/// From here on the first Ctrl-C only raises `interrupted`; a second one ends the process.
+/// After this call the first Ctrl-C only sets interrupted(); a second one ends the process.
 void watch_interrupts();
 bool interrupted() noexcept;
 
-/// A line of progress: done, elapsed, what is left by the pace so far. One line that changes on a
-/// terminal, else a line every ten seconds.
+/// A line of progress: settings done, time elapsed, and the remaining time at the pace so far. On a
+/// terminal it is one line that changes, otherwise a new line every ten seconds.
 class Progress {
  public:
   explicit Progress(std::size_t total);

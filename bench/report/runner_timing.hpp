@@ -9,8 +9,7 @@
 
 namespace gsnav_report {
 
-/// Value below or at which the share `q` of the values lies (nearest rank); 0 for none. Reorders
-/// `values`.
+/// The q-quantile of the values by the nearest rank; 0 if there are none. Reorders `values`.
 inline double percentile(std::vector<double>& values, double q) {
   if (values.empty()) return 0;
   const double rank = std::ceil(q * static_cast<double>(values.size())) - 1;
@@ -24,8 +23,8 @@ struct Timing {
   int runs = 0;
 };
 
-/// Times `f` `runs` times after two runs that do not count (buffers reach their size, caches fill).
-/// Stops after three runs at the earliest once `budget_s` seconds are spent.
+/// Times `runs` calls of `f`, after two calls that do not count, in which buffers reach their size and
+/// caches fill. Stops earlier, but not before three runs, once `budget_s` seconds are spent.
 template <class F>
 Timing measure(const F& f, int runs, double budget_s) {
   using Clock = std::chrono::steady_clock;

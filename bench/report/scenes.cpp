@@ -28,8 +28,8 @@ bool is_there(const std::filesystem::path& p) {
   return std::filesystem::exists(p, error);
 }
 
-/// Four views from outside, a quarter turn apart: what a scene without cameras is seen from. They look
-/// at the median of the means from 1.5 times the radius that holds nine tenths of them, y up.
+/// Four views from outside, a quarter turn apart, for scenes without cameras. They look at the median of
+/// the means, from 1.5 times the radius that holds nine tenths of them. Y is up.
 std::vector<ViewPoint> orbit(const GaussianCloud& cloud) {
   Vec3d center;
   std::vector<double> values(cloud.size());
@@ -105,7 +105,7 @@ std::vector<SceneSpec> data_scenes(const std::filesystem::path& folder) {
   const std::filesystem::path ruin = folder / "splats/fyoxy_ruin_300k_sh3";
   if (is_there(ruin)) {
     SceneSpec spec{"fyoxy_ruin", ruin.string(), {}};
-    const Vec3d up{0, -1, 0};  // the scan is y down, about one unit a metre
+    const Vec3d up{0, -1, 0};  // the scan is y down, about one unit per metre
     spec.views = {
         look("wall", {0, -1, -2.5}, {2, -1.2, 0}, up), look("yard", {2.2, -1.5, -5}, {0.5, -1, 0}, up),
         look("corner", {-3, -1.5, -5}, {0, -1, 0}, up), look("fence", {0, -1.4, -3}, {-3, -1.2, 0}, up)};
@@ -118,7 +118,7 @@ Result<Scene> load(const SceneSpec& spec, int views) {
   Scene scene;
   scene.name = spec.name;
   std::vector<ViewPoint> all = spec.views;
-  if (!spec.cameras.empty()) {  // before the scene, which may take long
+  if (!spec.cameras.empty()) {  // before the scene, which may take long to load
     const Result<std::vector<Camera>> cameras = io::load_cameras(spec.cameras);
     if (!cameras) return Status(cameras.code(), "scene " + spec.name + ": " + cameras.message());
     if (cameras->empty())

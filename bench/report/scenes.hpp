@@ -13,25 +13,25 @@
 
 namespace gsnav_report {
 
-/// Where a camera stands; size and field of view are the report's.
+/// Pose of a camera; the report sets size and field of view.
 struct ViewPoint {
   std::string name;
   gsnav::Affine3<double> viewmat{};  ///< world to camera, OpenCV axes
 };
 
-/// A scene to be measured, not yet loaded.
+/// Names and files of a scene to be measured, before it is loaded.
 struct SceneSpec {
   std::string name;
-  std::string path;     ///< what io::load_scene takes; empty: the embedded flat
-  std::string cameras;  ///< INRIA cameras.json; empty: `views`, or views made from the cloud
+  std::string path;     ///< a path for io::load_scene; empty: the embedded flat
+  std::string cameras;  ///< INRIA cameras.json; empty: use `views`, or make views from the cloud
   std::vector<ViewPoint> views{};
-  std::string visible_sets{};  ///< a file of them; empty: none
+  std::string visible_sets{};  ///< a file of visible sets; empty: none
 };
 
 struct Scene {
   std::string name;
   gsnav::GaussianCloud cloud;
-  std::string path;  ///< its spec's
+  std::string path;  ///< of its SceneSpec
   std::optional<gsnav::VisibleSets> visible;
   std::string hash;  ///< content_hash of the cloud
   std::vector<ViewPoint> views;
@@ -40,19 +40,19 @@ struct Scene {
 /// The scene of `NAME=PATH[:CAMERAS.json]`. Errors: invalid_argument naming option and value.
 gsnav::Result<SceneSpec> parse_scene(const std::string& text);
 
-/// The embedded flat from its own viewpoints.
+/// The embedded flat with its own viewpoints.
 SceneSpec default_flat();
 
-/// The benchmark flat in `ply`, with the cameras.json that lies beside it. Errors: file_not_found.
+/// The benchmark flat of the file `ply`, with the cameras.json beside it. Errors: file_not_found.
 gsnav::Result<SceneSpec> benchmark_flat(const std::string& ply);
 
-/// The real scans that are there below `folder` (GSNAV_DATA_DIR), with viewpoints that show something.
+/// The real scans that exist below `folder` (GSNAV_DATA_DIR), with viewpoints chosen by hand.
 std::vector<SceneSpec> data_scenes(const std::filesystem::path& folder);
 
-/// Loads a scene and chooses at most `views` viewpoints, spread evenly over those it has.
+/// Loads a scene and chooses at most `views` of its viewpoints, evenly spread.
 gsnav::Result<Scene> load(const SceneSpec& spec, int views);
 
-/// `view` through a pinhole with square pixels; a Gaussian is drawn beyond `near` metres.
+/// A pinhole camera with square pixels at `view`. Gaussians nearer than `near` metres are not drawn.
 gsnav::Camera camera_of(const ViewPoint& view, int width, int height, double hfov_degrees, double near);
 
 }  // namespace gsnav_report

@@ -36,7 +36,7 @@ std::vector<double> dense_weights(const AvatarAsset& asset) {
   return out;
 }
 
-/// Every joint turned by up to `degrees` about an axis of its own.
+/// A pose in which every joint is turned by up to `degrees` about a random axis of its own.
 LocalPose random_pose(const Skeleton& skeleton, Rng& rng, double degrees) {
   LocalPose pose = skeleton.rest_pose();
   for (Quatd& q : pose.rotations) {
@@ -51,8 +51,8 @@ struct Posed {
   Mat3d rotation{};
 };
 
-/// Blends all joints with a weight in double: the definition, with the kernel's rule for blends that
-/// have no orientation.
+/// Blends all joints with a weight in double, by the definition of skinning. For blends without an
+/// orientation it follows the kernel's rule.
 Posed blend(const Matrices& joints, const double* weights, const Vec3d& mean) {
   Mat3d linear{};
   Vec3d shift{};
@@ -67,7 +67,7 @@ Posed blend(const Matrices& joints, const double* weights, const Vec3d& mean) {
   return {linear * mean + shift, polar_rotation(usable ? linear : joints[heaviest].linear)};
 }
 
-/// The k greatest of `dense`, divided by their sum; the rest 0.
+/// The k greatest of `dense`, divided by their sum; the others become 0.
 void truncate_weights(const double* dense, std::size_t joints, std::size_t k, std::vector<double>& out) {
   std::vector<std::size_t> order(joints);
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -111,7 +111,8 @@ struct FloatSkinning {
   }
 };
 
-/// Float32 on a backend against float64 with the same four weights, and the time for 100,000 Gaussians.
+/// Rows of float32 on a backend against float64 with the same four weights, with the time for 100,000
+/// Gaussians.
 template <class B>
 Status float_rows(B& backend, Row base, const AvatarAsset& sampled, const AvatarAsset& timed,
                   const std::vector<Matrices>& poses, const SkinningOptions& o, std::vector<Row>& rows) {

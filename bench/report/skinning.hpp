@@ -10,15 +10,15 @@ namespace gsnav_report {
 
 struct SkinningOptions {
   int gaussians = 100000;  ///< of the embedded humanoid that is timed, about
-  int sampled = 6000;      ///< of the one that errors are taken from
-  int poses = 8;           ///< of walking, and as many random ones
+  int sampled = 6000;      ///< of the humanoid that errors are measured on
+  int poses = 8;           ///< poses of walking, and the same number of random poses
   int threads = 0;         ///< of the openmp backend; 0: all
   int runs = 15;
 };
 
-/// What K influences a Gaussian cost in accuracy (float64, against weights of all joints), and what
-/// float32 and each backend add, with the time for 100,000 Gaussians. Errors: what making the humanoid
-/// reports.
+/// Rows of the accuracy of K influences per Gaussian (float64, against the weights of all joints), and
+/// of the errors that float32 and each backend add, with the time for 100,000 Gaussians. Errors: those
+/// of making the humanoid.
 gsnav::Result<std::vector<Row>> skinning_rows(const SkinningOptions& options);
 
 }  // namespace gsnav_report

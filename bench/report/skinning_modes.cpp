@@ -62,7 +62,7 @@ struct ModeSkinning {
   }
 };
 
-/// The derivative of the place under linear blending by the canonical place.
+/// Derivative of the posed position under linear blending with respect to the canonical position p.
 Mat3d derivative(const SoftWeights& weights, const Matrices& joints, const Vec3d& p) {
   constexpr double kStep = 1e-5;
   std::vector<double> w;
@@ -88,7 +88,7 @@ double greatest(const Mat3d& m) {
   return out;
 }
 
-/// Float32 against float64 in one mode, and its time.
+/// Rows of float32 against float64 in one mode, with its time.
 template <class B>
 Status float_rows(B& backend, Row base, const AvatarAsset& asset, const std::vector<Matrices>& poses,
                   const SkinningOptions& o, std::vector<Row>& rows) {
@@ -125,7 +125,7 @@ Status float_rows(B& backend, Row base, const AvatarAsset& asset, const std::vec
 
 Status mode_rows(const AvatarAsset& body, const std::vector<Matrices>& poses, const char* name,
                  const SkinningOptions& o, std::vector<Row>& rows) {
-  // The body with the soft weights, whose derivative is known.
+  // The body with the soft weights, since their derivative is known.
   AvatarAsset asset = body;
   const SoftWeights soft(body);
   const std::size_t joints = body.skeleton.size();

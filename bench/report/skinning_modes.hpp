@@ -10,9 +10,10 @@
 
 namespace gsnav_report {
 
-/// What turning shapes only and stretching them cost against the derivative of the skin itself (soft
-/// weights of all joints, central differences in float64), and what float32 adds to dual quaternions and
-/// stretch, with their times. `poses`: joint matrices, called `name`.
+/// Adds rows of skinning modes. They have the errors of turning the shapes only and of stretching them,
+/// against the derivative of the skin itself (soft weights of all joints, central differences in
+/// float64). They also have the errors that float32 adds to dual quaternions and stretch, with their
+/// times. `poses` are joint matrices, `name` is their name.
 gsnav::Status mode_rows(const gsnav::AvatarAsset& body, const std::vector<Matrices>& poses,
                         const char* name, const SkinningOptions& options, std::vector<Row>& rows);
 

@@ -10,7 +10,7 @@
 
 namespace gsnav_report {
 
-/// Times skinning of the asset's Gaussians on a backend and writes it into `row`: for 100000 of them.
+/// Times skinning of the asset's Gaussians on a backend. Writes the time for 100,000 of them into `row`.
 template <class B, class Args>
 gsnav::Status time_skinning(B& backend, const gsnav::AvatarAsset& asset, const Args& args, int runs,
                             Row& row) {

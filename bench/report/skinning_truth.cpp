@@ -16,7 +16,7 @@ SoftWeights::SoftWeights(const AvatarAsset& asset)
 
 void SoftWeights::at(const Vec3d& p, std::vector<double>& out) const {
   constexpr double kSoftness = 0.025;
-  out.assign(rest_.size(), std::numeric_limits<double>::infinity());  // distances first
+  out.assign(rest_.size(), std::numeric_limits<double>::infinity());  // distances at first
   for (const ProxyCapsule& c : asset_->capsules) {
     const Vec3d a = rest_[c.joint] * c.p0, d = rest_[c.joint] * c.p1 - a;
     const double s = std::clamp(dot(p - a, d) / std::max(dot(d, d), 1e-12), 0.0, 1.0);

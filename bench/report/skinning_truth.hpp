@@ -10,8 +10,8 @@ namespace gsnav_report {
 
 using Matrices = std::vector<gsnav::Affine3<double>>;
 
-/// Weights of all joints at any place: falling off exponentially, 25 mm a factor e, with the distance
-/// from the joint's capsules beyond the nearest one's.
+/// Weights of all joints at any point. They fall off exponentially with the distance from the joint's
+/// capsules beyond that of the nearest capsule, by a factor of e every 25 mm.
 class SoftWeights {
  public:
   explicit SoftWeights(const gsnav::AvatarAsset& asset);
@@ -22,7 +22,7 @@ class SoftWeights {
   Matrices rest_;
 };
 
-/// Posed joint * inverse bind for each pose.
+/// Skinning matrices for each pose: posed joint * inverse bind.
 std::vector<Matrices> skinning_matrices(const gsnav::Skeleton& skeleton,
                                         const std::vector<gsnav::LocalPose>& poses);
 
@@ -33,9 +33,9 @@ struct SkinningErrors {
   std::vector<double> position, rotation;
 };
 
-/// Rows of both, greatest and 99th percentile.
+/// Adds rows with the greatest and the 99th percentile of both errors.
 void add_skinning_rows(std::vector<Row>& rows, const Row& base, SkinningErrors& e);
-/// A row of one quantity.
+/// Adds a row for one quantity.
 void add_error_row(std::vector<Row>& rows, Row row, const char* name, const char* unit,
                    std::vector<double>& values);
 

@@ -39,7 +39,7 @@ constexpr std::array<StorageCodec, 8> kCodecs{{
     {"shN_8", "higher SH in 8 bit, 1/128 a step (SPZ)", 1.0 / 128, -1, 127.0 / 128, 8, -1},
 }};
 
-/// The nearest point of the grid low + k step (0 + k step where low is infinite) within the range.
+/// The nearest point of the grid low + k step within the range; if low is infinite, of the grid k step.
 float snap(float x, const StorageCodec& c) noexcept {
   const double v = static_cast<double>(x), from = std::isinf(c.low) ? 0.0 : c.low;
   return static_cast<float>(

@@ -13,33 +13,37 @@
 
 namespace gsnav_report {
 
-/// A way to store one field of a cloud in fewer bits. Values in range come back within half a step; the
-/// formats named use it.
+/// A way to store one field of a cloud in fewer bits, as used by the formats that its description names.
+/// Values in range come back within half a step.
 struct StorageCodec {
   std::string_view name, description;
-  double step;       ///< of the stored quantity, uniform; for fp16: relative, at the binade's lower end
-  double low, high;  ///< range; beyond it values are clamped (positions: no limit within a 64 m cell)
+  double step;       ///< of the stored quantity, uniform; for fp16 relative, at the binade's lower end
+  double low, high;  ///< range; values beyond it are clamped (positions have no limit within a 64 m
+                     ///< cell)
   double bits;       ///< per value
-  int values;        ///< per Gaussian: 3, 4 (stored as 3 and an index), 1, or -1: all of shN
+  int values;        ///< per Gaussian: 3, 4 (stored as 3 and an index), 1, or -1 for all of shN
 };
 
 /// All codecs that the report measures, by name.
 std::span<const StorageCodec> storage_codecs() noexcept;
 
-/// The knob's value that packs all fields at once (scene/packed_cloud.hpp).
+/// Value of the knob `storage` that packs all fields at once (scene/packed_cloud.hpp).
 inline constexpr std::string_view kPackedStorage = "packed";
 
-/// A cloud that was packed, in floats again, and the bytes that it had; of these, in SH bands from 1 on.
+/// A cloud that was packed and unpacked again. `bytes` is its packed size; `band_bytes` is the part of
+/// it in SH bands from 1 on.
 struct PackedThrough {
   gsnav::GaussianCloud cloud;
   std::size_t bytes = 0, band_bytes = 0;
-  std::uint64_t read_peak = 0;  ///< most that reading it took; 0: not known
+  std::uint64_t read_peak = 0;  ///< peak memory while it was read, bytes; 0: not known
 };
+/// Unpacks a cloud.
 PackedThrough through_packing(const gsnav::PackedCloud& packed);
-/// The same of what a path names (io::load_packed_scene). Errors: that function's.
+/// Reads the packed cloud of a path (io::load_packed_scene) and unpacks it. Errors: those of that
+/// function.
 gsnav::Result<PackedThrough> read_packed(const std::string& path);
 
-/// `cloud` as it comes back from storage by the codec `name`; all other fields keep their bits.
+/// `cloud` after being stored by the codec `name` and read back; all other fields keep their bits.
 /// Errors: invalid_argument for an unknown name, with the known ones.
 gsnav::Result<gsnav::GaussianCloud> through_storage(const gsnav::GaussianCloud& cloud,
                                                     std::string_view name);
@@ -47,7 +51,7 @@ gsnav::Result<gsnav::GaussianCloud> through_storage(const gsnav::GaussianCloud& 
 /// Bytes of the cloud's arrays with the codec's field in its stored size.
 std::size_t stored_bytes(const gsnav::GaussianCloud& cloud, const StorageCodec& codec) noexcept;
 
-/// The nearest float16 (ties to even, no infinities: clamped to 65504).
+/// The nearest float16 (ties to even; values too large are clamped to 65504 instead of infinity).
 float round_to_half(float x) noexcept;
 
 }  // namespace gsnav_report

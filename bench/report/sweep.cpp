@@ -19,7 +19,7 @@ namespace {
 
 using Real = long double;
 constexpr Real kInf = std::numeric_limits<Real>::infinity();
-/// A motion that comes nearer than half a skin has to be stopped.
+/// A motion that comes nearer than half a skin must be stopped.
 constexpr Real kContact = 0.5e-4L;
 using V = Vec3<Real>;
 
@@ -33,8 +33,8 @@ MovingCapsule<S> cast(const MovingCapsule<double>& m) {
 
 V random_direction(Rng& rng) { return normalized(V{rng.normal(), rng.normal(), rng.normal()}); }
 
-/// A standing agent that moves a step of at most 0.25 m and a bone that moves `speed` metres, aimed so
-/// that the two meet within a metre. Coordinates are float32 values: both precisions see the same
+/// A standing agent that moves by at most 0.25 m and a bone that moves `speed` metres, aimed such that
+/// the two meet within a metre. Coordinates are float32 values, so that both precisions get the same
 /// motion.
 struct Pair {
   MovingCapsule<double> agent, body;
@@ -67,8 +67,8 @@ Capsule<Real> at(const MovingCapsule<Real>& m, Real t) {
   return {mix(m.begin.p0, m.end.p0), mix(m.begin.p1, m.end.p1), mix(m.begin.radius, m.end.radius)};
 }
 
-/// From the point of b nearest to a to that of a, by bisection on the slope of the (convex) distance
-/// from a point that runs along a to the segment b.
+/// Vector to the nearest point of segment a from the nearest point of segment b. Finds it by bisection
+/// on the slope of the distance from a point that moves along a to the segment b, which is convex.
 V segment_offset(const V& a0, const V& a1, const V& b0, const V& b1) {
   const V u = a1 - a0, v = b1 - b0;
   const Real vv = dot(v, v);
@@ -123,8 +123,9 @@ Row distance_row(const SweepOptions& o, const char* precision) {
   return row.set("note", "of segments up to 2 m apart, relative to at least 1 cm, against long double");
 }
 
-/// Two rows of one speed: how deep motion goes into a body before the sweep stops it (never, if all is
-/// well), and how much room beyond contact a motion that was stopped would have left.
+/// Two rows for one speed. The first is the depth that motion reaches in a body before the sweep stops
+/// it (0 if the sweep is correct). The second is the room beyond contact that a stopped motion would
+/// have left.
 template <class S>
 void speed_rows(const SweepOptions& o, const char* precision, double speed, std::vector<Row>& rows) {
   Rng rng(static_cast<std::uint64_t>(speed * 1024));
@@ -183,8 +184,8 @@ long double least_gap(const MovingCapsule<double>& a, const MovingCapsule<double
   constexpr Real kTolerance = 1e-8L;
   const MovingCapsule<Real> ma = cast<Real>(a), mb = cast<Real>(b);
   Real least = kInf;
-  // Along a fixed direction the four pairs of endpoints separate linearly in time: at the ends of an
-  // interval their least separation bounds the gap from below.
+  // Along a fixed direction, the separation of each of the four pairs of endpoints is linear in time.
+  // Their least separation at the ends of an interval is therefore a lower bound of the gap within it.
   const auto separation = [&](const V& n, Real t) {
     const Capsule<Real> p = at(ma, t), q = at(mb, t);
     return std::min(dot(n, p.p0), dot(n, p.p1)) - std::max(dot(n, q.p0), dot(n, q.p1)) - p.radius -

@@ -29,7 +29,7 @@ double as_number(const std::string& text) {
              : std::numeric_limits<double>::quiet_NaN();
 }
 
-/// What a row has in common with the exact one that it is measured against.
+/// The settings that a row shares with the `exact` row that it is compared with, as a key.
 std::string conditions(const Row& row) {
   std::string key;
   for (const char* column : {"scene", "view", "width", "height", "sensor", "backend", "threads"}) {

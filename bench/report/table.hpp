@@ -16,7 +16,7 @@ namespace gsnav_report {
 
 using RowRefs = std::vector<const Row*>;
 
-/// The rows of a report's CSV, and the folder that its images are relative to.
+/// The rows of a report's CSV, and the folder that its image paths are relative to.
 class Table {
  public:
   Table(std::vector<Row> rows, std::filesystem::path folder)
@@ -25,7 +25,7 @@ class Table {
   static gsnav::Result<Table> read(const std::filesystem::path& path);
 
   RowRefs of_kind(std::string_view kind) const;
-  /// Different values of a column that are not empty, in order of appearance, joined by ", ".
+  /// Distinct values of a column without empty ones, in order of appearance, joined by ", ".
   std::string distinct(std::string_view column) const;
   const std::filesystem::path& folder() const noexcept { return folder_; }
 
@@ -34,31 +34,33 @@ class Table {
   std::filesystem::path folder_;
 };
 
-/// A render row of a profile itself, no knob turned.
+/// Whether a render row measures a profile itself, with no knob set.
 bool is_plain(const Row& row);
-/// Colour compared with the float64 contract, whichever of its two orders.
+/// Whether colour is compared with the float64 contract, in either of its two orders.
 bool against_contract(const Row& row);
-/// "1920x1080".
+/// Resolution of a row, for example "1920x1080".
 std::string resolution(const Row& row);
-/// The knob's value, numbers to 4 digits.
+/// The knob's value; numbers have 4 digits.
 std::string shown_value(const Row& row);
-/// "exact", or "alpha_min = 0.02" where a knob is turned (with its profile unless that is exact).
+/// Name of a row's setting: "exact", or "alpha_min = 0.02" for a knob (after its profile unless that is
+/// exact).
 std::string setting_label(const Row& row);
 
 RowRefs select(const RowRefs& rows, const std::function<bool(const Row&)>& wanted);
-/// Whether any of the rows has something in the column.
+/// Whether any of the rows has a value in the column.
 bool has(const RowRefs& rows, std::string_view column);
 
-/// Rows whose `name` is the same, in order of first appearance.
+/// Rows that have the same name, in order of first appearance.
 struct Group {
   std::string name;
   RowRefs rows;
 };
 std::vector<Group> group_by(const RowRefs& rows, const std::function<std::string(const Row&)>& name);
-/// Orders groups by the number their name is, groups that are none behind, as they were.
+/// Orders groups by the number that is their name. Groups without a number keep their order behind the
+/// others.
 void sort_numerically(std::vector<Group>& groups);
 
-/// PSNR of views where nothing differs: what they count as in means, dB.
+/// PSNR that stands for identical views in means, dB.
 inline constexpr double kIdenticalPsnr = 140.0;
 
 /// Mean and extremes of a column over the rows that have a number there.
@@ -69,16 +71,15 @@ struct Spread {
 };
 Spread spread(const RowRefs& rows, std::string_view column);
 
-/// Rows of the `exact` profile against the same oracle in the same view, sensor, backend and threads as
-/// one of `rows`.
+/// Rows of the `exact` profile with the same oracle, view, sensor, backend and threads as one of `rows`.
 RowRefs exact_rows(const RowRefs& rows, const RowRefs& all);
 
-/// Whether every row that has such an exact row has its errors too, digit by digit, and one has: the
-/// knob's value is the one that `exact` uses, or might be.
+/// Whether `rows` measure the value of a knob that `exact` may use too: every row that has an `exact`
+/// counterpart has the same errors, digit by digit, and at least one has a counterpart.
 bool same_as_exact(const RowRefs& rows, const RowRefs& all);
 
-/// Geometric mean of a column over its value in the `exact` row of the same view, sensor, backend and
-/// threads; nothing where no pair has two positive numbers.
+/// Geometric mean of a column divided by its value in the `exact` row of the same view, sensor, backend
+/// and threads; nothing if no pair has two positive numbers.
 std::optional<double> ratio_to_exact(const RowRefs& rows, const RowRefs& all, std::string_view column);
 
 }  // namespace gsnav_report

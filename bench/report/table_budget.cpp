@@ -6,7 +6,7 @@
 namespace gsnav_report {
 namespace {
 
-/// `column` of a profile's rows times `unit` against `limit`.
+/// A budget: `column` of a profile's rows times `unit` against `limit`.
 struct Budget {
   std::string_view profile, measure, column;
   double limit, unit;
@@ -28,7 +28,7 @@ constexpr Budget kProfiles[] = {
     {"lod", "depth, 90th percentile, % of range", "depth_absrel_p90", 1, 100, false},
 };
 
-/// The largest error of rows of a kind, by the start of their name.
+/// A budget for the largest error among rows of a kind whose name starts with `name`.
 struct NamedBudget {
   std::string_view kind, name, measure, unit;
   double limit, scale;
@@ -69,7 +69,7 @@ std::vector<BudgetCheck> check_budgets(const Table& table) {
   std::vector<BudgetCheck> checks;
   const auto backend = [](const Row& r) { return r.get("backend"); };
   for (const Budget& b : kProfiles) {
-    // LOD answers to the photographic oracle, all else to the contract in its own order.
+    // LOD is judged by the photographic oracle, all others by the contract in its own order.
     const std::string_view oracle = b.profile == "lod" ? "photo4" : "contract";
     const RowRefs rows = select(table.of_kind("render"), [&](const Row& r) {
       return is_plain(r) && r.get("profile") == b.profile && r.get("oracle") == oracle;

@@ -36,7 +36,7 @@ class Place {
   static RowRefs of_sensor(const RowRefs& rows, std::string_view sensor) {
     return select(rows, [&](const Row& r) { return r.get("sensor") == sensor; });
   }
-  /// Pairs of rows of one view; sensor too where `same_sensor`.
+  /// Pairs of rows of the same view, and of the same sensor if `same_sensor`.
   static std::vector<std::pair<const Row*, const Row*>> by_view(const RowRefs& a, const RowRefs& b,
                                                                 bool same_sensor) {
     std::vector<std::pair<const Row*, const Row*>> out;
@@ -134,7 +134,7 @@ class Place {
                   psnr.min);
     add("packed: bytes a Gaussian beside its SH bands", 40, (*bytes - *bands) / *n, false, packed.size(),
         note);
-    constexpr double kLeast = 1.6e7;  // of less, what threads and pages take says more
+    constexpr double kLeast = 1.6e7;  // below this, threads and pages dominate the peak
     if (const auto peak = packed.front()->number("read_peak"); peak && *bytes >= kLeast)
       add("packed: most memory while it is read, of what stays", 2, *peak / *bytes, false,
           packed.size());

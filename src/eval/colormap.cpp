@@ -8,7 +8,7 @@
 namespace gsnav::eval {
 namespace {
 
-/// Every tenth of the original's range; straight lines between them stay within 4/255 of it.
+/// Every tenth entry of the original table. Linear interpolation stays within 4/255 of it.
 constexpr std::array<std::array<std::uint8_t, 3>, 11> kMagma{{{0, 0, 4},
                                                               {21, 14, 56},
                                                               {59, 15, 112},

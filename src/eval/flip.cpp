@@ -16,15 +16,15 @@ namespace {
 
 using detail::Plane;
 
-// Symbols of the paper.
-constexpr double kQc = 0.7;  // exponent of the colour difference
-constexpr double kPc = 0.4;  // share of the largest difference that maps to kPt
+// Names follow the paper.
+constexpr double kQc = 0.7;  // Exponent of the colour difference.
+constexpr double kPc = 0.4;  // Fraction of the largest difference that maps to kPt.
 constexpr double kPt = 0.95;
-constexpr double kQf = 0.5;  // exponent of the feature difference
+constexpr double kQf = 0.5;  // Exponent of the feature difference.
 
-/// An image as the two pipelines compare it.
+/// An image as the colour and feature pipelines compare it.
 struct Seen {
-  std::vector<Vec3d> color;  // Hunt-adjusted CIELAB after the eye's blur
+  std::vector<Vec3d> color;  // Hunt-adjusted CIELAB after the blur of the eye.
   detail::Features features;
 };
 
@@ -54,7 +54,7 @@ Seen see(const Samples& rgb, int width, int height, double pixels_per_degree) {
   return seen;
 }
 
-/// The largest colour difference that sRGB can show, green against blue, raised to kQc.
+/// Largest colour difference in sRGB (green to blue), raised to kQc.
 double largest_difference() {
   const auto lab = [](const Vec3d& rgb) {
     return detail::hunt_lab_from_xyz(detail::xyz_from_linear(rgb));
@@ -62,7 +62,7 @@ double largest_difference() {
   return std::pow(detail::hyab(lab({0.0, 1.0, 0.0}), lab({0.0, 0.0, 1.0})), kQc);
 }
 
-/// Differences up to kPc of the largest take [0, kPt], the rest what is left.
+/// Maps differences up to kPc of the largest to [0, kPt], and larger ones to [kPt, 1].
 double redistribute(double difference, double largest) {
   const double knee = kPc * largest;
   return difference < knee ? kPt / knee * difference

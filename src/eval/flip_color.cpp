@@ -14,10 +14,11 @@ Mat3d inverse(const Mat3d& m) {
   return transpose(Mat3d{{a, b, c}}) * (1.0 / dot(m.row[0], a));
 }
 
-/// XYZ with Y = 1 of a chromaticity.
+/// XYZ with Y = 1 for a chromaticity.
 Vec3d from_chromaticity(double x, double y) { return {x / y, 1.0, (1.0 - x - y) / y}; }
 
-/// Linear sRGB to XYZ / XYZ of white, from the primaries and the D65 white of IEC 61966-2-1.
+/// Matrix from linear sRGB to XYZ divided by the XYZ of white, from the primaries and the D65 white of
+/// IEC 61966-2-1.
 Mat3d make_matrix() {
   const Mat3d primaries = transpose(Mat3d{
       {from_chromaticity(0.64, 0.33), from_chromaticity(0.30, 0.60), from_chromaticity(0.15, 0.06)}});
@@ -35,13 +36,13 @@ struct Matrices {
   Mat3d linear_from_xyz = inverse(xyz_from_linear);
 };
 
-// Not a global: one of another translation unit might be made first, and need it.
+// A function-local static, so that it is initialized before any static of another file uses it.
 const Matrices& matrices() {
   static const Matrices m;
   return m;
 }
 
-/// The cube root, continued by its tangent below (6/29)^3.
+/// Cube root, continued by its tangent below (6/29)^3.
 double lab_curve(double t) {
   constexpr double d = 6.0 / 29.0;
   return t > d * d * d ? std::cbrt(t) : t / (3.0 * d * d) + 4.0 / 29.0;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// A term a sqrt(pi / b) exp(-pi^2 x^2 / b) of a contrast sensitivity filter, x in degrees.
+/// Term a sqrt(pi / b) exp(-pi^2 x^2 / b) of a contrast sensitivity filter, with x in degrees.
 struct CsfTerm {
   double a, b;
 };
@@ -19,10 +19,10 @@ constexpr CsfTerm kRedGreen[] = {{1.0, 0.0053}};
 constexpr CsfTerm kBlueYellow[] = {{34.1, 0.04}, {13.5, 0.025}};
 constexpr double kLargestB = 0.04;
 
-/// A sum of radial Gaussians is no product of a row and a column, but each of them is.
+/// Applies a sum of radial Gaussians. The sum is not separable, but each of its terms is.
 template <std::size_t N>
 Plane csf_filter(const Plane& image, const CsfTerm (&terms)[N], double pixels_per_degree) {
-  // Three standard deviations of the widest term, for all channels.
+  // Three standard deviations of the widest term. All channels use it.
   const int radius =
       static_cast<int>(std::ceil(3.0 * std::sqrt(kLargestB / (2.0 * kPi * kPi)) * pixels_per_degree));
   std::vector<double> taps[N];
@@ -44,7 +44,7 @@ Plane csf_filter(const Plane& image, const CsfTerm (&terms)[N], double pixels_pe
   return out;
 }
 
-/// Scales the positive taps to a sum of 1 and the negative ones to -1.
+/// Scales the positive taps to a sum of 1 and the negative taps to a sum of -1.
 std::vector<double> balanced(std::vector<double> taps) {
   double positive = 0.0, negative = 0.0;
   for (const double tap : taps) (tap > 0.0 ? positive : negative) += std::fabs(tap);
@@ -69,11 +69,12 @@ std::array<Plane, 3> contrast_filtered(const std::array<Plane, 3>& ycxcz, double
 }
 
 Features detect_features(const Plane& lightness, double pixels_per_degree) {
-  constexpr double kFeatureWidth = 0.082;  // degrees from peak to trough of the eye's edge detector
+  constexpr double kFeatureWidth = 0.082;  // Distance from peak to trough of the eye's edge detector,
+                                           // degrees.
   const double sigma = 0.5 * kFeatureWidth * pixels_per_degree;
   const int radius = static_cast<int>(std::ceil(3.0 * sigma));
   const std::vector<double> gaussian = gaussian_taps(0.5 / (sigma * sigma), radius);
-  std::vector<double> first = gaussian, second = gaussian;  // derivatives of the Gaussian
+  std::vector<double> first = gaussian, second = gaussian;  // Derivatives of the Gaussian.
   for (int x = -radius; x <= radius; ++x) {
     const std::size_t i = static_cast<std::size_t>(x + radius);
     first[i] *= -x;

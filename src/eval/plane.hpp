@@ -19,26 +19,27 @@ struct Plane {
   Plane(std::size_t w, std::size_t h) : width(w), height(h), values(w * h) {}
 };
 
-/// What a filter sees beyond the image.
+/// Treatment of pixels beyond the border.
 enum class Border {
-  valid,      ///< nothing: the result shrinks by the taps' length less one
-  replicate,  ///< the nearest pixel: the result has the image's size
+  valid,      ///< Use none: the result is smaller by the number of taps minus one.
+  replicate,  ///< Repeat the nearest pixel: the result has the size of the image.
 };
 
-/// Correlates the rows, then the columns, with taps of odd length; under `valid` no longer than the
-/// side.
+/// Correlates rows, then columns, with taps of odd length. For Border::valid, they must not be longer
+/// than the image.
 Plane filter(const Plane& image, const std::vector<double>& row_taps,
              const std::vector<double>& column_taps, Border border);
 
-/// exp(-rate x^2) at x = -radius .. radius.
+/// Values exp(-rate x^2) for x = -radius .. radius.
 std::vector<double> gaussian_taps(double rate, int radius);
-/// Taps scaled so that they add up to 1.
+/// Scales taps to a sum of 1.
 std::vector<double> unit_sum(std::vector<double> taps);
 
-/// invalid_argument, naming `metric`, unless both are images [height][width][3].
+/// Checks that both images have shape [height][width][3].
+/// @return invalid_argument, with the name of the metric.
 Status check_rgb(const char* metric, const Samples& reference, const Samples& test, int width,
                  int height);
-/// The channels of an image, clamped to [0, 1], NaN as 0.
+/// Channels of an image, clamped to [0, 1]. NaN becomes 0.
 std::array<Plane, 3> clamped_planes(const Samples& rgb, int width, int height);
 
 }  // namespace gsnav::eval::detail

@@ -15,7 +15,7 @@ using detail::Plane;
 
 constexpr int kRadius = 5;
 constexpr double kSigma = 1.5;
-constexpr double kC1 = 0.01 * 0.01, kC2 = 0.03 * 0.03;  // (K L)^2, L = 1
+constexpr double kC1 = 0.01 * 0.01, kC2 = 0.03 * 0.03;  // (K L)^2 with L = 1.
 
 std::vector<double> window(int side) {
   return detail::unit_sum(

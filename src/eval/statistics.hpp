@@ -8,8 +8,8 @@
 
 namespace gsnav::eval::detail {
 
-/// The smallest value that a share `q` of the values does not exceed (nearest rank); 0 for none.
-/// Reorders `values`.
+/// The q-quantile by nearest rank: the smallest value that a fraction `q` of the values does not exceed.
+/// 0 if there are none. Reorders `values`.
 template <class T>
 double percentile(std::vector<T>& values, double q) {
   if (values.empty()) return 0.0;
@@ -20,7 +20,7 @@ double percentile(std::vector<T>& values, double q) {
   return static_cast<double>(*at);
 }
 
-/// a / b; 0 of nothing.
+/// a / b, or 0 if b is 0.
 inline double share(std::size_t a, std::size_t b) noexcept {
   return b == 0 ? 0.0 : static_cast<double>(a) / static_cast<double>(b);
 }

@@ -8,12 +8,12 @@
 
 namespace gsnav::detail {
 
-/// Draws items in proportion to their weights in constant time (Walker 1977, built as Vose 1991).
+/// Samples items in proportion to their weights in constant time (Walker 1977, built as by Vose 1991).
 class AliasTable {
  public:
   AliasTable() = default;
-  /// `names` are what draw() returns; the items' own numbers where it is empty. Weights of zero in all
-  /// are as good as equal ones.
+  /// Builds the table. If all weights are zero, items are equally likely.
+  /// @param names Values that draw() returns. Empty: indices of the items.
   AliasTable(const std::vector<double>& weights, const std::vector<std::uint32_t>& names) {
     const std::size_t n = weights.size();
     double sum = 0;
@@ -45,7 +45,7 @@ class AliasTable {
 
   bool empty() const noexcept { return cells_.empty(); }
   std::uint32_t draw(Rng& rng) const noexcept {
-    // One number gives the cell by its integer part and the side by the rest.
+    // The integer part of one random number selects the cell, the rest selects the side.
     const double at = rng.uniform() * static_cast<double>(cells_.size());
     const auto i = static_cast<std::size_t>(at);
     const Cell& c = cells_[i < cells_.size() ? i : cells_.size() - 1];

@@ -10,7 +10,7 @@ namespace gsnav::detail {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kRounding = 1e-9;  // metres, or square metres: sights that only touch count
+constexpr double kRounding = 1e-9;  // Metres or m². Sights that only touch count.
 
 }  // namespace
 
@@ -45,7 +45,7 @@ bool CornerHubs::look(const UnfoldedMesh& mesh, std::vector<std::vector<Link>>& 
   };
   std::vector<Placed> seen;
   links.resize(corners_.size());
-  // Windows side by side, of one root, are one sight.
+  // Adjacent windows of one root are merged into one sight.
   std::vector<std::size_t> last_of(mesh.faces.size(), 0);
   const auto same = [](const Flat& a, const Flat& b) { return length(a - b) < kRounding; };
   const auto add = [&](const Placed& p) {
@@ -99,7 +99,7 @@ bool CornerHubs::look(const UnfoldedMesh& mesh, std::vector<std::vector<Link>>& 
 
 void CornerHubs::draw_sides(const UnfoldedMesh& mesh) {
   constexpr double kShort =
-      1e-4;  // metres: sides that begin so near their end are left to the exact test
+      1e-4;  // Metres. Sides that begin this near to their end are left to the exact test.
   sides_.assign(6 * sights_.size(), 0.0f);
   for (const Sight& s : sights_) roots_.push_back({s.root, s.corner});
   for (std::uint32_t f = 0; f < mesh.faces.size(); ++f) {
@@ -128,8 +128,7 @@ void CornerHubs::draw_sides(const UnfoldedMesh& mesh) {
 }
 
 void CornerHubs::rank(const std::vector<std::vector<Link>>& links) {
-  // Corners on many shortest paths make good hubs: counted on the trees of paths from a sample of
-  // corners.
+  // Corners on many shortest paths are good hubs. Count them on the path trees of a sample of corners.
   constexpr std::size_t kTrees = 64;
   const std::size_t n = corners_.size(), stride = max(n / kTrees, std::size_t{1});
   std::vector<double> score(n, 0.0), below(n), best(n);

@@ -9,19 +9,19 @@
 
 namespace gsnav::detail {
 
-/// Shortest paths by the corners that they bend at, without a search.
+/// Shortest paths through the corners at which they bend, without a search.
 ///
-/// Each face keeps which corners its points can see; each corner keeps its distance to some hubs, chosen
-/// so that any two corners have a hub on a shortest path between them (pruned landmark labels, Akiba,
-/// Iwata and Yoshida 2013). The least sum over both ends' corners and a common hub is the shortest path
-/// that bends (Euclidean hub labels, Du, Shen and Cui 2023), on unfolded faces as well as on level ones.
-/// Of a mesh of no more than kMostTable corners the labels are summed once, for all pairs: a table of at
-/// most 8 MiB.
+/// Each face stores the corners that its points can see. Each corner stores its distance to some hubs,
+/// chosen so that any two corners have a hub on a shortest path between them (pruned landmark labels,
+/// Akiba, Iwata and Yoshida 2013). The shortest path that bends is the minimum sum over the corners seen
+/// by both ends and a common hub (Euclidean hub labels, Du, Shen and Cui 2023). This works on unfolded
+/// faces as on level ones. For a mesh of at most kMostTable corners the sums are precomputed for all
+/// pairs, in a table of at most 8 MiB.
 class CornerHubs {
  public:
-  /// Makes nothing, so that empty() holds, for a mesh of more corners or sights than these, or whose
-  /// labels take more comparisons (a tenth of a second): a hall of thousands of pillars, each of which
-  /// sees many others.
+  /// Limits of the construction. A mesh with more corners or sights, or whose labels need more
+  /// comparisons (0.1 s), gets no hubs, and empty() is true. An example is a hall with thousands of
+  /// pillars that see many others.
   static constexpr std::size_t kMostCorners = std::size_t{1} << 12, kMostSights = std::size_t{1} << 19,
                                kMostWork = std::size_t{1} << 26, kMostTable = std::size_t{1} << 10;
   explicit CornerHubs(const UnfoldedMesh& mesh);
@@ -31,18 +31,18 @@ class CornerHubs {
   std::size_t sights() const noexcept { return sights_.size(); }
   std::size_t labels() const noexcept { return labels_.size(); }
 
-  /// A path that bends: from the start straight to corner `first`, the shortest way to `last`, and to
-  /// the goal.
+  /// A path that bends: straight from the start to corner `first`, by the shortest path to `last`, and
+  /// straight to the goal.
   struct Way {
     double length = std::numeric_limits<double>::infinity();
     std::uint32_t first = 0, last = 0;
-    double to_first = 0, from_last = 0;  ///< straight, metres
+    double to_first = 0, from_last = 0;  ///< Lengths of the straight parts, metres.
     std::uint32_t near_goal =
-        UnfoldedMesh::kNone;  ///< the corner nearest to the goal of those that it sees,
-    double to_goal = 0;       ///< and its distance
+        UnfoldedMesh::kNone;  ///< Corner nearest to the goal among those that it sees.
+    double to_goal = 0;       ///< Its distance from the goal, metres.
   };
-  /// Distances to a way's goal from below: by the triangle inequality, with the corner near the goal.
-  /// Until the thread's next one.
+  /// Lower bounds of distances to a path's goal, by the triangle inequality with the corner near the
+  /// goal. Valid until the thread creates the next one.
   class LeastToGoal final : public GoalBound {
    public:
     LeastToGoal(const CornerHubs& hubs, const Way& way);
@@ -51,20 +51,21 @@ class CornerHubs {
    private:
     const CornerHubs& hubs_;
     const Way& way_;
-    const double* row_ = nullptr;  ///< of the corner near the goal, where there is a table
+    const double* row_ = nullptr;  ///< Row of the table for the corner near the goal. Null if there is
+                                   ///< no table.
   };
-  /// The shortest path among those that bend; infinite length where there is none.
+  /// Shortest path among those that bend. Infinite length if there is none.
   Way shortest(const Site& start, const Site& goal) const;
-  /// A straight stretch of a way and where it ends.
+  /// Straight part of a path and its end.
   struct Leg {
     Site end;
     double length = 0;
   };
-  /// All legs of a way from its start to its goal, in order.
+  /// All legs of a path in order.
   std::vector<Leg> legs(const Way& way, const Site& goal) const;
 
  private:
-  /// A corner and the window of the face's edge that it sees the face through; no width for the face's
+  /// A corner and the window of a face's edge through which it sees the face. No width for the face's
   /// own corners.
   struct Sight {
     Flat root, right, left;
@@ -72,8 +73,8 @@ class CornerHubs {
   };
   struct Label {
     double length = 0;
-    std::uint32_t hub = 0;   ///< its rank: labels of a corner are sorted by it
-    std::uint32_t next = 0;  ///< corner on the way to the hub
+    std::uint32_t hub = 0;   ///< Rank of the hub. The labels of a corner are sorted by it.
+    std::uint32_t next = 0;  ///< Next corner on the path to the hub.
   };
   struct Link {
     double length = 0;
@@ -81,26 +82,26 @@ class CornerHubs {
   };
 
   struct Seen {
-    double straight = 0;  ///< to the corner
+    double straight = 0;  ///< Straight distance to the corner, metres.
     std::uint32_t corner = 0;
   };
-  /// The hub of the shortest way between two corners, by its rank, and that way's length.
+  /// Hub of the shortest path between two corners, by its rank, and the length of that path.
   struct Meeting {
     double length = std::numeric_limits<double>::infinity();
     std::uint32_t hub = 0;
   };
 
-  /// False where there is too much of it.
+  /// Finds the corners and the regions visible from them. Returns false if a limit is exceeded.
   bool look(const UnfoldedMesh& mesh, std::vector<std::vector<Link>>& links);
   void rank(const std::vector<std::vector<Link>>& links);
   bool label(const std::vector<std::vector<Link>>& links);
-  /// Both sides of each sight in float, to leave out most of those that a site is not in.
+  /// Stores both sides of each sight in float, for a fast test that excludes most sights.
   void draw_sides(const UnfoldedMesh& mesh);
   void fill_table();
-  /// The corners that a site sees, the nearest first.
+  /// Corners that a site sees, the nearest first.
   void look_from(const Site& from, std::vector<Seen>& out) const;
   Meeting meet(std::uint32_t a, std::uint32_t b) const noexcept;
-  /// Makes `best` the way by these two where its length is less.
+  /// Replaces `best` by the path through these two corners if it is shorter.
   static void offer(double length, const Seen& first, const Seen& last, Way& best) noexcept {
     if (!(length < best.length)) return;
     best.length = length;
@@ -109,7 +110,8 @@ class CornerHubs {
     best.to_first = first.straight;
     best.from_last = last.straight;
   }
-  /// Of the corners that both ends see, by the table or by the labels.
+  /// Finds the shortest path over all pairs of corners that both ends see, by the table or by the
+  /// labels.
   void join_by_table(const Site& start, const Site& goal, std::vector<Seen>& near_start,
                      std::vector<Seen>& near_goal, Way& best) const;
   void join_by_labels(const Site& start, const Site& goal, const std::vector<Seen>& near_start,
@@ -119,27 +121,29 @@ class CornerHubs {
   }
 
   std::vector<Site> corners_;
-  std::vector<std::uint32_t> corner_of_;    ///< of each vertex; kNone where no path bends
-  std::vector<std::uint32_t> first_sight_;  ///< of each face, and one past the last
+  std::vector<std::uint32_t> corner_of_;    ///< Corner of each vertex. kNone if no path bends there.
+  std::vector<std::uint32_t> first_sight_;  ///< Begin of each face's sights, and one past the last.
   std::vector<Sight> sights_;
-  /// What every query that is within a sight reads, apart from what few read.
+  /// Data of a sight that most queries read, separate from the rest.
   struct Root {
     Flat at;
     std::uint32_t corner = 0;
   };
-  std::vector<Root> roots_;  ///< of each sight
-  /// A face's sights have a row of each of six numbers: a, b, c of right and left side, where a x + b y
-  /// + c is the distance, metres, to the inside of the point (x, y) from the face's first corner.
+  std::vector<Root> roots_;  ///< One per sight.
+  /// For each face, six rows with one value per sight: a, b, c of the right side and of the left side. a
+  /// x + b y + c is the distance in metres by which the point (x, y), relative to the face's first
+  /// corner, lies inside.
   std::vector<float> sides_;
   struct Frame {
     Flat origin;
-    float margin = 0;  ///< metres: no more than that is lost by rounding
+    float margin = 0;  ///< Bound of the rounding error, metres.
   };
-  std::vector<Frame> frames_;               ///< of each face
-  std::vector<std::uint32_t> first_label_;  ///< of each corner, and one past the last
+  std::vector<Frame> frames_;               ///< One per face.
+  std::vector<std::uint32_t> first_label_;  ///< Begin of each corner's labels, and one past the last.
   std::vector<Label> labels_;
-  std::vector<std::uint32_t> hub_corner_;  ///< by rank
-  std::vector<double> table_;  ///< metres between each two corners; empty where they are too many
+  std::vector<std::uint32_t> hub_corner_;  ///< Corner of each hub, by rank.
+  std::vector<double> table_;  ///< Distance between each two corners, metres. Empty if there are too
+                               ///< many corners.
 };
 
 }  // namespace gsnav::detail

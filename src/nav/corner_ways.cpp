@@ -5,15 +5,15 @@
 
 #include "corner_hubs.hpp"
 
-// Questions to the hubs.
+// Queries of the hubs.
 
 namespace gsnav::detail {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kRounding = 1e-9;  // metres, or square metres: sights that only touch count
+constexpr double kRounding = 1e-9;  // Metres or m². Sights that only touch count.
 
-/// Where the point (x, y) is within both sides of a sight: 0 no, 1 perhaps, 2 yes.
+/// Tests whether the point (x, y) is inside both sides of each sight: 0 no, 1 perhaps, 2 yes.
 void inside_sides(const float* __restrict sides, std::size_t n, float x, float y, float margin,
                   std::uint8_t* __restrict out) noexcept {
   for (std::size_t i = 0; i < n; ++i) {
@@ -81,9 +81,9 @@ CornerHubs::Way CornerHubs::shortest(const Site& start, const Site& goal) const 
 
 void CornerHubs::join_by_table(const Site& start, const Site& goal, std::vector<Seen>& near_start,
                                std::vector<Seen>& near_goal, Way& best) const {
-  // Good ways first: to the corner nearest to the one end from all that the other sees. They are also
-  // bounds, by the triangle inequality: whoever leads there a long way round leads to that end at most
-  // its distance less.
+  // Good paths first: to the corner nearest to one end from all corners that the other end sees. By the
+  // triangle inequality, their lengths also bound paths through the same corners: a path through a
+  // corner is at least its length to the nearest corner minus that corner's distance from the end.
   const auto by_nearest = [&](const std::vector<Seen>& from, const Seen& nearest, bool forward) {
     const double* to = row(nearest.corner);
     for (const Seen& seen : from) {
@@ -125,12 +125,12 @@ void CornerHubs::join_by_labels(const Site& start, const Site& goal, const std::
   };
   thread_local std::vector<Entry> from_start;
   thread_local std::uint64_t round = 0;
-  // No way by the corner to the other end is shorter.
+  // Lower bound of a path through the corner to the other end.
   const auto least = [&](const Seen& seen, const Site& end) {
     return seen.straight + distance(corners_[seen.corner].position, end.position);
   };
-  // A good way first, by the corners that lead most nearly to the other end: most others are then too
-  // far.
+  // Start with a good path, through the corners that lead most directly to the other end. Most other
+  // corners are then too far.
   const auto first = [&](const std::vector<Seen>& from, const Site& end) {
     return *std::min_element(from.begin(), from.end(), [&](const Seen& a, const Seen& b) {
       return least(a, end) < least(b, end);
@@ -160,11 +160,11 @@ void CornerHubs::join_by_labels(const Site& start, const Site& goal, const std::
 
 namespace {
 
-/// Of the corner near a goal, and what came of it.
+/// Labels of the corner near a goal, and results computed from them.
 struct NearGoal {
-  std::vector<double> to_hub;       ///< infinity where it has no label
-  std::vector<std::uint32_t> set;   ///< the finite ones
-  std::vector<double> from_corner;  ///< where `round_of` is the round
+  std::vector<double> to_hub;       ///< Infinity for hubs without a label.
+  std::vector<std::uint32_t> set;   ///< Hubs with a finite value.
+  std::vector<double> from_corner;  ///< Valid where `round_of` equals `round`.
   std::vector<std::uint64_t> round_of;
   std::uint64_t round = 0;
 };
@@ -201,7 +201,7 @@ CornerHubs::LeastToGoal::LeastToGoal(const CornerHubs& hubs, const Way& way) : h
 double CornerHubs::LeastToGoal::from(std::uint32_t vertex) const noexcept {
   const std::uint32_t c = hubs_.corner_of_[vertex];
   if (c == UnfoldedMesh::kNone || way_.near_goal == UnfoldedMesh::kNone) return 0;
-  // Less what rounding may have left out.
+  // Subtract the rounding error.
   const auto less = [&](double d) {
     return d < kInfinity ? max(d - way_.to_goal - kRounding, 0.0) : 0.0;
   };
@@ -218,7 +218,7 @@ double CornerHubs::LeastToGoal::from(std::uint32_t vertex) const noexcept {
 
 std::vector<CornerHubs::Leg> CornerHubs::legs(const Way& way, const Site& goal) const {
   const std::uint32_t hub = meet(way.first, way.last).hub;
-  using Place = std::pair<std::uint32_t, double>;  // a corner, and its distance to the hub
+  using Place = std::pair<std::uint32_t, double>;  // A corner and its distance to the hub.
   const auto to_hub = [&](std::uint32_t corner) {
     std::vector<Place> out;
     for (;;) {

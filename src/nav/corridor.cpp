@@ -4,21 +4,21 @@
 
 #include "landmarks.hpp"
 
-// A way over faces that landmarks point along, and the shortest within these faces.
+// Finds a sequence of faces by landmarks, and the shortest path inside it.
 
 namespace gsnav::detail {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kSame = 1e-9;  // metres
+constexpr double kSame = 1e-9;  // Metres.
 
-/// From the plane of a face into that of the first.
+/// Transform from the plane of a face to that of the first face.
 struct Placed {
   double cosine = 1, sine = 0, dx = 0, dy = 0;
   Flat operator()(const Flat& p) const noexcept {
     return {cosine * p.x - sine * p.y + dx, sine * p.x + cosine * p.y + dy};
   }
-  /// After the turn of an edge, from its face's plane into the neighbour's.
+  /// Composed with the turn of an edge: from the plane of its face to that of its neighbour.
   Placed after(const UnfoldedMesh::Edge& e) const noexcept {
     if (e.same_plane) return *this;
     const Flat d = (*this)({e.dx, e.dy});
@@ -30,7 +30,7 @@ struct Gate {
   Flat right, left;
 };
 
-/// The shortest way from a point through all gates, of which the last is a point.
+/// Length of the shortest path from a point through all gates. The last gate is a point.
 double straightened(const Flat& start, const std::vector<Gate>& gates) noexcept {
   double sum = 0;
   Flat apex = start, right = start, left = start;
@@ -38,7 +38,7 @@ double straightened(const Flat& start, const std::vector<Gate>& gates) noexcept 
   const auto at_apex = [&](const Flat& p) { return length(p - apex) < kSame; };
   for (std::size_t i = 0; i < gates.size(); ++i) {
     Gate g = gates[i];
-    // A corner has other numbers in other planes, by rounding.
+    // Rounding gives a corner slightly different coordinates in different planes.
     if (at_apex(g.right)) g.right = apex;
     if (at_apex(g.left)) g.left = apex;
     if (cross(right - apex, g.right - apex) >= 0) {
@@ -83,7 +83,7 @@ double corridor_length(const UnfoldedMesh& mesh, const LandmarkLead& lead, const
     for (std::uint32_t e = f.first; e < f.first + f.count; ++e) {
       const UnfoldedMesh::Edge &edge = mesh.edges[e], &after = mesh.edges[mesh.next(e)];
       if (edge.twin == UnfoldedMesh::kNone || e == entered) continue;
-      // Not its ends, which it could go round for ever.
+      // Exclude the ends of the edge, because the path could circle around them forever.
       for (std::uint32_t k = 1; k < Landmarks::kParts; ++k) {
         const double t = static_cast<double>(k) / Landmarks::kParts;
         const Flat p = edge.at + (after.at - edge.at) * t;

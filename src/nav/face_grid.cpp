@@ -9,8 +9,8 @@ namespace gsnav::detail {
 namespace {
 
 constexpr double kCellsAFace = 3.0;
-constexpr double kMostAcross = 1024;  // cells along a side of a polygon
-constexpr double kSlack = 1e-9;       // shares of a corner: what rounding may move a side by
+constexpr double kMostAcross = 1024;  // Cells along a side of a polygon.
+constexpr double kSlack = 1e-9;       // Margin for rounding, as a fraction of a corner's share.
 
 }  // namespace
 
@@ -46,8 +46,8 @@ void FaceGrid::add(const PolyMesh& mesh, PolyId id, bool by_triangle, std::uint3
     const std::uint32_t r0 = g.row(min(a.z, min(b.z, c.z))), r1 = g.row(max(a.z, max(b.z, c.z)));
     for (std::uint32_t row = r0; row <= r1; ++row) {
       for (std::uint32_t column = c0; column <= c1; ++column) {
-        // The corners' greatest shares in the cell: none of its points is inside where one of them is
-        // negative.
+        // Largest share of each corner within the cell. If one is negative, no point of the cell is
+        // inside.
         const double x = g.x + column / g.columns_a_metre - a.x, z = g.z + row / g.rows_a_metre - a.z;
         const double w = 1.0 / g.columns_a_metre, d = 1.0 / g.rows_a_metre;
         const auto most = [&](double by_x, double by_z, double constant) {

@@ -8,19 +8,21 @@
 
 namespace gsnav::detail {
 
-/// Finds the face of an UnfoldedMesh that a point of a polygon is on, and its height there, without
-/// walking all height triangles: a grid over each polygon whose faces they are lists the triangles that
-/// reach into each cell. About 110 bytes a face. Constant after add() and so for any number of threads.
+/// Finds the face of an UnfoldedMesh below a point of a polygon, and the height there, without a walk
+/// over all height triangles. If the faces of a polygon are its height triangles, a grid over the
+/// polygon lists the triangles that intersect each cell. About 110 bytes per face. Thread-safe after
+/// add().
 class FaceGrid {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
-  /// The next polygon; `by_triangle` where its faces are its height triangles, the first of them
-  /// `first_face`.
+  /// Adds the next polygon.
+  /// @param by_triangle True if the faces of the polygon are its height triangles.
+  /// @param first_face Index of its first face.
   void add(const PolyMesh& mesh, PolyId id, bool by_triangle, std::uint32_t first_face);
 
-  /// The first face of the polygon that (x, z) of p is on, with `p.y` set to its height there; kNone,
-  /// and p as it was, where p is on none or the polygon's faces are not its height triangles.
+  /// Finds the first face of the polygon that contains (x, z) of p, and sets `p.y` to its height there.
+  /// @return kNone, with p unchanged, if no face contains p or the faces are not height triangles.
   std::uint32_t find(PolyId id, Vec3d& p) const noexcept {
     const Grid& g = grids_[id];
     if (g.columns == 0) return kNone;
@@ -40,8 +42,8 @@ class FaceGrid {
   struct Grid {
     double x = 0, z = 0, columns_a_metre = 0, rows_a_metre = 0;
     std::uint32_t columns = 0, rows = 0;
-    std::uint32_t first = 0;               ///< cell in `first_`
-    std::uint32_t triangle = 0, face = 0;  ///< of number 0 in `in_cells_`
+    std::uint32_t first = 0;               ///< Index of the first cell in `first_`.
+    std::uint32_t triangle = 0, face = 0;  ///< Triangle and face with number 0 in `in_cells_`.
     std::uint32_t column(double at) const noexcept {
       return static_cast<std::uint32_t>(
           clamp((at - x) * columns_a_metre, 0.0, static_cast<double>(columns - 1)));
@@ -51,16 +53,16 @@ class FaceGrid {
           clamp((at - z) * rows_a_metre, 0.0, static_cast<double>(rows - 1)));
     }
   };
-  /// What PolyMesh::height() takes from three arrays: a corner, how the shares of the others grow, and
-  /// their rise.
+  /// Data of PolyMesh::height() in one place: a corner, the gradients of the shares of the other two,
+  /// and their rise.
   struct Triangle {
     double x = 0, y = 0, z = 0, u_x = 0, u_z = 0, v_x = 0, v_z = 0, rise_u = 0, rise_v = 0;
   };
 
-  std::vector<Grid> grids_;  ///< of each polygon
+  std::vector<Grid> grids_;  ///< One per polygon.
   std::vector<Triangle> triangles_;
-  std::vector<std::uint32_t> first_{0};  ///< of each cell in `in_cells_`, and one past the last
-  std::vector<std::uint32_t> in_cells_;  ///< triangles of the polygon, ascending in a cell
+  std::vector<std::uint32_t> first_{0};  ///< Begin of each cell in `in_cells_`, and one past the last.
+  std::vector<std::uint32_t> in_cells_;  ///< Triangles of the polygon, ascending within a cell.
 };
 
 }  // namespace gsnav::detail

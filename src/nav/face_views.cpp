@@ -9,19 +9,20 @@
 namespace gsnav::detail {
 namespace {
 
-constexpr double kRounding = 1e-8;  // square metres: what only touches a beam is in it
-constexpr double kShort = 1e-6;     // metres: the direction between points so near is not known
-constexpr double kPoint = 1e-9;     // metres: edges so short are points
-constexpr double kSame = 1e-7;      // radians: directions so near are one
-constexpr double kSlack = 1e-6;     // of an edge's length: what is left beside a range
+constexpr double kRounding = 1e-8;  // m²: a point that only touches a beam is in it.
+constexpr double kShort = 1e-6;     // Metres: closer points define no direction.
+constexpr double kPoint = 1e-9;     // Metres: shorter edges are points.
+constexpr double kSame = 1e-7;      // Radians: directions closer than this are equal.
+constexpr double kSlack = 1e-6;     // Margin on each side of a range, as a fraction of the edge.
 
-/// The lines across a first edge and all that they crossed since, as they enter a face; in its plane.
-/// None is right of the line from the first edge's left end to `right`, or left of that from its right
-/// end to `left`.
+/// A beam: all straight lines that cross a first edge and every edge since, as they enter a face, in its
+/// plane. No line is to the right of the line from the left end of the first edge to `right`, or to the
+/// left of the line from its right end to `left`.
 struct Beam {
   std::uint32_t edge = 0;
   Flat first_right, first_left, right, left;
-  Flat rightmost, leftmost;  ///< directions that bound theirs, at most half a turn
+  Flat rightmost, leftmost;  ///< Directions that bound those of the lines. They are at most half a turn
+                             ///< apart.
 };
 
 Beam enter(const UnfoldedMesh::Edge& e, const Beam& b) noexcept {
@@ -37,8 +38,8 @@ Beam enter(const UnfoldedMesh::Edge& e, const Beam& b) noexcept {
           turned(b.leftmost)};
 }
 
-/// What a beam's lines have between two directions more, each taken where it is within half a turn and
-/// tighter; false where no line is left.
+/// Limits the directions of a beam to those between `right` and `left`. A limit is applied only if it is
+/// within half a turn and tighter. Returns false if no line remains.
 bool bound(Beam& b, const Flat& right, const Flat& left) noexcept {
   if (cross(b.rightmost, right) > 0) b.rightmost = right;
   if (cross(left, b.leftmost) > 0) b.leftmost = left;
@@ -46,7 +47,7 @@ bool bound(Beam& b, const Flat& right, const Flat& left) noexcept {
   return !(c < 0 && c * c > kSame * kSame * dot(b.rightmost, b.rightmost) * dot(b.leftmost, b.leftmost));
 }
 
-/// Directions across an edge; false where no line is left.
+/// Limits directions to those that leave across an edge. Returns false if no line remains.
 bool cross_edge(Beam& b, const Flat& e) noexcept {
   const Flat back = e * -1.0;
   if (cross(b.rightmost, back) > 0) return bound(b, back, b.leftmost);
@@ -54,16 +55,17 @@ bool cross_edge(Beam& b, const Flat& e) noexcept {
   return dot(b.rightmost, back) > 0;
 }
 
-/// Directions between the ends of the first edge and of the last window; false where no line is left.
+/// Limits directions by the ends of the first edge and of the last window. Returns false if no line
+/// remains.
 bool look_ahead(Beam& b) noexcept {
-  // Lines cross the first edge outwards: what lies elsewhere bounds nothing.
+  // Lines cross the first edge outwards, so only points on that side limit them.
   const Flat first = b.first_left - b.first_right, right = b.right - b.first_left,
              left = b.left - b.first_right;
   const auto bounds = [&](const Flat& d) { return cross(first, d) < 0 && dot(d, d) > kShort * kShort; };
   return bound(b, bounds(right) ? right : b.rightmost, bounds(left) ? left : b.leftmost);
 }
 
-/// See FaceViews::Range; not rounded.
+/// Position of a direction on the scale of FaceViews::Range, not rounded.
 double step_of(const Flat& direction, const Flat& edge) noexcept {
   const double x = dot(direction, edge), y = max(-cross(edge, direction), 0.0), sum = std::abs(x) + y;
   return (x / sum + 1.0) * (0.5 * FaceViews::kSteps);
@@ -90,7 +92,7 @@ FaceViews::FaceViews(const UnfoldedMesh& mesh) {
     if (look_through(mesh, e, most)) continue;
     for (std::size_t goal = 0; goal < faces; ++goal) ranges_[goal * edges_ + e] = {0, kSteps};
   }
-  // Who is not seen does not see.
+  // Visibility is mutual: if b does not see a, a does not see b.
   const auto sees = [&](std::size_t from, std::size_t goal) {
     const UnfoldedMesh::Face& f = mesh.faces[from];
     for (std::size_t e = f.first; e < f.first + f.count; ++e) {
@@ -122,7 +124,9 @@ bool FaceViews::look_through(const UnfoldedMesh& mesh, std::uint32_t edge, std::
   const UnfoldedMesh::Edge& from = mesh.edges[edge];
   if (from.twin == UnfoldedMesh::kNone) return true;
   const Flat right = from.at, left = mesh.edges[mesh.next(edge)].at;
-  if (!(length(left - right) > kPoint)) return false;  // in a file only: it has no direction
+  if (!(length(left - right) > kPoint))
+    return false;  // Occurs only in files: such an edge has no
+                   // direction.
   std::vector<Beam> open{enter(from, {edge, right, left, right, left, right - left, left - right})};
   for (std::size_t n = 0; !open.empty(); ++n) {
     if (n == most) return false;
@@ -149,7 +153,7 @@ bool FaceViews::look_through(const UnfoldedMesh& mesh, std::uint32_t edge, std::
       };
       const Flat r = right_p < 0 && right_q > right_p ? cut(right_p, right_q) : p;
       const Flat l = left_q > 0 && left_q > left_p ? cut(left_p, left_q) : q;
-      // An end of the first edge that is beyond this one sees it from behind, which limits nothing.
+      // If an end of the first edge lies beyond this edge, it sees it from behind and sets no limit.
       const bool by_right = cross(r - b.first_left, l - b.first_left) > 0;
       const bool by_left = cross(l - b.first_right, r - b.first_right) < 0;
       Beam next{e,           b.first_right, b.first_left, by_right ? r : b.right, by_left ? l : b.left,

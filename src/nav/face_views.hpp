@@ -9,20 +9,21 @@
 
 namespace gsnav::detail {
 
-/// Which faces can be seen from which along straight ways, through which edge and in which directions: a
-/// search for such a way need not look elsewhere. From above: beams of all lines that cross two edges
-/// are a little wider than what crosses those between as well.
+/// Which faces can be seen from which along straight lines: through which edge and in which directions.
+/// A search for straight paths can skip the rest. It is conservative: a beam contains all lines that
+/// cross two edges, and slightly more than those that cross the edges between them too.
 class FaceViews {
  public:
-  /// Nothing is known, so that empty() holds, of a mesh with more pairs of a face and an edge than this
-  /// (two bytes each, 32 MiB: some 2000 faces).
+  /// Largest number of (face, edge) pairs. A larger mesh gets no table, and empty() is true. Two bytes
+  /// per pair: 32 MiB, or about 2000 faces.
   static constexpr std::size_t kMostPairs = std::size_t{1} << 24;
-  /// Beams followed in all; from an edge with more than its part of them everything is taken to be seen.
+  /// Largest total number of beams. An edge that uses up its share of them is treated as seeing
+  /// everything.
   static constexpr std::size_t kMostBeams = std::size_t{1} << 24;
 
-  /// Directions of lines out of a face across its edge, from the left to the right as steps 0 to kSteps
-  /// of the angle's cosine over the sum of cosine and sine, against the edge from its first corner to
-  /// the next. None where low > high.
+  /// Directions of lines that leave a face across its edge. They are counted from left to right in steps
+  /// 0 to kSteps of cos / (|cos| + sin) of the angle to the edge, which runs from its first corner to
+  /// the next. Empty if low > high.
   struct Range {
     std::uint8_t low = kSteps, high = 0;
   };
@@ -32,21 +33,21 @@ class FaceViews {
   explicit FaceViews(const UnfoldedMesh& mesh);
 
   bool empty() const noexcept { return ranges_.empty(); }
-  /// Of straight ways that leave a face across `edge` and end in the face `goal`.
+  /// Directions of straight paths that leave a face across `edge` and end in the face `goal`.
   Range toward(std::uint32_t goal, std::uint32_t edge) const noexcept {
     return ranges_[std::size_t{goal} * edges_ + edge];
   }
-  /// Takes what of the window [right, left] of the edge, both as shares of its length, lines from a root
-  /// reach within the range; false where that is nothing. The root lies at `along` the edge and `inside`
-  /// it, both in shares.
+  /// Narrows the window [right, left] of an edge to the part that lines from a root reach within
+  /// `range`. Returns false if nothing remains. All lengths are fractions of the edge: the window, and
+  /// the root's position `along` the edge and its distance `inside` the face.
   static bool narrow(Range range, double along, double inside, double& right, double& left) noexcept;
 
  private:
-  /// Marks what is seen from the face of `edge` through it; false after `most` beams.
+  /// Marks what the face of `edge` sees through it. Returns false if more than `most` beams are needed.
   bool look_through(const UnfoldedMesh& mesh, std::uint32_t edge, std::size_t most);
 
   std::size_t edges_ = 0;
-  std::vector<Range> ranges_;  ///< [goal][edge]
+  std::vector<Range> ranges_;  ///< Shape [goal][edge].
 };
 
 }  // namespace gsnav::detail

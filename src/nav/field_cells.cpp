@@ -10,11 +10,12 @@
 namespace gsnav::detail {
 namespace {
 
-constexpr double kMargin = 1e-9;     // metres by which a cell and a face reach beyond their sides
-constexpr double kRounding = 1e-12;  // metres that rounding may add to a length
-constexpr double kAtBend = 1e-9;     // metres: the direction to a nearer point is not known
+constexpr double kMargin = 1e-9;     // Margin by which a cell and a face extend beyond their sides,
+                                     // metres.
+constexpr double kRounding = 1e-12;  // Rounding error of a length, metres.
+constexpr double kAtBend = 1e-9;     // Metres: closer points define no direction.
 
-/// Cuts a convex polygon to the part on the left of the line through p along d.
+/// Clips a convex polygon to the left side of the line through p in direction d.
 void cut(std::vector<Flat>& polygon, std::vector<Flat>& scratch, const Flat& p, const Flat& d) {
   scratch.clear();
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -26,7 +27,7 @@ void cut(std::vector<Flat>& polygon, std::vector<Flat>& scratch, const Flat& p, 
   polygon.swap(scratch);
 }
 
-/// Builds the block of numbers of a face's cells (FieldCells::block_).
+/// Builds FieldCells::block_ of a face.
 class CellsBuilder {
  public:
   CellsBuilder(const UnfoldedMesh& mesh, std::uint32_t face, const FieldGrid& grid,
@@ -80,7 +81,7 @@ class CellsBuilder {
     numbers_.insert(numbers_.end(), windows_.begin(), windows_.end());
   }
 
-  /// The part of a cell that is in the face.
+  /// The part of a cell that lies in the face.
   void cut_part(std::size_t cell) {
     const Flat a = grid_.low + Flat{static_cast<double>(cell % grid_.columns) * width_ - kMargin,
                                     static_cast<double>(cell / grid_.columns) * depth_ - kMargin};
@@ -101,8 +102,8 @@ class CellsBuilder {
     for (const Flat& p : part_) radius_ = max(radius_, length(p - middle_));
   }
 
-  /// The sources that can be least in the part, the least at its middle first. No length changes faster
-  /// than its end moves.
+  /// Sources that can be nearest somewhere in the part, sorted by their length at its middle. A length
+  /// changes no faster than its end moves.
   void find_candidates() {
     candidates_.clear();
     double nearest = std::numeric_limits<double>::infinity();
@@ -117,7 +118,8 @@ class CellsBuilder {
     });
   }
 
-  /// False where the source's tangent at the middle is nowhere below the lengths of one that is kept.
+  /// Returns false if the source's tangent at the middle is nowhere below the lengths of a source that
+  /// is kept.
   bool may_be_least(const Candidate& c) {
     const Flat back = middle_ - sources_[c.source].last_bend(middle_);
     const double away = length(back);
@@ -133,7 +135,8 @@ class CellsBuilder {
     return true;
   }
 
-  /// Where the ways to all corners of the part have the same last bend, so have those to all of it.
+  /// If the paths to all corners of the part have the same last bend, so do the paths to all its points.
+  /// Store only that bend.
   void put_source(const FieldSource& s) {
     const auto all = [&](const auto& test) { return std::all_of(part_.begin(), part_.end(), test); };
     const auto right = [&](const Flat& p) { return cross(s.right - s.root, p - s.root); };
@@ -172,16 +175,17 @@ class CellsBuilder {
   const FieldGrid& grid_;
   std::span<const FieldSource> sources_;
   double relative_error_;
-  double width_, depth_;  ///< of a cell, metres
+  double width_, depth_;  ///< Size of a cell, metres.
   std::vector<std::uint64_t> heads_, numbers_;
   std::size_t copies_ = 0;
-  // Of the cell at hand:
+  // State of the current cell:
   std::vector<Flat> part_, scratch_;
-  Flat middle_;  ///< mean of the part's corners
+  Flat middle_;  ///< Mean of the part's corners.
   double radius_ = 0;
   std::vector<Candidate> candidates_;
-  std::vector<double> tangents_, lengths_;  ///< at the part's corners; `lengths_` of each kept source
-  std::vector<std::uint64_t> windows_;      ///< follow the cell's points
+  std::vector<double> tangents_, lengths_;  ///< At the corners of the part. `lengths_` has one block per
+                                            ///< kept source.
+  std::vector<std::uint64_t> windows_;      ///< Appended after the points of the cell.
 };
 
 }  // namespace

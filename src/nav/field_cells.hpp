@@ -13,26 +13,26 @@
 
 namespace gsnav::detail {
 
-/// A point in the plane of a face with its distance to the goal, and the window of an edge through which
-/// it sees the face. The window has no width where the point lies in the face.
+/// Point in the plane of a face with its distance to the goal, and the window of an edge through which
+/// it sees the face. The window has no width if the point lies in the face.
 struct FieldSource {
   Flat root, right, left;
   double g = 0;
 
-  /// The last bend of the shortest way from the root through the window to p: the root or an end of the
+  /// Last bend of the shortest path from the root through the window to p: the root or an end of the
   /// window.
   Flat last_bend(const Flat& p) const noexcept {
     const Flat d = p - root;
     const double r = cross(right - root, d), l = cross(left - root, d);
     return r >= 0 && l <= 0 ? root : r < 0 ? right : left;
   }
-  /// Length of that way plus the root's distance.
+  /// Length of that path plus the distance of the root.
   double length_to(const Flat& p) const noexcept {
     const Flat end = last_bend(p);
     const bool bent = end.x != root.x || end.y != root.y;
     return g + (bent ? length(end - root) : 0.0) + length(p - end);
   }
-  /// The lesser of `best` and length_to(p).
+  /// min(best, length_to(p)).
   double least(const Flat& p, double best) const noexcept {
     const Flat d = p - root;
     const double straight = g + length(d);
@@ -44,10 +44,10 @@ struct FieldSource {
   }
 };
 
-/// The grid that cuts a face into cells.
+/// Grid that divides a face into cells.
 struct FieldGrid {
-  /// A face has about kCellsASource cells a source, of at least kLeastSide metres, and at most
-  /// kMostAcross of them in a row.
+  /// About kCellsASource cells per source, at least kLeastSide metres wide, at most kMostAcross along a
+  /// side.
   static constexpr double kCellsASource = 2.0, kLeastSide = 0.2, kMostAcross = 64;
 
   Flat low;
@@ -64,25 +64,24 @@ struct FieldGrid {
   }
 };
 
-/// The cells of a face, each with the sources that can be least in it, in one piece of memory.
+/// Cells of a face, each with the sources that can be nearest in it, in one block of memory.
 ///
-/// In the part of a cell that is in the face, the length of a source's way is convex in its end, so that
-/// it is nowhere below its tangent at a point of that part. A source is left out where this tangent is
-/// at least the lengths of another source at all corners of the part: their difference is convex, so the
-/// same holds in all of the part. With a relative error eps the tangent is multiplied by 1 + eps, and
-/// the result is at most that much above the least. A source is stored as a point where it sees all of
-/// the part, or where all ways to the part bend at the same end of its window.
+/// Consider the part of a cell that lies in the face. The length of a source's path is convex in its end
+/// point, so it is nowhere below its tangent at a point of that part. A source is dropped if this
+/// tangent is at least the length of another source at all corners of the part: their difference is
+/// convex, so the same holds in the whole part. With a relative error eps the tangent is multiplied by 1
+/// + eps, and the result is at most that much above the minimum. A source is stored as a point if it
+/// sees the whole part, or if all paths to the part bend at the same end of its window.
 class FieldCells {
  public:
-  /// Most copies in the cells for each source of the face. Where that is not enough, all cells share all
-  /// sources.
+  /// Largest average number of cells per source. Beyond it, all cells share all sources.
   static constexpr std::size_t kMostCopies = 16;
-  static constexpr std::size_t kMostSources = 0xffff;  ///< of a face
+  static constexpr std::size_t kMostSources = 0xffff;  ///< Largest number of sources of a face.
 
   FieldCells(const UnfoldedMesh& mesh, std::uint32_t face, const FieldGrid& grid,
              std::span<const FieldSource> sources, double relative_error);
 
-  /// Least length to a point of a cell; infinity where there are no sources.
+  /// Smallest length to a point of a cell. Infinity if there are no sources.
   double least(std::size_t cell, const Flat& p) const noexcept {
     const std::uint64_t head = block_[cell];
     const std::uint64_t* at = block_.get() + (head >> 32);
@@ -103,8 +102,8 @@ class FieldCells {
  private:
   static double number(std::uint64_t bits) noexcept { return std::bit_cast<double>(bits); }
 
-  /// A head for each cell: where its numbers begin (32 bits), its points and its windows (16 each). Then
-  /// the numbers of points (at, g) and windows (root, right, left, g).
+  /// First a head per cell: index of its numbers (32 bits), number of points and number of windows (16
+  /// bits each). Then the numbers of points (at, g) and windows (root, right, left, g).
   std::unique_ptr<std::uint64_t[]> block_;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The floor of a storey in each column.
+// Floor of a storey in each column.
 #include <algorithm>
 
 #include "floors.hpp"
@@ -7,9 +7,9 @@
 namespace gsnav::detail::floors {
 namespace {
 
-constexpr double kCoverGap = 0.6;  // metres: holes in a ceiling up to this wide are closed
+constexpr double kCoverGap = 0.6;  // Metres. Holes in a ceiling up to this width are closed.
 
-/// Distance from every cell to the nearest set one, in cells, chessboard metric, up to `limit`.
+/// Chessboard distance of each cell to the nearest set cell, in cells, up to `limit`.
 std::vector<int> distances(const std::vector<std::uint8_t>& set, std::size_t nx, std::size_t nz,
                            int limit) {
   std::vector<int> d(set.size());
@@ -87,7 +87,7 @@ void Floors::mark(std::int32_t id) {
     if (tops[i] != kNoLevel || mask[i] == 0) continue;
     const std::size_t level = at(id, x0 + i % nx, z0 + i / nx);
     if (level == kNone) continue;
-    // No higher and no lower than the floor beside it.
+    // Stay within the heights of the neighbouring floor.
     std::uint16_t low = kNoLevel, high = 0;
     for (std::size_t z = i / nx - min(i / nx, near); z <= min(i / nx + near, nz - 1); ++z) {
       for (std::size_t x = i % nx - min(i % nx, near); x <= min(i % nx + near, nx - 1); ++x) {

@@ -14,59 +14,63 @@
 
 #include "gaussian_floor.hpp"
 
-// The search for floors in its steps: storeys (storeys.cpp), their marks in each column
-// (floor_marks.cpp), the stairs between them (stairs.cpp).
+// Search for floors: storeys (storeys.cpp), the floor of a storey in each column (floor_marks.cpp), and
+// stairs between storeys (stairs.cpp).
 
 namespace gsnav::detail::floors {
 
-inline constexpr double kPatch = 1.0;  // metres: side of the squares that a floor is followed by
-inline constexpr double kApart = 2.0;  // metres between storeys
+inline constexpr double kPatch = 1.0;  // Side of the square patches that a floor consists of, metres.
+inline constexpr double kApart = 2.0;  // Smallest height difference of storeys, metres.
 inline constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 inline constexpr std::uint16_t kNoLevel = std::numeric_limits<std::uint16_t>::max();
-inline constexpr std::int32_t kNotWalkable = -1, kFree = -2;  // labels of runs; storeys from 0
+inline constexpr std::int32_t kNotWalkable = -1, kFree = -2;  // Labels of runs. Storeys are numbered
+                                                              // from 0.
 
-/// Levels free above run k of a column; all where nothing is above.
+/// Free levels above run k of a column. kNone if nothing is above.
 inline std::size_t room_above(std::span<const SolidRun> runs, std::size_t k) noexcept {
   return k + 1 < runs.size() ? std::size_t{runs[k + 1].low} - runs[k].end : kNone;
 }
 
-/// Morphological closing: sets cells that no empty square of `width` cells fits over.
+/// Morphological closing: sets all cells that no empty square of `width` cells covers.
 void close_mask(std::vector<std::uint8_t>& mask, std::size_t nx, std::size_t nz, int width);
 
-/// Where a storey stands in one patch: scans drift by decimetres over a flat and real floors slope.
+/// Height of a storey in one patch. It varies, because scans drift by decimetres over a flat and real
+/// floors slope.
 struct PatchLevel {
   std::int32_t storey = 0;
-  double level = 0;       // at the patch's centre
-  double gx = 0, gz = 0;  // levels a patch
+  double level = 0;       // At the centre of the patch.
+  double gx = 0, gz = 0;  // Slope in levels per patch.
 };
 
-/// A column and the level of the floor in it.
+/// Level of the floor in a column.
 struct Mark {
   std::uint32_t column = 0;
   std::uint16_t top = 0;
   friend auto operator<=>(const Mark&, const Mark&) = default;
 };
 
-/// Ground beside the storeys, connected by the agent's climb.
+/// Connected ground outside the storeys. Neighbouring cells differ by at most the agent's climb height.
 struct Piece {
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> runs;    // column, run
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> beside;  // of the storeys next to it
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> runs;    // Pairs (column, run).
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> beside;  // Pairs (column, run) of adjacent
+                                                                // storeys.
   std::vector<std::int32_t> storeys;
 };
 
 struct Storey {
   std::vector<std::size_t> patches;
-  double level = 0;    // mean of the patches
-  double columns = 0;  // that have room for the agent
-  double covered = 0;  // share of the marks that have something solid above head height
+  double level = 0;    // Mean over the patches.
+  double columns = 0;  // Number of columns with enough free height for the agent.
+  double covered = 0;  // Fraction of the marks with something solid above head height.
   bool kept = false;
-  bool inside = false;  // kept because it is the main one or lies under a ceiling, not for stairs alone
+  bool inside = false;  // Kept because it is the main storey or has a ceiling, not only because stairs
+                        // lead to it.
   std::size_t holes = 0;
   std::vector<Mark> marks;
-  std::vector<std::uint8_t> roofed;  // of each mark
+  std::vector<std::uint8_t> roofed;  // One per mark.
 };
 
-/// The search for the floors of one scene.
+/// Search for the floors of one scene.
 class Floors {
  public:
   Floors(VoxelGrid& g, const FloorSettings& s, const GaussianNavOptions& o, ThreadPool& pool)
@@ -106,8 +110,8 @@ class Floors {
   double least_columns() const noexcept { return 0.05 * static_cast<double>(side_ * side_); }
 
   // ---- storeys.cpp
-  /// The heights at which columns of each patch end with room above, the fullest first, an agent's
-  /// height apart.
+  /// Finds the heights in each patch at which most columns end with free space above. They are at least
+  /// an agent's height apart, and sorted by number of columns.
   void find_peaks();
   const PatchLevel* level_of(std::size_t patch, std::int32_t storey) const noexcept {
     for (const PatchLevel& l : patches_[patch]) {
@@ -119,37 +123,37 @@ class Floors {
     return std::any_of(patches_[patch].begin(), patches_[patch].end(),
                        [&](const PatchLevel& l) { return std::abs(l.level - level) < apart_; });
   }
-  /// Where the floor stands in a patch, `band` levels around the plane that a neighbour expects: the
-  /// mean level around the fullest. None where fewer than a twentieth of the patch's columns end there.
+  /// Fits the floor in a patch: the mean level around the most frequent level within `band` levels of
+  /// the plane that a neighbour predicts. Nothing if fewer than a twentieth of the columns end there.
   std::optional<PatchLevel> fit(std::size_t patch, const PatchLevel& expected, std::size_t band,
                                 double& columns) const;
-  /// A storey from where it stands within `near` levels of the seeds: patches follow their neighbours'
-  /// planes.
+  /// Grows a storey from seeds, which may be off by `near` levels. Each patch follows the planes of its
+  /// neighbours.
   void grow(std::span<const Seed> seeds, std::size_t near);
-  /// Further storeys: from the fullest heights that are as far from every floor beside them as storeys
-  /// are apart.
+  /// Finds further storeys, starting at the most frequent heights that are far enough from every
+  /// adjacent floor.
   void find_storeys();
   bool is_furniture(std::size_t patch, double level) const;
-  /// Level of a storey in a column, interpolated between the patches' centres; kNone away from all of
-  /// its patches.
+  /// Level of a storey in a column, interpolated between centres of patches. kNone away from its
+  /// patches.
   std::size_t at(std::int32_t storey, std::size_t x, std::size_t z) const;
 
   // ---- floor_marks.cpp
-  /// The floor of a storey in each column: the highest run that ends within the band. Pits below the
-  /// floor's own level are noise and are levelled; small gaps get the floor's level (what stands there
-  /// keeps them from being walkable).
+  /// Finds the floor of a storey in each column: the highest run that ends within the band. Pits below
+  /// the level of the floor are noise and are filled. Small gaps get the floor's level; objects that
+  /// stand there keep them from being walkable.
   void mark(std::int32_t id);
-  /// Gives pits below a floor its own level, or the height of most ground within 0.1 m where that is
-  /// lower: a tread of stairs at the floor's edge is no pit.
+  /// Raises pits below a floor to its level, or to the height of most ground within 0.1 m if that is
+  /// lower. The latter keeps treads of stairs at the edge of a floor.
   void raise_pits(std::int32_t id, std::size_t x0, std::size_t z0, std::size_t nx,
                   std::vector<std::uint16_t>& tops);
-  /// Solid voxels above and below the main floor in its columns and those up to a patch beside it (what
-  /// stands on a floor covers it), beyond its band.
+  /// Counts solid voxels above and below the band of the main floor, in its columns and up to one patch
+  /// around them.
   void weigh(GaussianNavReport& report) const;
 
   // ---- stairs.cpp
-  /// Whether the ground around a run of a column goes on, no steeper than the agent walks, in three of
-  /// four directions: stairs do, the side of a bush does not.
+  /// Returns true if the ground around a run continues in at least three of four directions and is no
+  /// steeper than the agent can walk. This holds for stairs, but not for the side of a bush.
   bool goes_on(std::size_t c, std::size_t top) const noexcept;
   template <class F>
   void each_neighbour(std::size_t c, std::uint32_t run, F&& f) const {
@@ -166,15 +170,16 @@ class Floors {
     if (z > 0) visit(c - g_.nx);
     if (z + 1 < g_.nz) visit(c + g_.nx);
   }
-  /// Stairs and ramps: ground beside the floors, connected by the agent's climb, that reaches two of
-  /// them. Keeps the storeys that they lead to.
+  /// Finds stairs and ramps: ground outside the floors, connected by the agent's climb height, that
+  /// reaches two of them. Marks the storeys they lead to as kept.
   std::vector<Mark> find_stairs(GaussianNavReport& report);
-  /// The height of each walkable run without the noise of Gaussians that stand on edge: the median of
-  /// the ground within 0.1 m that two steps can reach. A step of more than the agent's climb stays one.
+  /// Computes the height of each walkable run without the noise of Gaussians that stand on edge: the
+  /// median of the ground within 0.1 m that two steps can reach. Steps above the agent's climb height
+  /// are preserved.
   void find_heights();
-  /// Gives stairs, and the floors within kStairHead of them, the mean height of the ground within
-  /// kRampRadius that a step reaches. That is a ramp without steps, whatever the grid's offset: no step
-  /// is too high for Recast, and erosion widens none. Takes off the voxels that stand out of it.
+  /// Turns stairs into ramps: replaces the height of stairs, and of floors within kStairHead of them, by
+  /// the mean of the ground within kRampRadius that one step reaches. No step is then too high for
+  /// Recast and erosion widens none, whatever the offset of the grid. Removes voxels that stick out.
   void level_ramps(std::span<const Piece> pieces, std::vector<Mark>& out);
   /// Closes small gaps in stairs.
   void fill_stairs(const Piece& p, std::vector<Mark>& out, GaussianNavReport& report);
@@ -188,9 +193,10 @@ class Floors {
   double apart_;
   std::vector<Peak> peaks_;
   std::vector<Storey> storeys_;
-  std::vector<std::int32_t> label_;    // of each run: a storey, kNotWalkable or kFree
-  std::vector<std::uint16_t> height_;  // of each walkable run
-  std::vector<std::uint16_t> ramp_;    // level of each run that is or leads to stairs, or kNoLevel
+  std::vector<std::int32_t> label_;    // One per run: a storey, kNotWalkable or kFree.
+  std::vector<std::uint16_t> height_;  // One per walkable run.
+  std::vector<std::uint16_t> ramp_;    // Level of each run that is part of stairs or leads to them, or
+                                       // kNoLevel.
 };
 
 }  // namespace gsnav::detail::floors

@@ -11,9 +11,9 @@ namespace gsnav::detail {
 namespace floors {
 namespace {
 
-/// The height at which the scene's main floor lies: the lowest at which a good share of the columns that
-/// have room for the agent end. Columns below a ceiling decide where the scene has one: a garden around
-/// a house is not its floor. Thin tops count little: noise under the ground is one too.
+/// Height of the main floor: the lowest at which a considerable fraction of the columns with free space
+/// for the agent end. If the scene has a ceiling, only columns below it count, so that the garden around
+/// a house is not its floor. Thin tops have a low weight, because noise under the ground is thin too.
 std::optional<std::size_t> main_level(const VoxelGrid& g, std::size_t clearance, std::size_t smooth,
                                       double& most_area) {
   std::vector<double> open(g.ny, 0.0), roofed(g.ny, 0.0);
@@ -44,7 +44,7 @@ std::optional<std::size_t> main_level(const VoxelGrid& g, std::size_t clearance,
   if (!(top > 0)) return std::nullopt;
   std::size_t y = 0;
   while (score[y] < 0.4 * top) ++y;
-  // The peak itself: the fullest level within twice the smoothing above.
+  // Move to the peak: the most frequent level within twice the smoothing above.
   std::size_t level = y;
   for (std::size_t k = y; k <= min(y + 2 * smooth, g.ny - 1); ++k)
     level = raw[k] > raw[level] ? k : level;
@@ -58,7 +58,7 @@ FloorTops Floors::find(GaussianNavReport& report, double& most_area) {
       max<std::size_t>(1, static_cast<std::size_t>(std::floor(0.08 / g_.level + 1e-6)));
   const auto level = main_level(g_, s_.clearance, smooth, most_area);
   if (!level || most_area < max(o_.min_island_area, g_.cell * g_.cell)) return {};
-  // A floor's voxel holds its surface near the middle.
+  // The surface lies near the middle of a floor's voxel.
   report.floor_y = g_.low.y + (static_cast<double>(*level) + 0.5) * g_.level;
   find_peaks();
   std::vector<Seed> seeds;
@@ -94,7 +94,7 @@ FloorTops Floors::find(GaussianNavReport& report, double& most_area) {
         m.top = ramp_[r];
         stairs = true;
       }
-      // What lies under the open sky beside a house is outside; a flight below an open storey is not.
+      // Ground without a ceiling next to a building is outside. Stairs below an open storey are not.
       if (o_.drop_uncovered && indoors && s.inside && s.roofed[i] == 0 && !stairs) {
         report.dropped_uncovered += g_.cell * g_.cell;
         continue;

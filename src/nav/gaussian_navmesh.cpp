@@ -52,7 +52,7 @@ Status validate(const GaussianNavOptions& o) {
   return {};
 }
 
-/// Drops pieces of the floor that are smaller than `min_area`.
+/// Drops pieces of floor below `min_area`, m².
 struct Pruner {
   double min_area;
   GaussianNavReport& report;
@@ -91,10 +91,10 @@ struct Pruner {
   }
 };
 
-/// The box of the NavMesh: the voxels' grid, enlarged by whole cells where triangles reach beyond it.
+/// Box of the NavMesh: the voxel grid, enlarged by whole cells to contain the triangles.
 struct Extent {
   Vec3d low, high;
-  int x = 0, y = 0, z = 0;  ///< cells below the grid's first ones
+  int x = 0, y = 0, z = 0;  ///< Number of cells before the first cells of the grid.
 
   explicit Extent(const VoxelGrid& g)
       : low(g.low),
@@ -108,7 +108,7 @@ struct Extent {
                   below(g.low.z, triangles.low.z, g.cell)};
     low = g.low - Vec3d{n.x * g.cell, n.y * g.level, n.z * g.cell};
     for (int k = 0; k < 3; ++k) high[k] = max(high[k], triangles.high[k] + (k == 1 ? g.level : g.cell));
-    constexpr double kMost = 65000;  // a larger grid is refused later
+    constexpr double kMost = 65000;  // A larger grid is an error later.
     x = static_cast<int>(min(n.x, kMost));
     y = static_cast<int>(min(n.y, kMost));
     z = static_cast<int>(min(n.z, kMost));
@@ -121,7 +121,7 @@ struct Piece {
   bool floor;
 };
 
-/// The solid runs and floors of a column, lowest first.
+/// Solid runs and floors of a column, lowest first.
 void read_column(const VoxelGrid& g, const detail::FloorTops& floors, std::size_t column,
                  std::vector<Piece>& out) {
   out.clear();
@@ -132,7 +132,7 @@ void read_column(const VoxelGrid& g, const detail::FloorTops& floors, std::size_
   std::sort(out.begin(), out.end(), [](const Piece& a, const Piece& b) { return a.low < b.low; });
 }
 
-/// Adds the solid runs and floors of the grid to a field whose first column is (x0, z0) of the extent.
+/// Adds solid runs and floors of the grid to a heightfield. Its first column is (x0, z0) of the extent.
 Status add_spans(detail::RecastLog& log, const VoxelGrid& g, const detail::FloorTops& floors, int climb,
                  const Extent& o, int x0, int z0, rcHeightfield& field) {
   std::vector<Piece> pieces;
@@ -161,8 +161,9 @@ Status add_spans(detail::RecastLog& log, const VoxelGrid& g, const detail::Floor
   return {};
 }
 
-constexpr std::size_t kOneTile = std::size_t{1} << 22;  // most columns that are built as one tile
-constexpr int kTileCells = 512;                         // side of a tile above that
+constexpr std::size_t kOneTile = std::size_t{1} << 22;  // Largest number of columns that are built as
+                                                        // one tile.
+constexpr int kTileCells = 512;                         // Side of a tile above that.
 
 detail::FloorSettings floor_settings(const NavMeshSettings& settings, const GaussianNavOptions& options,
                                      const VoxelGrid& g) {
@@ -182,8 +183,8 @@ Status no_floor(const NavMeshSettings& settings, const GaussianNavOptions& optio
               " solid voxels"};
 }
 
-/// Refuses a ground that is seen from below: things stand on the ground, and under it there is only
-/// noise.
+/// Returns an error if the ground is seen from below. Objects stand on the ground; under it there should
+/// only be noise.
 Status check_upright(const GaussianNavReport& report, std::size_t floors) {
   constexpr double kHanging = 4;
   if (report.ceiling_share > 0.5 || report.solid_below * 20 <= floors ||
@@ -197,7 +198,7 @@ Status check_upright(const GaussianNavReport& report, std::size_t floors) {
               "GaussianNavOptions.refuse_underside"};
 }
 
-/// What a NavMesh is built from.
+/// Input of a NavMesh.
 struct NavGround {
   const NavMeshSettings& settings;
   const GaussianNavOptions& options;
@@ -206,9 +207,9 @@ struct NavGround {
   std::span<const Vec3d> vertices;
   std::span<const NavMesh::Triangle> triangles;
   Extent extent;
-  std::function<double(const Vec3d&)> height;  ///< of the triangles; empty without any
+  std::function<double(const Vec3d&)> height;  ///< Height of the triangles. Empty if there are none.
 
-  /// Tops of voxels stand half a voxel above the surface in them.
+  /// Origin of the heightfield. The tops of voxels are half a voxel above the surface in them.
   Vec3d origin() const { return extent.low - Vec3d{0, 0.5 * grid.level, 0}; }
 
   Status add_to(detail::RecastLog& log, int x0, int z0, rcHeightfield& field) const {

@@ -11,7 +11,8 @@
 namespace gsnav::detail {
 namespace {
 
-/// Clears connected sets (26 neighbours) of fewer than `least` voxels. Returns how many were cleared.
+/// Removes groups of connected voxels (26 neighbours) with fewer than `least` voxels. Returns the number
+/// of voxels removed.
 std::size_t remove_floaters(VoxelGrid& g, std::size_t least) {
   std::vector<std::uint32_t> parent(g.runs.size());
   for (std::uint32_t i = 0; i < parent.size(); ++i) parent[i] = i;
@@ -19,7 +20,8 @@ std::size_t remove_floaters(VoxelGrid& g, std::size_t least) {
     while (parent[i] != i) i = parent[i] = parent[parent[i]];
     return i;
   };
-  const auto join = [&](std::size_t a, std::size_t b) {  // runs of two neighbouring columns that touch
+  const auto join = [&](std::size_t a, std::size_t b) {  // Joins the touching runs of two neighbouring
+                                                         // columns.
     std::uint32_t i = g.first[a], j = g.first[b];
     while (i < g.first[a + 1] && j < g.first[b + 1]) {
       if (g.runs[i].low <= g.runs[j].end && g.runs[j].low <= g.runs[i].end) {
@@ -65,7 +67,7 @@ std::size_t remove_floaters(VoxelGrid& g, std::size_t least) {
   return removed;
 }
 
-/// A length as people write it: 0.05, not 0.050000.
+/// Formats a length without trailing zeros: 0.05 instead of 0.050000.
 std::string metres(double v) {
   std::string s = std::to_string(v);
   s.erase(s.find_last_not_of('0') + 1);
@@ -73,7 +75,7 @@ std::string metres(double v) {
   return s;
 }
 
-/// What to do where the grid is `times` as large as it may be.
+/// Error message for a grid that is `times` too large. It suggests a cell size.
 Status too_large(const VoxelGrid& g, const char* field, std::size_t limit, double times,
                  double dimensions) {
   const double cell = g.cell * std::pow(times, 1.0 / dimensions);
@@ -102,7 +104,7 @@ Result<VoxelGrid> voxelise(const NavMeshSettings& settings, std::span<const Gaus
   VoxelGrid g;
   g.cell = settings.cell_size;
   g.level = settings.cell_height;
-  // A column of air around, so that Recast's edge filters have something to look at.
+  // One column of air around the scene, which Recast's edge filters need.
   const Vec3d margin{2 * g.cell, 2 * g.level, 2 * g.cell};
   box = {box.low - margin, box.high + margin};
   g.low = box.low;
@@ -110,7 +112,7 @@ Result<VoxelGrid> voxelise(const NavMeshSettings& settings, std::span<const Gaus
   const Vec3d size = box.high - box.low;
   const double nx = std::ceil(size.x / g.cell), ny = std::ceil(size.y / g.level),
                nz = std::ceil(size.z / g.cell);
-  constexpr double kLargest = 1e15;  // more cannot be counted
+  constexpr double kLargest = 1e15;  // Larger numbers cannot be counted.
   if (nx < kLargest && ny < kLargest && nz < kLargest) {
     g.nx = static_cast<std::size_t>(nx);
     g.ny = static_cast<std::size_t>(ny);

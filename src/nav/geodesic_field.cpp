@@ -24,8 +24,9 @@ struct GeodesicField::Impl {
       delete faces[f].cells.load(std::memory_order_relaxed);
   }
 
-  /// Made by who first asks; where two do so at once, both make the same and one is kept. Null without
-  /// memory, and for a face of more sources than cells can count.
+  /// Creates the cells of a face at its first lookup. If several threads do so at once, they make the
+  /// same cells and one copy is kept. Returns null if memory is exhausted or the face has more sources
+  /// than cells can count.
   const FieldCells* make_cells(std::uint32_t face) const noexcept {
     const std::span<const FieldSource> own = sources_of(face);
     if (own.size() > FieldCells::kMostSources) return nullptr;
@@ -47,7 +48,7 @@ struct GeodesicField::Impl {
   const NavMesh::Impl* mesh = nullptr;
   std::shared_ptr<const detail::UnfoldedMesh> unfolded;
   double relative_error = 0;
-  std::vector<std::uint32_t> first;  ///< of each face in `sources`, and one past the last
+  std::vector<std::uint32_t> first;  ///< Begin of each face in `sources`, and one past the last.
   std::vector<FieldSource> sources;
   struct Face {
     FieldGrid grid;
@@ -95,7 +96,7 @@ Result<GeodesicField> GeodesicField::make(const NavMesh& mesh, std::span<const V
     for (std::uint32_t k = 0; k < m.faces[f].count; ++k) {
       const auto& e = m.edges[m.faces[f].first + k];
       const double d = search.vertex_distance(e.vertex);
-      // Through a vertex that no path bends at windows lead beside it.
+      // Near a vertex at which no path bends, windows cover the paths.
       const bool needed = m.vertices[e.vertex].turning || d <= 0 || by_face[f].empty();
       if (needed && d < std::numeric_limits<double>::infinity())
         by_face[f].push_back({e.at, e.at, e.at, d});

@@ -6,15 +6,15 @@
 namespace gsnav::detail {
 namespace {
 
-constexpr double kHeightError = 0.01;  // metres that a path's points may leave the surface by
-constexpr double kSame = 1e-9;         // metres
+constexpr double kHeightError = 0.01;  // Largest distance of a path from the surface, metres.
+constexpr double kSame = 1e-9;         // Metres.
 
 struct PathPoint {
   Vec3d position{};
   bool corner = false;
 };
 
-/// Where the straight line from target to root crosses the window, as a share of its edge's length.
+/// Position where the line from target to root crosses the window, as a fraction of its edge.
 double crossing(const GeodesicSearch::Node& n, const Flat& a, const Flat& b,
                 const Flat& target) noexcept {
   const Flat e = n.left - n.right, d = n.root - target;
@@ -24,7 +24,8 @@ double crossing(const GeodesicSearch::Node& n, const Flat& a, const Flat& b,
   return clamp(dot(at - a, whole) / dot(whole, whole), 0.0, 1.0);
 }
 
-/// Appends what of [first, last] a straight line misses, last included (Douglas-Peucker).
+/// Appends the points of (first, last] that a straight line misses, including the last
+/// (Douglas-Peucker).
 void simplify(const std::vector<PathPoint>& p, std::size_t first, std::size_t last,
               std::vector<Vec3d>& out) {
   std::size_t worst = first;
@@ -68,7 +69,7 @@ std::vector<Vec3d> GeodesicSearch::path() const {
     }
     const UnfoldedMesh::Edge &end = mesh_->edges[mesh_->next(n.edge)], &twin = mesh_->edges[e.twin];
     const double t = crossing(n, e.at, end.at, target);
-    // A path through a vertex may have been found as the edge of a window before the vertex itself.
+    // A path through a vertex may have been found as the end of a window before the vertex itself.
     const double side = length(end.at - e.at);
     const bool at_turn = (t * side < kSame && mesh_->vertices[e.vertex].turning) ||
                          ((1 - t) * side < kSame && mesh_->vertices[end.vertex].turning);

@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kRounding = 1e-9;  // metres, square metres or radians
-constexpr double kPoint = 1e-11;    // metres: windows below this are points
+constexpr double kRounding = 1e-9;  // Metres, m² or radians.
+constexpr double kPoint = 1e-11;    // Metres. Narrower windows are points.
 
 Flat turned(const Flat& d, double angle) noexcept {
   const double c = std::cos(angle), s = std::sin(angle);
@@ -97,7 +97,8 @@ void GeodesicSearch::flood(const UnfoldedMesh& mesh, const std::vector<Site>& st
 }
 
 void GeodesicSearch::settle() {
-  // What no mesh of Recast needs: bent or folded polygons of a file could keep windows alive for ever.
+  // Bounds the search for bent or folded polygons of a file, whose windows might never end. Meshes built
+  // by Recast do not need it.
   const std::size_t most = 100000 + 1000 * mesh_->edges.size();
   while (!heap_.empty() && nodes_.size() < most) {
     const auto [f, node] = heap_.front();
@@ -132,7 +133,7 @@ void GeodesicSearch::leave(const Site& start) {
   for (std::uint32_t k = 0; k < face.count; ++k) {
     const UnfoldedMesh::Edge& e = mesh_->edges[face.first + k];
     if (length(e.at - start.at) > kRounding) continue;
-    // On a vertex: a window on an edge next to it would turn around it for ever.
+    // The start lies on a vertex. A window on an adjacent edge would turn around it forever.
     const UnfoldedMesh::Vertex& v = mesh_->vertices[e.vertex];
     seen_[e.vertex] = round_;
     distance_[e.vertex] = 0;
@@ -181,7 +182,7 @@ void GeodesicSearch::open(std::uint32_t edge, const Flat& root, const Flat& righ
     open_straight(edge, root, right, left, parent);
     return;
   }
-  // A way along the edge from one of its ends may be shorter for all of the window.
+  // A path along the edge from one of its ends may be shorter for the whole window.
   const double dr = vertex_distance(here.vertex), dl = vertex_distance(there.vertex);
   if (dr < kInfinity && dr + length(left - here.at) + kRounding < g + length(left - root)) return;
   if (dl < kInfinity &&
@@ -211,7 +212,7 @@ void GeodesicSearch::open(std::uint32_t edge, const Flat& root, const Flat& righ
     offer_goal(f, static_cast<std::uint32_t>(nodes_.size() - 1));
     return;
   }
-  // In space: along the edge and off its line, from the right end of the window.
+  // Goal in 3D relative to the right end of the window: distance along the edge and from its line.
   const Vec3d &a = here.corner, &b = mesh_->edges[mesh_->next(edge)].corner;
   const Vec3d e{b.x - a.x, b.y - a.y, b.z - a.z},
       to{goal_.position.x - a.x, goal_.position.y - a.y, goal_.position.z - a.z};
@@ -243,9 +244,9 @@ void GeodesicSearch::spread(std::uint32_t face, std::uint32_t first, std::uint32
     if (k + 1 < first + count && right_q >= -kRounding && left_q <= kRounding)
       reach(after, root, g, parent);
     if (left_p >= 0 && k != first) break;
-    // From a root on the edge that it enters by, or at a corner in line with its neighbours, the cone is
-    // half a turn wide: the end of the last edge lies on the line of its right side, or by rounding
-    // beyond.
+    // If the root lies on the edge through which the cone enters, or at a corner in line with its
+    // neighbours, the cone is half a turn wide. The end of the last edge then lies on its right side, or
+    // beyond it by rounding.
     if (right_q > 0 || (wide && right_p > 0 && k + 1 == first + count)) {
       const Flat r = right_p >= 0 ? p : p + (q - p) * (right_p / (right_p - right_q));
       const Flat l = left_q <= 0 ? q : p + (q - p) * (left_p / (left_p - left_q));
@@ -261,7 +262,8 @@ void GeodesicSearch::spread_window(std::uint32_t node) {
   const Node n = nodes_[node];
   const std::uint32_t face = mesh_->edges[n.edge].face;
   const UnfoldedMesh::Face& f = mesh_->faces[face];
-  // Seen from outside the face its edge runs from left to right, and the other edges from right to left.
+  // Seen from outside, the edge of the window runs from left to right, and the other edges from right to
+  // left.
   spread(face, n.edge - f.first + 1, f.count - 1, n.root, {n.right - n.root, n.left - n.root}, n.g,
          node);
 }
@@ -269,12 +271,12 @@ void GeodesicSearch::spread_window(std::uint32_t node) {
 void GeodesicSearch::spread_vertex(std::uint32_t node) {
   const Node n = nodes_[node];
   const UnfoldedMesh::Edge& e = mesh_->edges[n.edge];
-  if (n.g > distance_[e.vertex]) return;  // a shorter way was found
+  if (n.g > distance_[e.vertex]) return;  // A shorter path was found.
   const UnfoldedMesh::Vertex& v = mesh_->vertices[e.vertex];
   const Flat along = mesh_->edges[mesh_->next(n.edge)].at - e.at, back = n.root - e.at;
   const double in = e.angle + std::atan2(cross(along, back), dot(along, back));
-  // A path is straight or bends around the vertex: half a turn or more of surface on both sides of it,
-  // or a wall.
+  // A path is straight or bends around the vertex: on both sides of it there is at least half a turn of
+  // surface, or a wall.
   if (every_vertex_) {
     leave_vertex(e.vertex, n.g, node, 0, v.total);
   } else if (v.closed) {
@@ -288,7 +290,7 @@ void GeodesicSearch::spread_vertex(std::uint32_t node) {
 void GeodesicSearch::leave_vertex(std::uint32_t vertex, double g, std::uint32_t parent, double low,
                                   double high) {
   const UnfoldedMesh::Vertex& v = mesh_->vertices[vertex];
-  // Of a closed fan the range may go past its seam.
+  // For a closed fan, the range may extend past its seam.
   for (const double seam : {-v.total, 0.0, v.total}) {
     if (seam != 0.0 && !v.closed) continue;
     for (std::uint32_t i = 0; i < v.count; ++i) {

@@ -11,7 +11,7 @@
 
 namespace gsnav::detail {
 
-/// A point on the unfolded surface.
+/// Point on the unfolded surface.
 struct Site {
   std::uint32_t face = 0;
   Flat at;
@@ -20,32 +20,34 @@ struct Site {
 
 class LandmarkLead;
 
-/// What is known of distances to the goal.
+/// Lower bounds of distances to the goal.
 class GoalBound {
  public:
-  /// No way from the vertex to the goal is shorter; 0 where nothing is known.
+  /// Lower bound of the distance from a vertex to the goal. 0 if nothing is known.
   virtual double from(std::uint32_t vertex) const noexcept = 0;
 
  protected:
   ~GoalBound() = default;
 };
 
-/// Exact shortest paths on an UnfoldedMesh: windows (stretches of edges with the point that sees all of
-/// them) spread from face to face, best first. On a level mesh this is Polyanya (Cui, Harabor and
-/// Grastien 2017); over slopes the point is unfolded with the faces and windows that a known vertex
-/// distance beats are dropped, as in improved Chen-Han (Xin and Wang 2009). Paths bend at vertices with
-/// more than a half plane of surface at a wall, or more than a full turn inside.
+/// Exact shortest paths on an UnfoldedMesh.
 ///
-/// Holds the memory of its last search and is used again; not for two threads at a time.
+/// Windows (parts of edges, each with a root that sees all of it) spread from face to face, best first.
+/// On a level mesh this is Polyanya (Cui, Harabor and Grastien 2017). Over slopes the root is unfolded
+/// with the faces, and windows that cannot beat a known vertex distance are dropped, as in improved
+/// Chen-Han (Xin and Wang 2009). Paths bend at vertices with more than half a turn of surface at a wall,
+/// or more than a full turn in the interior.
+///
+/// Keeps its memory for the next search. Not thread-safe.
 class GeodesicSearch {
  public:
   static constexpr std::uint32_t kNone = UnfoldedMesh::kNone;
 
-  /// A window on `edge` (of the face it opens into), or the event that vertex of `edge` is reached.
+  /// A window on `edge` of the face it opens into, or the event that the vertex of `edge` is reached.
   struct Node {
-    Flat root;         ///< what sees the window, in the face's plane
-    Flat right, left;  ///< ends of the window
-    double g = 0;      ///< distance of the root; of the vertex itself in an event
+    Flat root;         ///< Point that sees the window, in the plane of the face.
+    Flat right, left;  ///< Ends of the window.
+    double g = 0;      ///< Distance of the root. For an event, distance of the vertex.
     std::uint32_t edge = 0;
     std::uint32_t parent = kNone;
     bool is_vertex = false;
@@ -53,39 +55,42 @@ class GeodesicSearch {
 
   static constexpr double kFar = std::numeric_limits<double>::infinity();
 
-  /// Distance between two sites, infinity where the search cannot reach the goal within less than
-  /// `bound`.
+  /// Distance between two sites. Infinity if the goal cannot be reached in less than `bound`.
   double run(const UnfoldedMesh& mesh, const Site& start, const Site& goal, double bound = kFar);
-  /// The same led by landmarks. What is not proven shorter than (1 + `slack`) times as long as the best
-  /// is searched; the rest leaves `least()`, which no way is shorter than.
+  /// Distance between two sites, guided by landmarks. Paths that cannot be shorter than the best one by
+  /// more than a factor of 1 + `slack` are skipped. Afterwards least() is a lower bound of the distance.
   double run_led(const UnfoldedMesh& mesh, const Site& start, const Site& goal, const LandmarkLead& lead,
                  double bound = kFar, double slack = 0);
   double least() const noexcept {
     return min(best_ / (1 + slack_), heap_.empty() ? kFar : heap_.front().first);
   }
-  /// The same over paths that do not bend; what `views` rules out is not looked at.
+  /// Distance along paths that do not bend.
+  /// @param least Lower bounds of distances to the goal, or null.
+  /// @param views Visibility of faces, or null.
   double run_straight(const UnfoldedMesh& mesh, const Site& start, const Site& goal, double bound = kFar,
                       const GoalBound* least = nullptr, const FaceViews* views = nullptr);
-  /// Corners of the last run's path from start to goal; between them points where the surface leaves the
-  /// straight line by more than a centimetre.
+  /// Corners of the last path from start to goal. Points are added where the surface leaves the straight
+  /// line by more than 1 cm.
   std::vector<Vec3d> path() const;
-  /// Spreads over everything that can be reached from `starts`.
+  /// Computes distances from `starts` to everything that can be reached.
   void flood(const UnfoldedMesh& mesh, const std::vector<Site>& starts);
-  /// Spreads straight ways from a vertex: nodes() are the windows, and turning vertices as they were
-  /// reached. Returns how many of them come first in whose directions a path that bends there may leave.
+  /// Spreads straight paths from a vertex. nodes() then holds the windows and the turning vertices in
+  /// the order reached. Returns how many of the first nodes lie in directions in which a path that bends
+  /// at the vertex may leave.
   std::size_t look_around(const UnfoldedMesh& mesh, std::uint32_t vertex);
 
   const std::vector<Node>& nodes() const noexcept { return nodes_; }
-  /// Whether the last flood spread everywhere: surfaces that no floor has are left unfinished.
+  /// True if the last flood() reached everything. Bent surfaces, which no floor has, may remain
+  /// unfinished.
   bool finished() const noexcept { return heap_.empty(); }
-  /// Distance of a vertex as far as the last search knows it; infinity where it was not seen.
+  /// Distance of a vertex found by the last search. Infinity if it was not reached.
   double vertex_distance(std::uint32_t vertex) const noexcept {
     return seen_[vertex] == round_ ? distance_[vertex] : std::numeric_limits<double>::infinity();
   }
 
  private:
   struct Cone {
-    Flat right, left;  ///< directions of its sides
+    Flat right, left;  ///< Directions of the sides.
   };
 
   void begin(const UnfoldedMesh& mesh, double bound = kFar);
@@ -93,12 +98,13 @@ class GeodesicSearch {
   void leave_vertex(std::uint32_t vertex, double g, std::uint32_t parent, double low, double high);
   void spread_window(std::uint32_t node);
   void spread_vertex(std::uint32_t node);
-  /// Windows that the cone from `root` opens through edges first, first + 1, ... of the face.
+  /// Opens windows for the cone from `root` through `count` edges of the face, starting with edge
+  /// `first`.
   void spread(std::uint32_t face, std::uint32_t first, std::uint32_t count, const Flat& root,
               const Cone& cone, double g, std::uint32_t parent);
   void open(std::uint32_t edge, const Flat& root, const Flat& right, const Flat& left, double g,
             std::uint32_t parent);
-  /// The same for the straight way to a goal.
+  /// Opens a window for paths without bends.
   void open_straight(std::uint32_t edge, const Flat& root, Flat right, Flat left, std::uint32_t parent);
   void reach(std::uint32_t edge, const Flat& root, double g, std::uint32_t parent);
   void offer_goal(double length, std::uint32_t node);
@@ -108,13 +114,13 @@ class GeodesicSearch {
   const UnfoldedMesh* mesh_ = nullptr;
   Site start_, goal_;
   bool has_goal_ = false;
-  bool every_vertex_ = false;  ///< bend at every vertex: where rounding hid the way
-  bool straight_ = false;      ///< bend nowhere
-  bool found_ = false;         ///< the goal
+  bool every_vertex_ = false;  ///< Bend at every vertex, used when rounding hid the path.
+  bool straight_ = false;      ///< Do not bend.
+  bool found_ = false;         ///< The goal was found.
   const GoalBound* least_ = nullptr;
   const FaceViews* views_ = nullptr;
   const LandmarkLead* lead_ = nullptr;
-  double slack_ = 0;  ///< ways that are not shorter than best_ / (1 + slack_) are left out
+  double slack_ = 0;  ///< Paths that are not shorter than best_ / (1 + slack_) are skipped.
   double best_ = 0;
   std::uint32_t best_node_ = kNone;
   std::vector<Node> nodes_;
@@ -124,12 +130,13 @@ class GeodesicSearch {
   std::uint64_t round_ = 0;
 };
 
-/// Shortest way from the window's root through it to a point at `along` the edge from its right end and
-/// `beyond` it (its mirror image where it lies on this side): a lower bound wherever that point is.
+/// Length of the shortest path from the window's root through it to a point. The point is at `along` the
+/// edge from the right end of the window and `beyond` its line; a point on the root's side is mirrored.
+/// A lower bound for any such point in 3D.
 double length_through(const Flat& root, const Flat& right, const Flat& left, double along,
                       double beyond) noexcept;
 
-/// A search to use until the thread's next one.
+/// Search object of this thread.
 GeodesicSearch& thread_search();
 
 }  // namespace gsnav::detail

@@ -3,14 +3,14 @@
 
 #include "geodesic_search.hpp"
 
-// Paths that do not bend: from a site to a goal, and from a vertex all around.
+// Paths without bends: from a site to a goal, and from a vertex in all directions.
 
 namespace gsnav::detail {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kRounding = 1e-9;  // radians
+constexpr double kRounding = 1e-9;  // Radians.
 
 }  // namespace
 
@@ -25,7 +25,7 @@ double GeodesicSearch::run_straight(const UnfoldedMesh& mesh, const Site& start,
   least_ = least;
   views_ = views != nullptr && !views->empty() ? views : nullptr;
   leave(start);
-  // There are few, so that their order saves nothing.
+  // There are few windows, so sorting them would not save time.
   constexpr std::size_t kMost = 1 << 14;
   while (!heap_.empty() && nodes_.size() < kMost) {
     const std::uint32_t node = heap_.back().second;
@@ -50,7 +50,7 @@ std::size_t GeodesicSearch::look_around(const UnfoldedMesh& mesh, std::uint32_t 
     settle();
     return nodes_.size();
   }
-  // Half a turn or more away from another way between the walls.
+  // Directions that are at least half a turn from another path between the walls.
   leave_vertex(vertex, 0.0, kNone, 0.0, v.total - kPi + kRounding);
   leave_vertex(vertex, 0.0, kNone, kPi - kRounding, v.total);
   settle();
@@ -78,8 +78,9 @@ void GeodesicSearch::open_straight(std::uint32_t edge, const Flat& root, Flat ri
     if (l < left_was) left = here.at + side * l;
   }
   const double to_right = length(right - root), to_left = length(left - root);
-  // Where there are many: moving off a corner, what is left may shrink by as much, the way there grows
-  // by less, so that the far end is the least.
+  // Worthwhile only for many windows. When the crossing point moves away from a corner, the remaining
+  // distance may decrease by that amount and the distance to the root increases by less. The minimum is
+  // therefore at the far end.
   constexpr std::size_t kMany = 24;
   if (least_ != nullptr && nodes_.size() > kMany) {
     if (to_left + least_->from(here.vertex) - length(left - here.at) >= best_ ||
@@ -104,7 +105,7 @@ void GeodesicSearch::open_straight(std::uint32_t edge, const Flat& root, Flat ri
     offer_goal(f, static_cast<std::uint32_t>(nodes_.size() - 1));
     return;
   }
-  // From the middle of the window no end is farther than half of it.
+  // An end of the window is at most half its width from its middle.
   const Flat side = after.at - here.at;
   const double at = dot((left + right) * 0.5 - here.at, side) / dot(side, side);
   const Vec3d &a = here.corner, &b = after.corner;

@@ -9,13 +9,14 @@
 
 namespace gsnav::detail {
 
-/// Twice the area of a triangle on the ground plane, positive where its corners run counter-clockwise in
+/// Twice the area of a triangle on the ground plane. Positive if its corners are counter-clockwise in
 /// (x, z).
 inline double area_xz(const Vec3d& a, const Vec3d& b, const Vec3d& c) noexcept {
   return (b.x - a.x) * (c.z - a.z) - (c.x - a.x) * (b.z - a.z);
 }
 
-/// Share of the edge a b that p lies at on the ground plane, and how far off it, metres.
+/// Position of the point of edge a b nearest to p on the ground plane, as a fraction of the edge, and
+/// its distance from p in metres.
 inline std::pair<double, double> along_xz(const Vec3d& a, const Vec3d& b, const Vec3d& p) noexcept {
   const double ex = b.x - a.x, ez = b.z - a.z, len2 = ex * ex + ez * ez;
   const double t = len2 > 0 ? clamp(((p.x - a.x) * ex + (p.z - a.z) * ez) / len2, 0.0, 1.0) : 0.0;

@@ -9,7 +9,7 @@
 
 namespace gsnav::detail {
 
-/// A vector on the ground plane.
+/// Vector on the ground plane.
 struct Ground {
   double x = 0, z = 0;
 };
@@ -21,16 +21,16 @@ inline double det(const Ground& a, const Ground& b) noexcept { return a.x * b.z 
 inline double length(const Ground& a) noexcept { return std::sqrt(dot(a, a)); }
 inline Ground left_of(const Ground& a) noexcept { return {-a.z, a.x}; }
 
-/// Where dot(normal, v) >= offset, less the slack that `soft` ones are given.
+/// Half plane dot(normal, v) >= offset. For soft ones the offset is reduced by the slack.
 struct HalfPlane {
-  Ground normal;  ///< unit
+  Ground normal;  ///< Unit vector.
   double offset = 0;
   bool soft = false;
 };
 
-/// The point of the disc of radius `limit` that lies in all half planes and is nearest to `wanted`; none
-/// where they leave nothing. One after the other: a half plane that the point so far misses has the new
-/// one on its line.
+/// Point nearest to `wanted` in the disc of radius `limit` and all half planes. Nothing if they have no
+/// common point. Half planes are added one by one: if the point violates a new one, the new point lies
+/// on its line.
 inline std::optional<Ground> nearest_in(std::span<const HalfPlane> planes, const Ground& wanted,
                                         double limit, double slack = 0.0) noexcept {
   constexpr double kRounding = 1e-12;

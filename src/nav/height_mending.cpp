@@ -13,14 +13,14 @@
 namespace gsnav::detail {
 namespace {
 
-constexpr double kBeside = 1e-2;  // metres: how far off its edge a polygon's height sample may lie
-constexpr double kOnLine = 1e-4;  // metres: corners that a straight side has besides its ends
-constexpr double kSliver = 1e-8;  // square metres
+constexpr double kBeside = 1e-2;  // Largest distance of a height sample from its edge, metres.
+constexpr double kOnLine = 1e-4;  // Metres. Corners that lie on a straight side between its ends.
+constexpr double kSliver = 1e-8;  // m².
 constexpr std::uint32_t kNew = ~0u;
 
 using Triangle = PolyMesh::Corners;
 
-/// The places on the ground that triangles have corners at: in order, each once.
+/// Distinct ground positions of the corners of triangles, sorted.
 class Places {
  public:
   Places(std::span<const Vec3d> points, std::span<const Triangle> triangles) : points_(points) {
@@ -44,14 +44,14 @@ class Places {
     return p.x < q.x || (!(q.x < p.x) && p.z < q.z);
   }
   std::span<const Vec3d> points_;
-  std::vector<std::uint32_t> first_;  ///< a point of each place
+  std::vector<std::uint32_t> first_;  ///< One point for each position.
 };
 
-/// True where triangles of `points` cover the polygon once: each side of one is another's or lies on the
-/// polygon's.
+/// Returns true if the triangles cover the polygon exactly once: each side is shared with another
+/// triangle or lies on the polygon's boundary.
 bool cover_once(std::span<const Vec3d> corners, std::span<const Vec3d> points,
                 std::span<const Triangle> triangles) {
-  using Side = std::pair<std::uint16_t, std::uint16_t>;  // a polygon has at most 255 triangles
+  using Side = std::pair<std::uint16_t, std::uint16_t>;  // A polygon has at most 255 triangles.
   double covered = 0, whole = 0;
   for (std::size_t k = 1; k + 1 < corners.size(); ++k)
     whole += area_xz(corners[0], corners[k], corners[k + 1]);
@@ -83,10 +83,10 @@ bool cover_once(std::span<const Vec3d> corners, std::span<const Vec3d> points,
   return true;
 }
 
-/// Triangles over points that are put in one by one (Lawson's flips), counter-clockwise in (x, z).
+/// Incremental Delaunay triangulation (Lawson's flips), counter-clockwise in (x, z).
 class Delaunay {
  public:
-  /// Of a convex polygon without corners within its sides.
+  /// Starts with a convex polygon without corners on its sides.
   explicit Delaunay(std::vector<Vec3d> corners) : points_(std::move(corners)) {
     for (std::uint32_t k = 1; k + 1 < points_.size(); ++k) triangles_.push_back({0, k, k + 1});
     for (std::size_t t = 0; t < triangles_.size(); ++t) settle({side(t, 0), side(t, 1), side(t, 2)});
@@ -97,7 +97,7 @@ class Delaunay {
     }
     const auto n = static_cast<std::uint32_t>(points_.size());
     points_.push_back(p);
-    // On a side of the polygon, or in a triangle.
+    // Find the boundary side or the triangle that contains p.
     std::size_t best = 0, edge = 3;
     double near = kBeside, most = -1e300;
     for (std::size_t t = 0; t < triangles_.size(); ++t) {
@@ -133,13 +133,13 @@ class Delaunay {
 
  private:
   static constexpr std::size_t kNone = ~std::size_t{0};
-  using Side = std::pair<std::uint16_t, std::uint16_t>;  // triangle, edge
+  using Side = std::pair<std::uint16_t, std::uint16_t>;  // Triangle and edge.
 
   static Side side(std::size_t triangle, std::size_t edge) noexcept {
     return {static_cast<std::uint16_t>(triangle), static_cast<std::uint16_t>(edge)};
   }
   const Vec3d& at(std::size_t t, std::size_t e) const noexcept { return points_[triangles_[t][e % 3]]; }
-  /// The triangle across edge e, and its edge; kNone at the rim.
+  /// Triangle across edge e and the number of its edge. kNone at the boundary.
   std::pair<std::size_t, std::size_t> opposite(std::size_t t, std::size_t e) const noexcept {
     const std::uint32_t a = triangles_[t][e], b = triangles_[t][(e + 1) % 3];
     for (std::size_t u = 0; u < triangles_.size(); ++u) {
@@ -149,7 +149,7 @@ class Delaunay {
     }
     return {kNone, 0};
   }
-  /// Whether d lies in the circle of a, b and c.
+  /// Returns true if d lies in the circumcircle of a, b and c.
   static bool in_circle(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d) noexcept {
     const double ax = a.x - d.x, az = a.z - d.z, bx = b.x - d.x, bz = b.z - d.z, cx = c.x - d.x,
                  cz = c.z - d.z;
@@ -157,9 +157,10 @@ class Delaunay {
     const double det = ax * (bz * cc - cz * bb) - az * (bx * cc - cx * bb) + aa * (bx * cz - cx * bz);
     return det > 1e-9 * max(aa, max(bb, cc)) * max(aa, max(bb, cc));
   }
-  /// Flips these edges where that is Delaunay's, and those that it may have made wrong.
+  /// Flips these edges if they violate the Delaunay condition, and then the edges that a flip affects.
   void settle(std::vector<Side> edges) {
-    // Each flip is towards Delaunay's; rounding could turn in circles.
+    // Every flip improves the triangulation, but rounding could cause an endless loop. Limit their
+    // number.
     for (std::size_t left = 8 * triangles_.size() + 16; !edges.empty() && left > 0; --left) {
       const auto [t, e] = edges.back();
       edges.pop_back();
@@ -184,8 +185,8 @@ class Delaunay {
   std::vector<Triangle> triangles_;
 };
 
-/// New triangles of a polygon, empty where they would not do. Corners that no height triangle had get
-/// their places in `added`, which will follow the mesh's points.
+/// New triangles of a polygon. Empty if they do not fit. Corners without a point in the mesh are
+/// appended to `added`, which will follow the mesh's points.
 std::vector<Triangle> triangulated(const PolyMesh& mesh, const PolyMesh::Poly& poly,
                                    std::vector<Vec3d>& added) {
   const std::span<const Vec3d> corners = std::span(mesh.corners).subspan(poly.first, poly.count);
@@ -201,12 +202,12 @@ std::vector<Triangle> triangulated(const PolyMesh& mesh, const PolyMesh::Poly& p
   Delaunay fresh(strict);
   for (const Vec3d& p : rest) fresh.add(p);
   const std::size_t own = fresh.points().size();
-  std::vector<std::uint32_t> names, inner;  // of fresh's points from `own`
+  std::vector<std::uint32_t> names, inner;  // Names of the new triangulation's points, from index `own`.
   const auto add = [&](std::uint32_t point) {
     fresh.add(mesh.points[point]);
     if (own + names.size() < fresh.points().size()) names.push_back(point);
   };
-  // Those on the polygon's sides first: a neighbour has the same.
+  // Add samples on the polygon's sides first, because a neighbour has the same ones.
   for (const Triangle& t : old) {
     for (const std::uint32_t point : t) {
       const Vec3d& p = mesh.points[point];
@@ -254,16 +255,16 @@ std::vector<Triangle> triangulated(const PolyMesh& mesh, const PolyMesh::Poly& p
 }  // namespace
 
 void mend_heights(PolyMesh& mesh) {
-  std::vector<std::pair<std::size_t, std::vector<Triangle>>> mended;  // polygons and what they get
+  std::vector<std::pair<std::size_t, std::vector<Triangle>>> mended;  // Polygons and their new
+                                                                      // triangles.
   std::vector<Vec3d> added;
   std::size_t count = mesh.tris.size();
   for (std::size_t id = 0; id < mesh.polys.size(); ++id) {
     const PolyMesh::Poly& p = mesh.polys[id];
     const std::span<const Vec3d> corners = std::span(mesh.corners).subspan(p.first, p.count);
     const std::span<const Triangle> old = std::span(mesh.tris).subspan(p.tri_first, p.tri_count);
-    // A fan of two triangles or less over the corners alone has nothing to mend. One of more triangles
-    // than that has samples on a side, which a sliver may leave without effect: a triangle of three
-    // corners and a sample has two.
+    // A fan of at most two triangles over the corners needs no mending. A fan with more triangles has
+    // samples on a side, and these may be lost in a sliver.
     if ((old.size() < 3 && old.size() + 2 <= corners.size()) || cover_once(corners, mesh.points, old))
       continue;
     std::vector<Triangle> made = triangulated(mesh, p, added);

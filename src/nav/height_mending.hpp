@@ -5,9 +5,10 @@
 
 namespace gsnav::detail {
 
-/// Triangulates anew, by Delaunay's rule, the height triangles of polygons that they overlap in or leave
-/// holes in: Recast makes such where samples lie on one circle. What has no triangulation of its own
-/// vertices stays. Before neighbours' borders are closed and PolyMesh::finish().
+/// Replaces height triangles that overlap or leave holes by a Delaunay triangulation of the same
+/// vertices. Recast produces such triangles when samples lie on one circle. Polygons whose vertices
+/// cannot be triangulated are not changed. Call before the borders of neighbours are closed and before
+/// PolyMesh::finish().
 void mend_heights(PolyMesh& mesh);
 
 }  // namespace gsnav::detail

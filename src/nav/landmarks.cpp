@@ -9,7 +9,7 @@ namespace gsnav::detail {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kRounding = 1e-9;  // metres
+constexpr double kRounding = 1e-9;  // Metres.
 constexpr std::uint32_t kParts = Landmarks::kParts;
 
 float rounded_up(double x) noexcept {
@@ -17,21 +17,22 @@ float rounded_up(double x) noexcept {
   return static_cast<double>(f) >= x ? f : std::nextafter(f, std::numeric_limits<float>::infinity());
 }
 
-/// Stretch of an edge that is reached straight from a root, in metres along the edge.
+/// Part of an edge that is reached in a straight line from a root, in metres along the edge.
 struct Reach {
   double low = 0, high = 0;
-  double at = 0, beside = 0, g = 0;  ///< the root's place and own distance
+  double at = 0, beside = 0, g = 0;  ///< Position of the root along the edge and its distance from the
+                                     ///< line, and the root's own distance.
   double length_to(double x) const noexcept {
     return g + std::sqrt((x - at) * (x - at) + beside * beside);
   }
 };
 
-/// What is known of a landmark's distances along one edge.
+/// Distances from a landmark along one edge.
 struct AlongEdge {
   const Reach* first = nullptr;
   const Reach* last = nullptr;
   double length = 0;
-  double from_low = kInfinity, from_high = kInfinity;  ///< of its ends
+  double from_low = kInfinity, from_high = kInfinity;  ///< Distances of its ends.
 
   double distance(double x) const noexcept {
     double d = min(from_low + x, from_high + length - x);
@@ -42,7 +43,7 @@ struct AlongEdge {
   }
 };
 
-/// How far the distance can be below the line from (low, a) to (high, b).
+/// Largest amount by which the distance is below the line from (low, a) to (high, b).
 double most_below(const AlongEdge& e, double low, double high, double a, double b) noexcept {
   const double slope = (b - a) / (high - low), rest = 1.0 - slope * slope;
   double most = 0;
@@ -56,7 +57,7 @@ double most_below(const AlongEdge& e, double low, double high, double a, double 
   return most;
 }
 
-/// How far it can be above. `ends` is scratch.
+/// Largest amount by which the distance is above the line. `ends` is scratch.
 double most_above(const AlongEdge& e, double low, double high, double a, double b,
                   std::vector<double>& ends) {
   constexpr std::size_t kTaken = 6;
@@ -71,7 +72,8 @@ double most_above(const AlongEdge& e, double low, double high, double a, double 
   double most = 0;
   for (std::size_t i = 0; i + 1 < ends.size(); ++i) {
     const double x = ends[i], y = ends[i + 1];
-    // Over the line at both ends of [x, y]: a convex function is below its chord. Of many the least.
+    // Values above the line at both ends of [x, y]. A convex function is below its chord. Keep the
+    // lowest few.
     std::array<std::pair<double, double>, kTaken> over;
     std::size_t m = 0;
     const double line_x = a + slope * (x - low), line_y = a + slope * (y - low);
@@ -88,7 +90,7 @@ double most_above(const AlongEdge& e, double low, double high, double a, double 
     for (const Reach* r = e.first; r != e.last; ++r) {
       if (r->low <= x + kRounding && r->high >= y - kRounding) take(r->length_to(x), r->length_to(y));
     }
-    // The least of all chords is greatest where two of them cross, or at an end.
+    // The minimum of all chords is largest where two of them cross or at an end.
     double least = kInfinity;
     for (std::size_t j = 0; j < m; ++j) {
       for (std::size_t k = 0; k <= j; ++k) {
@@ -107,10 +109,10 @@ double most_above(const AlongEdge& e, double low, double high, double a, double 
   return most;
 }
 
-/// Places spread evenly over the mesh: three of four along its walls, the others in the middle of faces.
+/// Positions spread evenly over the mesh: three quarters along walls, the others in the middle of faces.
 std::vector<Site> spread_evenly(const UnfoldedMesh& mesh, std::size_t count) {
   std::vector<Site> out;
-  std::vector<std::pair<double, std::uint32_t>> walls, inside;  // sums of length and area
+  std::vector<std::pair<double, std::uint32_t>> walls, inside;  // Cumulative length and area.
   double length_so_far = 0, area = 0;
   for (std::uint32_t f = 0; f < mesh.faces.size(); ++f) {
     const UnfoldedMesh::Face& face = mesh.faces[f];
@@ -161,7 +163,7 @@ Landmarks::Landmarks(const UnfoldedMesh& mesh, std::size_t most) {
   for (const Site& at : spread_evenly(mesh, most)) {
     if (add(mesh, at, search)) ++count_;
   }
-  // What is read together lies together.
+  // Order by vertex, because values of one vertex are read together.
   const std::size_t n = mesh.vertices.size();
   std::vector<float> by_vertex(count_ * n);
   for (std::size_t k = 0; k < count_; ++k) {

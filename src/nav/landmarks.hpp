@@ -11,8 +11,8 @@
 
 namespace gsnav::detail {
 
-/// The least of |x - root| + constant + slope x for x in [low, high] of a line that the root is `beside`
-/// the point `at` of.
+/// Minimum of |x - root| + constant + slope x over x in [low, high] on a line. The root is at distance
+/// `beside` from the point `at` of the line.
 inline double least_sum(double at, double beside, double low, double high, double constant,
                         double slope) noexcept {
   double x = slope > 0 ? low : high;
@@ -21,17 +21,20 @@ inline double least_sum(double at, double beside, double low, double high, doubl
   return std::sqrt((x - at) * (x - at) + beside * beside) + constant + slope * x;
 }
 
-/// Distances from points of the mesh (landmarks) to all of its edges, to lead a search by the triangle
-/// inequality: d(x, goal) >= |d(L, x) - d(L, goal)|. On an edge a distance is kept at kParts + 1 points,
-/// and how far it can be below and above the straight lines between them.
+/// Distances from some points of the mesh (landmarks) to all its edges. They guide searches by the
+/// triangle inequality: d(x, goal) >= |d(L, x) - d(L, goal)|.
 ///
-/// Below: on a window the distance is a branch of a hyperbola, which is farthest below a line where its
-/// slope is the line's; along the edge from one of its ends it is nowhere below the line. Above: the
-/// difference to the line is convex between the ends of windows, so that it is greatest at one of them.
+/// For an edge, a distance is stored at kParts + 1 points, together with how far it can be below and
+/// above the straight lines between them.
+///
+/// Below: within a window the distance is a branch of a hyperbola, which is farthest below a line where
+/// its slope equals that of the line. Along the edge from one of its ends, the distance is nowhere below
+/// the line. Above: the difference to the line is convex between the ends of windows, so its maximum is
+/// at one of them.
 class Landmarks {
  public:
   static constexpr std::uint32_t kParts = 4;
-  /// No more landmarks, and no more memory, than that.
+  /// Largest number of landmarks, and largest memory in bytes.
   static const std::size_t kMost, kMostBytes;
 
   Landmarks() = default;
@@ -40,10 +43,10 @@ class Landmarks {
   bool empty() const noexcept { return count_ == 0; }
   std::size_t size() const noexcept { return count_; }
 
-  /// What is kept of an edge and a landmark, metres.
+  /// Distances from one landmark along one edge, metres.
   struct Line {
-    std::array<float, kParts + 1> at;  ///< from the edge's first corner on
-    float below = 0, above = 0;        ///< how far the distance may be below and above the lines
+    std::array<float, kParts + 1> at;  ///< From the first corner of the edge on.
+    float below = 0, above = 0;        ///< How far the distance may be below and above the lines.
   };
 
  private:
@@ -51,28 +54,30 @@ class Landmarks {
   struct Range {
     double low = 0, high = 0;
   };
-  /// Of the distance between a landmark and a site in a face that it is not in.
+  /// Bounds of the distance between a landmark and a site, which must not lie in the same face.
   Range distance(const UnfoldedMesh& mesh, std::size_t landmark, const Site& to) const noexcept;
   bool add(const UnfoldedMesh& mesh, const Site& at, GeodesicSearch& search);
 
   std::size_t count_ = 0, edges_ = 0;
-  std::vector<std::uint32_t> line_of_;  ///< of each edge, twice; odd where it is read from its far end
-  std::vector<Line> lines_;             ///< of each landmark, all edges
-  std::vector<float> corners_;          ///< of each vertex, all landmarks: about
-  std::vector<std::uint32_t> faces_;    ///< of each landmark
+  std::vector<std::uint32_t> line_of_;  ///< Twice the index of each edge's line, plus 1 if it is read
+                                        ///< from its far end.
+  std::vector<Line> lines_;             ///< For each landmark, all edges.
+  std::vector<float> corners_;          ///< For each vertex, the approximate distances of all landmarks.
+  std::vector<std::uint32_t> faces_;    ///< Face of each landmark.
 };
 
-/// A question's landmarks: what no way from a point of an edge to the goal is shorter than.
+/// Landmarks selected for one query. They bound the length of paths from a point of an edge to the goal.
 class LandmarkLead {
  public:
   LandmarkLead(const Landmarks& marks, const UnfoldedMesh& mesh, const Site& start, const Site& goal);
-  /// No way between start and goal is shorter.
+  /// Lower bound of the distance between start and goal.
   double least() const noexcept { return least_; }
-  /// From point k of kParts + 1 of an edge to the goal.
+  /// Lower bound of the distance from point k of an edge (0 to kParts) to the goal.
   double from(std::uint32_t edge, std::uint32_t k) const noexcept;
-  /// The same without the errors of what is kept: what to go by, not a bound.
+  /// Estimate of that distance without the stored error. Not a bound.
   double toward(std::uint32_t edge, std::uint32_t k) const noexcept;
-  /// From a root, `beside` the point `at` of the edge, through [low, high] of it to the goal.
+  /// Lower bound of a path from a root through [low, high] of the edge to the goal. The root is at
+  /// distance `beside` from the point `at` of the edge.
   double through(std::uint32_t edge, double length, double at, double beside, double low,
                  double high) const noexcept;
 
@@ -88,8 +93,8 @@ class LandmarkLead {
   double least_ = 0;
 };
 
-/// The length of a way between two sites over faces that `lead` points along, straightened within them;
-/// infinity where none is found.
+/// Length of a path between two sites over faces that `lead` suggests, straightened within them.
+/// Infinity if none is found.
 double corridor_length(const UnfoldedMesh& mesh, const LandmarkLead& lead, const Site& start,
                        const Site& goal);
 

@@ -18,8 +18,10 @@ using detail::Disc;
 using detail::Ground;
 using detail::HalfPlane;
 
-/// The tangent of the velocity obstacle nearest to the preferred velocity: `to` leads from the agent to
-/// a disc of radius `reach` (both radii and the margin), which moves at `velocity`.
+/// Half plane of allowed velocities: the tangent of the velocity obstacle nearest to `preferred`.
+/// @param to Vector from the agent to the centre of the disc.
+/// @param reach Sum of both radii and the margin.
+/// @param velocity Velocity of the disc.
 HalfPlane avoid(const Ground& to, double reach, const Ground& velocity, const Ground& preferred,
                 const LocalPlannerOptions& o) noexcept {
   const double distance = detail::length(to);
@@ -28,7 +30,8 @@ HalfPlane avoid(const Ground& to, double reach, const Ground& velocity, const Gr
     return HalfPlane{n, relative + dot(n, velocity), true};
   };
   if (distance <= reach) return plane(towards * -1.0, (reach - distance) / o.escape_time);
-  // The obstacle is a cone cut off by the disc of what is met at the horizon: its round end, or a side.
+  // The obstacle is a cone, cut off by the disc of velocities that meet at the horizon. The nearest
+  // boundary is its round end or a side.
   const Ground from_end = preferred - velocity - to * (1 / o.horizon);
   const double off = detail::length(from_end);
   if (dot(from_end, to) < -reach * off) {
@@ -41,8 +44,8 @@ HalfPlane avoid(const Ground& to, double reach, const Ground& velocity, const Gr
   return plane(detail::left_of(leg) * side, 0);
 }
 
-/// Tries velocities all around: what comes of each is walked on the mesh and swept against the bodies as
-/// they are expected to move.
+/// Evaluates candidate velocities. Each is walked on the mesh and swept against the predicted motion of
+/// the bodies.
 class VelocitySearch {
  public:
   VelocitySearch(const NavMesh& mesh, const AgentState& agent, const NavPoint& here,
@@ -55,8 +58,8 @@ class VelocitySearch {
         people_(bodies, agent, o.max_speed, o.horizon),
         react_(min(max(people_.tick(), kReaction), o.horizon)) {}
 
-  /// The best velocity, `candidate` being one of those tried, and after how many seconds it meets
-  /// somebody.
+  /// Returns the best velocity, with `candidate` among those tried, and the time in seconds until its
+  /// first contact.
   std::pair<Ground, double> best(const Ground& candidate) const {
     std::vector<std::pair<double, Ground>> tries;
     const auto add = [&](const Ground& v) { tries.emplace_back(off(v), v); };
@@ -84,9 +87,10 @@ class VelocitySearch {
 
  private:
   static constexpr int kDirections = 24, kWaysOut = 12;
-  static constexpr double kReaction = 0.25;  // seconds before the agent may do otherwise, at least
-  static constexpr double kTight = 0.005;    // metres kept where the margin cannot be
-  static constexpr double kSoonest = 0.1;    // seconds: sooner costs no more
+  static constexpr double kReaction = 0.25;  // Smallest time before the agent can change its velocity,
+                                             // seconds.
+  static constexpr double kTight = 0.005;    // Distance to keep where the margin cannot be kept, metres.
+  static constexpr double kSoonest = 0.1;    // Seconds. Earlier contacts do not cost more.
   static constexpr double kOutWeight = 2.0, kInTick = 1000.0, kNever = 1e30;
 
   static Ground around(double ahead, int k, int count, double speed) noexcept {
@@ -106,8 +110,8 @@ class VelocitySearch {
     return people_.first_contact(walk, agent_.radius + margin, agent_.height, from, o_.horizon - from);
   }
 
-  /// What a velocity costs beside its difference, and after how many seconds somebody is met; costs of
-  /// `enough` or more need not be exact.
+  /// Returns the cost of a velocity without that of its difference from the preferred one, and the time
+  /// of its first contact. Costs of `enough` or more may be inexact.
   std::pair<double, double> price(const Ground& v, double enough) const {
     if (people_.size() == 0) return {0, o_.horizon};
     const SurfaceWalk way = walk(here_, v, o_.horizon);
@@ -120,7 +124,8 @@ class VelocitySearch {
     if (cost >= enough) return {cost, wide};
     return {cost + kOutWeight * urgency(touched < react_ ? touched : latest(v)), wide};
   }
-  /// When somebody is met at the latest after `react_` seconds at v, whichever way the agent then goes.
+  /// Latest possible time of contact, if the agent moves at v for `react_` seconds and then in the best
+  /// direction.
   double latest(const Ground& v) const {
     const SurfaceWalk first = walk(here_, v, react_);
     const NavPoint there{first.points.back().position, first.points.back().poly};
@@ -176,7 +181,8 @@ PlannedVelocity plan_velocity(const NavMesh& mesh, const AgentState& agent, cons
   }
   auto v = detail::nearest_in(planes, wanted, o.max_speed);
   if (!v) {
-    // The least slack that lets something through, by halving; all of it lets everything.
+    // Find the smallest slack with a solution by bisection. With the largest slack, every velocity is
+    // allowed.
     double low = 0, high = o.max_speed;
     for (const HalfPlane& h : planes) {
       if (h.soft) high = max(high, h.offset + o.max_speed);

@@ -46,7 +46,7 @@ Result<NavMesh> NavMesh::build(const NavMeshSettings& settings, std::span<const 
   }
   auto checked = detail::check_triangles(vertices, triangles);
   if (!checked.ok()) return checked.status();
-  // Recast computes in float: its zero goes near the mesh, on whole metres.
+  // Recast computes in float. Place its origin near the mesh, on whole metres.
   const Vec3d middle = (checked->low + checked->high) * 0.5;
   const Vec3d origin{std::floor(middle.x), std::floor(middle.y), std::floor(middle.z)};
   const Aabb<double> box{checked->low - origin, checked->high - origin};

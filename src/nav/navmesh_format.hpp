@@ -8,12 +8,14 @@
 
 namespace gsnav::detail {
 
-// Sizes and offsets of Habitat's `.navmesh`: little endian, a set header, tiles with a header each.
-inline constexpr double kMaxCoordinate = 1e6;  ///< metres: float32 has centimetres no more
+// Sizes and offsets of Habitat's `.navmesh` format: little endian, a header for the set, then tiles with
+// a header each.
+inline constexpr double kMaxCoordinate = 1e6;  ///< Metres. Beyond this, float32 cannot resolve
+                                               ///< centimetres.
 inline constexpr std::int32_t kSetMagic = 'M' << 24 | 'S' << 16 | 'E' << 8 | 'T';
-inline constexpr std::size_t kSetHeader = 40;    ///< magic, version, tile count, dtNavMeshParams
-inline constexpr std::size_t kSetSettings = 56;  ///< from version 2: 13 floats and 4 flags
-inline constexpr std::size_t kTileHeader = 100;  ///< dtMeshHeader
+inline constexpr std::size_t kSetHeader = 40;    ///< Magic number, version, tile count, dtNavMeshParams.
+inline constexpr std::size_t kSetSettings = 56;  ///< From version 2 on: 13 floats and 4 flags.
+inline constexpr std::size_t kTileHeader = 100;  ///< dtMeshHeader.
 inline constexpr std::size_t kPoly = 32, kPolyDetail = 12, kBvNode = 16, kOffMesh = 36, kLink = 12;
 
 }  // namespace gsnav::detail

@@ -25,7 +25,8 @@ struct DetourDeleter {
 };
 using NavMeshPtr = std::unique_ptr<dtNavMesh, DetourDeleter>;
 
-/// A NavMesh of the tiles that Detour holds; `height` moves its vertices to the true floor.
+/// Makes a NavMesh from the tiles that Detour holds. `height` moves vertices to the height of the true
+/// floor.
 NavMesh assemble_navmesh(const NavMeshSettings& settings, const Vec3d& origin, NavMeshPtr mesh,
                          const std::function<double(const Vec3d&)>& height = {});
 
@@ -33,11 +34,11 @@ NavMesh assemble_navmesh(const NavMeshSettings& settings, const Vec3d& origin, N
 
 struct NavMesh::Impl {
   NavMeshSettings settings;
-  Vec3d origin{};  ///< world position of the mesh's own zero
+  Vec3d origin{};  ///< World position of the mesh's origin.
   detail::NavMeshPtr mesh;
   detail::PolyMesh polys;
-  /// Made when first asked for, so that a file takes no more memory than its queries need; shared with
-  /// geodesic fields.
+  /// Unfolded surface. Created at its first use, to keep memory low for files whose queries do not need
+  /// it. Shared with geodesic fields.
   const detail::UnfoldedMesh& unfolded() const {
     const detail::UnfoldedMesh* made = unfolded_mesh.load(std::memory_order_acquire);
     return made != nullptr ? *made : *share_unfolded();
@@ -52,7 +53,7 @@ struct NavMesh::Impl {
   mutable std::once_flag unfolded_once;
   mutable std::shared_ptr<const detail::UnfoldedMesh> made_unfolded;
   mutable std::atomic<const detail::UnfoldedMesh*> unfolded_mesh{nullptr};
-  /// Made when first asked for: who never asks for a distance pays nothing.
+  /// Shortest distances between corners. Created at the first distance query.
   const detail::CornerHubs& hubs() const {
     const detail::CornerHubs* made = corner_hubs.load(std::memory_order_acquire);
     return made != nullptr ? *made : make_hubs();
@@ -69,27 +70,27 @@ struct NavMesh::Impl {
     });
     return *made_hubs;
   }
-  /// Made with the hubs.
+  /// Visibility of faces. Created together with the hubs.
   const detail::FaceViews& views() const noexcept { return made_views; }
-  /// Made in place of the hubs where there are too many corners or sights for them.
+  /// Landmarks. Created in place of the hubs if there are too many corners or lines of sight.
   const detail::Landmarks& landmarks() const noexcept { return made_landmarks; }
   mutable std::once_flag hubs_once;
   mutable std::unique_ptr<const detail::CornerHubs> made_hubs;
   mutable std::atomic<const detail::CornerHubs*> corner_hubs{nullptr};
   mutable detail::FaceViews made_views;
   mutable detail::Landmarks made_landmarks;
-  Aabb<double> bounds;                     ///< world
-  std::vector<dtPolyRef> refs;             ///< Detour's name of each polygon
-  std::vector<PolyId> first_poly;          ///< of each of Detour's tiles
-  std::vector<std::uint32_t> first_point;  ///< the same, of `polys.points`
+  Aabb<double> bounds;                     ///< World coordinates.
+  std::vector<dtPolyRef> refs;             ///< Detour's reference of each polygon.
+  std::vector<PolyId> first_poly;          ///< First polygon of each Detour tile.
+  std::vector<std::uint32_t> first_point;  ///< First element of `polys.points` for each Detour tile.
 
   detail::Site site(const NavPoint& p) const noexcept;
-  /// Length of the shortest path; infinity where there is none.
+  /// Length of the shortest path. Infinity if there is none.
   double distance(const detail::Site& start, const detail::Site& goal) const;
-  /// The same to an error.
+  /// Length of the shortest path with a relative error.
   BoundedDistance distance(const detail::Site& start, const detail::Site& goal,
                            double relative_error) const;
-  /// The shortest path, relative to the mesh's origin; no points where there is none.
+  /// The shortest path, relative to the mesh's origin. It has no points if there is no path.
   NavPath path(const detail::Site& start, const detail::Site& goal) const;
 
   dtPolyRef ref_of(PolyId id) const noexcept { return refs[id]; }

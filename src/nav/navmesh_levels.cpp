@@ -8,9 +8,9 @@
 namespace gsnav {
 namespace {
 
-constexpr double kLevel = 0.984807753012208;  // cosine of 10 degrees
-constexpr double kLeastArea = 1e-6;           // square metres: below it is rounding
-constexpr double kLeastGap = 1e-6;            // metres: what a mean of heights is rounded by
+constexpr double kLevel = 0.984807753012208;  // Cosine of 10 degrees.
+constexpr double kLeastArea = 1e-6;           // m². Smaller areas are rounding errors.
+constexpr double kLeastGap = 1e-6;            // Metres. Rounding error of a mean height.
 
 struct Piece {
   double height = 0, area = 0;
@@ -31,7 +31,7 @@ std::vector<NavLevel> find_levels(const NavMesh& mesh, const LevelOptions& optio
             [](const Piece& a, const Piece& b) { return a.height < b.height; });
   std::vector<NavLevel> levels;
   for (;;) {
-    // The window of two bands that holds the most area.
+    // Window of twice `band` with the largest area.
     NavLevel best;
     double area = 0, moment = 0;
     for (std::size_t low = 0, high = 0; low < pieces.size(); ++low) {

@@ -9,9 +9,10 @@ namespace gsnav {
 namespace {
 
 constexpr double kMaxCells = 0x1p28;
-constexpr double kWhole = 1e-6;  // cells: a span this much short of a whole number of them is one
+constexpr double kWhole = 1e-6;  // Cells. A length that is this much short of a whole number of cells
+                                 // counts as whole.
 
-/// Part of the line z = const that lies in a polygon; none where low > high.
+/// Part of the line z = const inside a polygon. Empty if low > high.
 struct Reach {
   double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
 };
@@ -21,7 +22,7 @@ Reach reach_at(const detail::PolyMesh& m, const detail::PolyMesh::Poly& poly, do
   for (std::uint32_t k = 0; k < poly.count; ++k) {
     const Vec3d &a = m.corner(poly, k), &b = m.corner(poly, k + 1);
     const double ex = b.x - a.x, ez = b.z - a.z;
-    // Inside is ex (z - a.z) - (x - a.x) ez >= 0.
+    // A point is inside if ex (z - a.z) - (x - a.x) ez >= 0.
     if (ez > 0) {
       r.high = min(r.high, a.x + ex * (z - a.z) / ez);
     } else if (ez < 0) {
@@ -68,7 +69,7 @@ Result<TopDownMap> NavMesh::top_down_map(double height, double metres_per_cell, 
   map.islands.assign(map.columns * map.rows, -1);
   if (corners) {
     map.at = 0;
-    constexpr double kBeside = 0.01, kFarthest = 1e9;  // metres
+    constexpr double kBeside = 0.01, kFarthest = 1e9;  // Metres.
     for (std::size_t r = 0; r < map.rows; ++r) {
       for (std::size_t c = 0; c < map.columns; ++c) {
         const Vec3d p{box.low.x + static_cast<double>(c) * metres_per_cell, height,
@@ -80,12 +81,13 @@ Result<TopDownMap> NavMesh::top_down_map(double height, double metres_per_cell, 
     }
     return map;
   }
-  std::vector<double> off(map.islands.size(), max_height_delta);  // of the surface shown, from `height`
+  std::vector<double> off(map.islands.size(), max_height_delta);  // Distance from `height` to the
+                                                                  // surface that a cell shows.
 
   const detail::PolyMesh& m = impl_->polys;
   const Vec3d low = map.low - impl_->origin;
   const double level = height - impl_->origin.y;
-  // The first cell whose centre is at or beyond `v`.
+  // First cell whose centre is at or beyond `v`.
   const auto cell_from = [&](double v, double n) {
     return static_cast<std::size_t>(clamp(std::ceil(v / metres_per_cell - 0.5), 0.0, n));
   };

@@ -8,8 +8,8 @@ namespace gsnav {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kSame = 1e-9;  // metres
-constexpr double kLeg = 1e-6;   // metres: what rounding may add to a leg
+constexpr double kSame = 1e-9;  // Metres.
+constexpr double kLeg = 1e-6;   // Metres: rounding error of a leg.
 
 std::string text(const Vec3d& p) {
   char buffer[96];
@@ -33,8 +33,8 @@ detail::Site NavMesh::Impl::site(const NavPoint& p) const noexcept {
   local.y = polys.height(p.poly, local);
   face = m.face_at(p.poly, local);
   const detail::Flat at = m.flat(m.faces[face], local);
-  // What lies outside its face, be it by a micrometre, sees the edge there from behind and would not
-  // pass it.
+  // A point outside its face, even by a micrometre, would see an edge from behind and could not cross
+  // it.
   const bool whole = polys.polys[p.poly].planar && m.first_face[p.poly + 1] - m.first_face[p.poly] == 1;
   return {face, whole ? at : m.clamped(face, at), local};
 }
@@ -61,7 +61,7 @@ BoundedDistance NavMesh::Impl::distance(const detail::Site& start, const detail:
     const double d = distance(start, goal);
     return {d, d};
   }
-  // Between two bounds that are 2 e apart their middle is off by e.
+  // The middle of two bounds that are 2 e apart has an error of at most e.
   const double slack = 2 * relative_error;
   const detail::LandmarkLead lead(landmarks(), unfolded(), start, goal);
   double least = lead.least(), most = detail::corridor_length(unfolded(), lead, start, goal);
@@ -98,7 +98,7 @@ NavPath NavMesh::Impl::path(const detail::Site& start, const detail::Site& goal)
   }
   if (!(way.length < kInfinity)) return searched();
   path.length = way.length;
-  // Leg by leg; its length is known.
+  // Search leg by leg. The length of each leg is known.
   detail::Site at = start;
   for (const detail::CornerHubs::Leg& leg : hubs().legs(way, goal)) {
     if (!(search.run(unfolded(), at, leg.end, leg.length + kLeg) < kInfinity)) return searched();

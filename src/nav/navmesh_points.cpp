@@ -11,14 +11,14 @@ namespace {
 using detail::PolyMesh;
 
 constexpr int kMaxTries = 10000;
-constexpr std::size_t kMaxCorners = 8;  // a triangle cut by four lines has at most seven
+constexpr std::size_t kMaxCorners = 8;  // A triangle cut by four lines has at most seven corners.
 
-/// A triangle's part within a square on the ground plane.
+/// Part of a triangle inside a square on the ground plane.
 struct Clipped {
   std::array<Vec3d, kMaxCorners> p{};
   std::size_t count = 0;
 
-  /// Keeps where sign * (coordinate - at) <= 0.
+  /// Keeps the part where sign * (coordinate - at) <= 0.
   void cut(int axis, double at, double sign) {
     std::array<Vec3d, kMaxCorners> out{};
     std::size_t n = 0;
@@ -33,8 +33,7 @@ struct Clipped {
   }
 };
 
-/// Polygons in the order they were reached, each once. Belongs to a thread, so that it is not allocated
-/// anew.
+/// Distinct polygons in the order they were reached. One per thread, to avoid allocations.
 struct Reached {
   std::vector<PolyId> queue;
   std::vector<std::uint64_t> round_of;
@@ -52,9 +51,9 @@ struct Reached {
   }
 };
 
-/// Calls f(distance, a, b, nearest point) for the edges of the mesh within `radius` of c, relative to
-/// the mesh's origin; f may make the radius less. The straight way to an edge crosses edges that are
-/// nearer than it: no others are crossed.
+/// Calls f(distance, a, b, nearest point) for the boundary edges within `radius` of c, relative to the
+/// mesh's origin. f may reduce the radius. The straight line to a boundary edge only crosses edges that
+/// are nearer, so only those need to be crossed.
 template <class F>
 void each_wall(const PolyMesh& m, PolyId start, const Vec3d& c, double& radius, F&& f) {
   thread_local Reached reached;
@@ -79,7 +78,7 @@ void each_wall(const PolyMesh& m, PolyId start, const Vec3d& c, double& radius, 
   }
 }
 
-/// Into the mesh: corners run counter-clockwise in (x, z).
+/// Normal of an edge into the mesh. Corners are counter-clockwise in (x, z).
 Vec3d inward(const Vec3d& a, const Vec3d& b) noexcept {
   const double ex = b.x - a.x, ez = b.z - a.z, inverse = 1 / std::sqrt(ex * ex + ez * ez);
   return {-ez * inverse, 0, ex * inverse};
@@ -87,8 +86,7 @@ Vec3d inward(const Vec3d& a, const Vec3d& b) noexcept {
 
 std::optional<ObstacleHit> closest_wall(const NavMesh::Impl& impl, const NavPoint& start,
                                         double max_radius) {
-  constexpr double kSame =
-      1e-9;  // metres: where edges meet they are as near as one another but for rounding
+  constexpr double kSame = 1e-9;  // Metres. Edges that meet have the same distance except for rounding.
   std::optional<ObstacleHit> hit;
   const Vec3d c = start.position - impl.origin;
   double radius = max_radius, faces = 0;
@@ -98,8 +96,7 @@ std::optional<ObstacleHit> closest_wall(const NavMesh::Impl& impl, const NavPoin
               const double facing = dot(c - nearest, normal);
               if (hit && d > hit->distance - kSame) {
                 hit->distance = min(d, hit->distance);
-                if (facing <= faces)
-                  return;  // the edge that turns more towards the point stands for the corner
+                if (facing <= faces) return;  // At a corner, choose the edge that faces the point more.
               } else {
                 hit.emplace().distance = d;
                 radius = min(max_radius, d + kSame);
@@ -169,7 +166,7 @@ std::vector<ObstacleHit> NavMesh::obstacles_near(const NavPoint& p, double radiu
   const Vec3d c = p.position - impl_->origin;
   each_wall(impl_->polys, p.poly, c, radius,
             [&](double d, const Vec3d& a, const Vec3d& b, const Vec3d& nearest) {
-              constexpr double kTouching = 1e-9;  // metres
+              constexpr double kTouching = 1e-9;  // Metres.
               const Vec3d way{c.x - nearest.x, 0, c.z - nearest.z};
               out.push_back({d, nearest + impl_->origin, d > kTouching ? way * (1 / d) : inward(a, b)});
             });

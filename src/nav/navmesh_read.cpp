@@ -15,8 +15,8 @@ namespace {
 
 using namespace navmesh_tile;
 
-/// The shortest decimal number that is this float32: 0.05 and not 0.0500000007, so that a mesh built
-/// with settings that were loaded is the mesh built with those that were saved.
+/// Converts a float32 to the shortest decimal number that rounds to it: 0.05 instead of 0.0500000007. A
+/// mesh built with loaded settings therefore equals one built with the saved settings.
 double decimal(float v) noexcept {
   char text[32];
   const auto written = std::to_chars(text, text + sizeof text, v);
@@ -35,7 +35,7 @@ Status read_settings(const std::byte* p, const Where& where, NavMeshSettings& s)
       s.verts_per_poly = static_cast<int>(clamp(v, -1.0, 100.0));
     }
   }
-  // Older files have a byte of padding for the fourth flag, of any value.
+  // In older files the byte of the fourth flag is padding with any value.
   s.filter_low_hanging_obstacles = p[52] != std::byte{0};
   s.filter_ledge_spans = p[53] != std::byte{0};
   s.filter_walkable_low_height_spans = p[54] != std::byte{0};
@@ -49,7 +49,7 @@ struct Tile {
   TileLayout layout{};
 };
 
-/// Detour's mesh of the tiles, which it keeps copies of.
+/// Creates Detour's mesh. Detour keeps copies of the tiles.
 Result<NavMeshPtr> mesh_of(const dtNavMeshParams& params, std::span<const Tile> tiles,
                            const Where& where) {
   NavMeshPtr mesh(dtAllocNavMesh());
@@ -109,7 +109,7 @@ Result<NavMesh> parse(std::span<const std::byte> file, const Where& where) {
     if (file.size() - at < 16) return here.bad("the file ends within its header");
     if (i == 0 && load<std::int32_t>(p + at + 8) != DT_NAVMESH_MAGIC && file.size() - at >= 20 &&
         load<std::int32_t>(p + at + 16) == DT_NAVMESH_MAGIC) {
-      head = 16;  // 64-bit references, and padding after the size
+      head = 16;  // 64-bit references, and padding after the size.
       link = 16;
     }
     const auto size = load<std::int32_t>(p + at + head - (head == 16 ? 8u : 4u));
@@ -158,7 +158,7 @@ Result<NavMesh> parse_navmesh(std::span<const std::byte> bytes, const std::strin
 
 Result<NavMesh> load_navmesh(const std::filesystem::path& path) {
   std::error_code error;
-  // Folders, pipes and devices are refused: reading one could wait for ever.
+  // Only regular files: reading a pipe or a device could block forever.
   if (!std::filesystem::is_regular_file(path, error)) {
     return Status(Errc::file_not_found, path.string() + ": is not a file");
   }

@@ -124,7 +124,7 @@ Status check_tile(std::span<const std::byte> tile, const TileLayout& t, const Wh
     detail_verts += static_cast<unsigned>(d[8]);
     detail_tris += static_cast<unsigned>(d[9]);
   }
-  // Polygons that share them could ask for a thousand times the file.
+  // If polygons shared them, memory could grow to a thousand times the file size.
   if (detail_verts > static_cast<std::uint64_t>(t.detail_verts)) {
     return where.bad("detailVertCount", t.detail_verts,
                      "is less than the polygons have, " + std::to_string(detail_verts));
@@ -136,7 +136,7 @@ Status check_tile(std::span<const std::byte> tile, const TileLayout& t, const Wh
   for (std::int32_t i = 0; i < t.bv_nodes; ++i) {
     const auto v =
         load<std::int32_t>(tile.data() + t.at_bv + static_cast<std::size_t>(i) * kBvNode + 12);
-    // A leaf names a polygon, a branch how many nodes to skip.
+    // A leaf has the index of a polygon, a branch the number of nodes to skip.
     if (v >= 0 ? v >= t.ground : v < -(t.bv_nodes - i)) {
       return where.in("bvNode", static_cast<std::size_t>(i))
           .bad("i", v, "leaves the tree or the polygons");

@@ -12,12 +12,11 @@
 #include "navmesh_format.hpp"
 #include "navmesh_stages.hpp"
 
-// One tile of a NavMesh file: where its arrays are, whether they hold what Detour relies on, and a copy
-// for Detour.
+// One tile of a NavMesh file: its layout, the checks that Detour relies on, and a copy for Detour.
 
 namespace gsnav::detail::navmesh_tile {
 
-/// What a message starts with, and how it ends.
+/// Prefix of an error message, and functions that complete it.
 struct Where {
   std::string text;
   Status bad(const std::string& what) const { return {Errc::invalid_file, text + ": " + what}; }
@@ -39,9 +38,9 @@ T load(const std::byte* p) noexcept {
 
 inline bool usable(float v) noexcept {
   return std::abs(static_cast<double>(v)) <= kMaxCoordinate;
-}  // false for NaN
+}  // False for NaN.
 
-/// The fields of dtMeshHeader and where its arrays start.
+/// Fields of dtMeshHeader, and offsets of the arrays.
 struct TileLayout {
   static constexpr const char* kCountNames[] = {"polyCount",       "vertCount",       "maxLinkCount",
                                                 "detailMeshCount", "detailVertCount", "detailTriCount",
@@ -50,15 +49,17 @@ struct TileLayout {
   std::size_t at_verts, at_polys, at_details, at_detail_verts, at_detail_tris, at_bv;
 };
 
-/// Errors: invalid_file, unsupported. `link_size` is that of the file's links.
+/// Reads the layout of a tile.
+/// @param link_size Size of a link in the file, bytes.
+/// @return invalid_file or unsupported.
 Result<TileLayout> read_layout(std::span<const std::byte> tile, std::size_t link_size,
                                const Where& where);
 
-/// Whether the indices of its arrays stay within them.
+/// Checks that all indices are within their arrays.
 Status check_tile(std::span<const std::byte> tile, const TileLayout& t, const Where& where);
 
-/// The tile as Detour wants it in memory: 32-bit links, which it fills itself, and no off-mesh
-/// connections.
+/// Copies a tile to the form that Detour needs in memory: 32-bit links, which Detour fills in, and no
+/// off-mesh connections.
 DetourBytes copy_tile(std::span<const std::byte> tile, const TileLayout& t, int& size);
 
 }  // namespace gsnav::detail::navmesh_tile

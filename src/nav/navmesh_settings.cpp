@@ -42,7 +42,7 @@ Status NavMeshSettings::validate() const {
       {"detail_sample_max_error", detail_sample_max_error, 0.0, kHuge},
   };
   for (const Field& f : fields) {
-    if (!(f.value >= f.low && f.value <= f.high)) {  // false for NaN
+    if (!(f.value >= f.low && f.value <= f.high)) {  // False for NaN.
       return {Errc::invalid_argument, std::string("NavMeshSettings.") + f.name + " = " +
                                           std::to_string(f.value) + " is not in [" +
                                           std::to_string(f.low) + ", " + std::to_string(f.high) + "]"};

@@ -9,11 +9,11 @@
 namespace gsnav::detail {
 namespace {
 
-constexpr double kEdge = 1e-6;  // what rounding may add to a length that is a multiple of a cell
+constexpr double kEdge = 1e-6;  // Rounding error of a length that is a multiple of a cell, in cells.
 
 int clamp_cells(double v) noexcept { return static_cast<int>(min(max(v, 0.0), 30000.0)); }
 
-/// Square metres of what can be walked on, `border` cells at the rim left out.
+/// Walkable area in m², without the outer `border` cells.
 double walkable_area(const rcHeightfield& f, int border) noexcept {
   std::size_t spans = 0;
   for (int z = border; z < f.height - border; ++z) {
@@ -105,7 +105,7 @@ Status check_grid(const NavMeshSettings& settings, const Vec3d& low, const Vec3d
     return std::to_string(columns) + " x " + std::to_string(rows) + " cells of " + std::to_string(cs) +
            " m, " + std::to_string(levels) + " levels of " + std::to_string(ch) + " m";
   };
-  // Recast counts half cells of the agent's radius, and cells of free height, in 8 bits.
+  // Recast stores the agent's radius in half cells, and free heights in cells, in 8 bits.
   if (const VoxelSettings v(settings); v.radius > 127) {
     return Status(Errc::invalid_argument,
                   "NavMeshSettings.agent_radius = " + std::to_string(settings.agent_radius) +
@@ -117,7 +117,7 @@ Status check_grid(const NavMeshSettings& settings, const Vec3d& low, const Vec3d
                       " is more than 255 cells of cell_height " + std::to_string(ch) +
                       "; raise cell_height");
   }
-  // Recast keeps vertices in 16 bits and spans in RC_SPAN_HEIGHT_BITS.
+  // Recast stores vertices in 16 bits and spans in RC_SPAN_HEIGHT_BITS.
   const double most = settings.tile_size > 0 ? 1e9 : 65000;
   if (!(columns < most && rows < most &&
         (columns + 1) * (rows + 1) <= static_cast<double>(settings.max_cells))) {
@@ -192,7 +192,7 @@ Result<TilePolygons> build_polygons(RecastLog& log, const NavMeshSettings& s, rc
   for (int i = 0; i < compact->spanCount; ++i) {
     const unsigned short region = compact->spans[i].reg;
     if (region < out.region_cells.size())
-      ++out.region_cells[region];  // the border's have a bit of their own
+      ++out.region_cells[region];  // Regions of the border have a bit of their own.
   }
   RecastPtr<rcContourSet> contours(rcAllocContourSet());
   if (!rcBuildContours(&log, *compact, static_cast<float>(s.edge_max_error),
@@ -204,8 +204,8 @@ Result<TilePolygons> build_polygons(RecastLog& log, const NavMeshSettings& s, rc
     return stage("building polygons", log);
   if (out.polys->npolys == 0) return out;
   out.heights.reset(rcAllocPolyMeshDetail());
-  // None: farther apart than any edge is long. (Recast reads an empty hull where the distance is 0: its
-  // issue 650.)
+  // A distance above the length of any edge means no samples. (For 0, Recast reads an empty hull, see
+  // its issue 650.)
   constexpr double kNoSamples = 1e9;
   const double sample = s.detail_sample_dist < 0.9 ? kNoSamples : s.detail_sample_dist * s.cell_size;
   if (!rcBuildPolyMeshDetail(&log, *out.polys, *compact, static_cast<float>(sample),

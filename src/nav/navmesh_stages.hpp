@@ -16,7 +16,7 @@
 #include "gsnav/nav/navmesh.hpp"
 #include "navmesh_impl.hpp"
 
-// The stages of a build, from triangles or voxels to a tile of Detour's.
+// Stages of a build, from triangles or voxels to a Detour tile.
 
 namespace gsnav::detail {
 
@@ -35,7 +35,7 @@ struct DetourFree {
 };
 using DetourBytes = std::unique_ptr<unsigned char, DetourFree>;
 
-/// Keeps Recast's last error line.
+/// Keeps the last error message of Recast.
 class RecastLog : public rcContext {
  public:
   RecastLog() : rcContext(true) {}
@@ -50,39 +50,42 @@ class RecastLog : public rcContext {
   std::string error_;
 };
 
-/// An error of a stage of the build, with Recast's own words.
+/// Error of a stage, with the message of Recast.
 Status stage(const char* what, const RecastLog& log);
 
-/// Settings in voxels, rounded as NavMeshSettings says.
+/// Settings in voxels, rounded as NavMeshSettings describes.
 struct VoxelSettings {
   int height = 0, climb = 0, radius = 0;
   explicit VoxelSettings(const NavMeshSettings& s) noexcept;
 };
 
-/// Whole cells that hold a length, which rounding may have made a little longer.
+/// Smallest number of cells that contains a length, with a tolerance for rounding.
 int cells_up(double length, double cell) noexcept;
 
-/// Cosine of agent_max_slope: triangles that face up more than that can be walked on.
+/// Cosine of agent_max_slope. A triangle can be walked on if it faces up more than that.
 double slope_cosine(const NavMeshSettings& settings) noexcept;
 
-/// Box of the vertices. Errors: invalid_argument naming a vertex or index.
+/// Checks vertices and indices.
+/// @return box of the vertices; invalid_argument, with the vertex or index.
 Result<Aabb<double>> check_triangles(std::span<const Vec3d> vertices,
                                      std::span<const NavMesh::Triangle> triangles);
 
-/// Adds triangles to a heightfield whose frame lies at `origin`. Errors: out_of_memory.
+/// Adds triangles to a heightfield whose frame is at `origin`.
+/// @return out_of_memory.
 Status rasterise(RecastLog& log, const NavMeshSettings& settings, std::span<const Vec3d> vertices,
                  std::span<const NavMesh::Triangle> triangles, const Vec3d& origin,
                  rcHeightfield& field);
 
-/// Errors: a grid over the box exceeds `settings.max_cells` or the height what Recast can number.
+/// Checks the size of a grid over a box.
+/// @return invalid_argument if it exceeds `settings.max_cells` or Recast's limits.
 Status check_grid(const NavMeshSettings& settings, const Vec3d& low, const Vec3d& high);
 
-/// An empty heightfield over a box (relative to the mesh's origin). Errors: as check_grid, and more than
-/// 65000 cells a side.
+/// Creates an empty heightfield over a box, relative to the mesh's origin.
+/// @return the errors of check_grid; an error if a side has more than 65000 cells.
 Result<RecastPtr<rcHeightfield>> make_heightfield(RecastLog& log, const NavMeshSettings& settings,
                                                   const Vec3d& low, const Vec3d& high);
 
-/// Square metres that are left after each stage.
+/// Area after each stage, m².
 struct WalkableAreas {
   double facing_up = 0, clear = 0, eroded = 0;
   void add(const WalkableAreas& o) noexcept {
@@ -93,58 +96,63 @@ struct WalkableAreas {
 };
 Status nothing_navigable(const char* why, const NavMeshSettings& settings, const WalkableAreas& areas);
 
-/// The polygons of a heightfield; none where `polys` is null or empty.
+/// Polygons of a heightfield. None if `polys` is null or empty.
 struct TilePolygons {
   RecastPtr<rcPolyMesh> polys;
   RecastPtr<rcPolyMeshDetail> heights;
-  std::vector<std::uint32_t> region_cells;  ///< cells of each region, inside the border
-  WalkableAreas areas;                      ///< inside the border
+  std::vector<std::uint32_t> region_cells;  ///< Number of cells of each region, without the border.
+  WalkableAreas areas;                      ///< Without the border.
   bool empty() const noexcept { return polys == nullptr || polys->npolys == 0; }
 };
 
-/// Filters, erosion, regions, contours, polygons. `border` cells around the tile are looked at and cut
-/// away; `prune` takes areas away after erosion. Errors: out_of_memory.
+/// Filters, erodes, and builds regions, contours and polygons.
+/// @param border Cells around the tile that are used as context and then cut off.
+/// @param prune Removes areas after erosion.
+/// @return out_of_memory.
 Result<TilePolygons> build_polygons(RecastLog& log, const NavMeshSettings& settings,
                                     rcHeightfield& field, int border,
                                     const std::function<void(rcCompactHeightfield&)>& prune = {});
 
-/// Where a tile lies.
+/// Position of a tile.
 struct TilePlace {
   int x = 0, z = 0;
   float low[3] = {}, high[3] = {};
 };
 
-/// The bytes of one of Detour's tiles. Errors: unsupported where Detour refuses the polygons.
+/// Creates the data of a Detour tile.
+/// @return unsupported if Detour rejects the polygons.
 Result<DetourBytes> make_tile(const NavMeshSettings& settings, const TilePolygons& tile,
                               const TilePlace& place, int& size);
 
-/// What a source of voxels may add to the build.
+/// Callbacks of a source of voxels.
 struct BuildHooks {
-  std::function<void(rcCompactHeightfield&)> prune;  ///< takes areas away after erosion
-  std::function<double(const Vec3d&)> height;        ///< true height of a vertex of the surface
+  std::function<void(rcCompactHeightfield&)> prune;  ///< Removes areas after erosion.
+  std::function<double(const Vec3d&)> height;        ///< True height of a vertex of the surface.
 };
 
-/// Everything after voxelisation, as one tile. `origin` is where the heightfield's frame lies in the
-/// world. nothing_navigable, naming the areas left at each stage, where no polygon comes out.
+/// All stages after voxelization, as one tile.
+/// @param origin World position of the heightfield's frame.
+/// @return nothing_navigable, with the areas after each stage, if no polygon remains.
 Result<NavMesh> finish_navmesh(RecastLog& log, const NavMeshSettings& settings, rcHeightfield& field,
                                const Vec3d& origin, const BuildHooks& hooks = {});
 
 class TriangleHeights;
-/// Height of the triangles below a vertex of the surface, relative to the origin: a span's top is the
-/// highest point of the surface within its cell, rounded up.
+/// Height of the triangles below a vertex of the surface, relative to the origin. The top of a span is
+/// the highest point of the surface in its cell, rounded up.
 double floor_below(const TriangleHeights& heights, const NavMeshSettings& settings, const Vec3d& p);
 
-/// What a source of voxels may add to a build in tiles. Called from many threads.
+/// Callbacks of a source of voxels for a build in tiles. Called from many threads.
 struct TileHooks {
-  /// Adds spans to a tile's field, whose first column is (x0, z0) of the box's cells (below 0 in the
-  /// border).
+  /// Adds spans to the heightfield of a tile. Its first column is (x0, z0) in cells of the box, negative
+  /// in the border.
   std::function<Status(RecastLog&, int x0, int z0, rcHeightfield&)> fill;
-  std::function<double(const Vec3d&)> height;  ///< as BuildHooks::height
-  double least_area = 0;                       ///< islands below this are dropped, square metres
-  std::function<void(double)> progress;        ///< share of the tiles; one call at a time
+  std::function<double(const Vec3d&)> height;  ///< See BuildHooks::height.
+  double least_area = 0;                       ///< Islands below this area are dropped, m².
+  std::function<void(double)> progress;        ///< Receives the completed fraction of the tiles. Calls
+                                               ///< do not overlap.
 };
 
-/// The build in tiles of `settings.tile_size`. `box` holds the triangles, relative to the origin.
+/// Builds in tiles of `settings.tile_size`. `box` contains the triangles, relative to the origin.
 Result<NavMesh> build_in_tiles(const NavMeshSettings& settings, std::span<const Vec3d> vertices,
                                std::span<const NavMesh::Triangle> triangles, const Vec3d& origin,
                                const Aabb<double>& box, int threads, const TileHooks& hooks = {});

@@ -10,7 +10,7 @@
 namespace gsnav::detail {
 namespace {
 
-constexpr double kNarrow = 1e-3;  // metres: portals between tiles below this are walls
+constexpr double kNarrow = 1e-3;  // Metres. Narrower portals between tiles are treated as walls.
 
 Vec3d vec3(const float* p) noexcept {
   return {static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])};
@@ -20,9 +20,9 @@ Vec3d corner_of(const dtMeshTile& tile, const dtPoly& p, std::size_t k) noexcept
   return vec3(&tile.verts[3 * p.verts[k % p.vertCount]]);
 }
 
-/// A stretch of an edge that leads into another tile.
+/// Part of an edge that leads into another tile.
 struct Portal {
-  double from = 0, to = 0;  ///< shares of the edge's length
+  double from = 0, to = 0;  ///< Fractions of the edge's length.
   PolyId neighbour = kNoPoly;
   friend auto operator<=>(const Portal&, const Portal&) = default;
 };
@@ -62,7 +62,7 @@ class Extractor {
   }
 
  private:
-  /// Room for what will be added, so that nothing is allocated twice.
+  /// Reserves memory, so that nothing is allocated twice.
   void reserve() {
     std::size_t points = 0, tris = 0, corners = 0;
     for (int t = 0; t < mesh_.getMaxTiles(); ++t) {
@@ -73,7 +73,7 @@ class Extractor {
         const dtPoly& p = tile.polys[i];
         tris += tile.detailMeshes[i].triCount;
         corners += p.vertCount;
-        // A link to another tile is a stretch with another before it at most.
+        // A link to another tile adds a part, with at most one other part before it.
         for (unsigned l = p.firstLink; l != DT_NULL_LINK; l = tile.links[l].next) {
           corners += leads_out(tile.links[l]) ? 2 : 0;
         }
@@ -151,7 +151,8 @@ class Extractor {
     return p;
   }
 
-  /// Where edge k meets edges of other tiles. Detour keeps that in steps of 1/255; the edges know it.
+  /// Parts of edge k that touch edges of other tiles. Detour stores them in steps of 1/255; the edges
+  /// are exact.
   std::vector<Portal> portals(const dtMeshTile& tile, int i, std::size_t k) const {
     std::vector<Portal> out;
     const dtPoly& p = tile.polys[i];
@@ -180,16 +181,16 @@ class Extractor {
         }
       }
     }
-    // Two edges of one polygon that lie on this one are found by the links of both.
+    // Two edges of one polygon that lie on this edge are found through both links.
     std::sort(out.begin(), out.end());
     out.erase(std::unique(out.begin(), out.end()), out.end());
     if (out.size() > links) out.resize(links);
     return out;
   }
 
-  /// Whether edge c d of another tile is within a step of the agent from edge a b, between parts `from`
-  /// and `to` of the latter. Detour links what is within twice its climb, a shelf with the floor below
-  /// it.
+  /// Returns true if edge c d of another tile is within the agent's climb height of edge a b, between
+  /// the fractions `from` and `to` of a b. Detour links edges within twice the climb height, for example
+  /// a shelf and the floor below it.
   bool within_climb(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d, double from,
                     double to) const {
     const NavMeshSettings& s = impl_.settings;

@@ -29,13 +29,13 @@ void put_settings(OutputFile& out, const NavMeshSettings& s) {
   out.write(s.include_static_objects ? "\1" : "\0", 1);
 }
 
-/// The floats of a point at p, moved by d.
+/// Moves a point by d.
 void shift(float* p, const Vec3d& d) noexcept {
   for (int c = 0; c < 3; ++c) p[c] = static_cast<float>(static_cast<double>(p[c]) + d[c]);
 }
 
-/// A tile's bytes in world coordinates with the true heights of the floor, which Detour's own does not
-/// have; `points` are its vertices' and height samples', relative to the origin.
+/// Data of a tile in world coordinates with the true heights of the floor, which Detour's data lack.
+/// @param points Vertices and height samples of the tile, relative to the origin.
 std::vector<unsigned char> world_tile(const NavMesh::Impl& impl, const dtMeshTile& tile,
                                       const Vec3d* points) {
   std::vector<unsigned char> data(tile.data, tile.data + tile.dataSize);

@@ -49,7 +49,7 @@ Result<CapsuleSet> CapsuleSet::create(std::vector<DynamicCapsule> capsules, doub
   for (const DynamicCapsule& c : capsules) {
     if (Status s = check(c); !s.ok()) return s;
   }
-  // By content after the ids, so that capsules with equal ids have an order of their own too.
+  // Sort by content after the ids, so that the order is defined for equal ids too.
   const auto before = [](const DynamicCapsule& a, const DynamicCapsule& b) {
     if (a.avatar != b.avatar) return a.avatar < b.avatar;
     if (a.bone != b.bone) return a.bone < b.bone;
@@ -66,7 +66,7 @@ Result<CapsuleSet> CapsuleSet::create(std::vector<DynamicCapsule> capsules, doub
     if (i == 0 || c.avatar != set.capsules_[i - 1].avatar) set.groups_.push_back({i, 0, {}});
     Group& g = set.groups_.back();
     ++g.count;
-    // Linear motion stays within the hull of both ends.
+    // Linear motion stays within the convex hull of both ends.
     add_swept(g.swept, c.motion.begin);
     add_swept(g.swept, c.motion.end);
   }
@@ -80,7 +80,7 @@ void CapsuleSet::make_grid() {
     all.add(g.swept.low);
     all.add(g.swept.high);
   }
-  // About one cell a body; a body that sweeps the whole grid is still in few of them.
+  // About one cell per body. The limit keeps bodies that sweep the whole grid in few cells.
   constexpr double kMostCellsASide = 64;
   const double side = groups_.empty()
                           ? 1.0

@@ -12,8 +12,8 @@ namespace {
 
 double ground(const Vec3d& d) { return std::hypot(d.x, d.z); }
 
-/// Where the band is pushed to by edges nearer than wanted: the mean over edges of what each asks for
-/// would stop short of the wanted distance at a single one, so those that ask for more count for more.
+/// Displacement that edges nearer than `wanted` exert on a point of the band. A plain mean over edges
+/// would stop short of the wanted distance, so edges are weighted by how much is missing.
 Vec3d push(const NavMesh& mesh, const NavPoint& p, double wanted) {
   Vec3d sum{};
   double weights = 0.0;
@@ -26,13 +26,13 @@ Vec3d push(const NavMesh& mesh, const NavPoint& p, double wanted) {
   return weights > 0 ? sum * (1.0 / weights) : Vec3d{};
 }
 
-/// A point on the surface that is `by` further on the ground; a wall in the way turns it.
+/// Moves a point along the surface. Walls deflect the motion.
 NavPoint moved(const NavMesh& mesh, const NavPoint& p, const Vec3d& by) {
   const SurfaceWalk walk = mesh.walk(p, by, true);
   return walk.points.empty() ? p : NavPoint{walk.points.back().position, walk.points.back().poly};
 }
 
-/// The straight way from a to b on the surface, without a; empty where an edge is between them.
+/// Straight path from a to b on the surface, without a. Empty if an edge is in between.
 std::vector<Vec3d> straight(const NavMesh& mesh, const NavPoint& a, const NavPoint& b) {
   const SurfaceWalk walk = mesh.walk(a, b.position - a.position, false);
   std::vector<Vec3d> out;
@@ -91,7 +91,7 @@ Result<ClearPath> keep_clear(const NavMesh& mesh, std::span<const Vec3d> points,
       const Vec3d before = band[i].position;
       const Vec3d middle = lerp(band[i - 1].position, band[i + 1].position, 0.5) - before;
       band[i] = moved(mesh, band[i], limited({0.3 * middle.x, 0, 0.3 * middle.z}));
-      // Across the band only: points that slid along it would leave a gap where there is least room.
+      // Move across the band only. Points that slide along it would leave a gap at the narrowest place.
       Vec3d along = band[i + 1].position - band[i - 1].position;
       along.y = 0;
       Vec3d away = push(mesh, band[i], options.clearance);
@@ -108,7 +108,7 @@ Result<ClearPath> keep_clear(const NavMesh& mesh, std::span<const Vec3d> points,
   out.path.points.push_back(band[0].position);
   for (std::size_t i = 1; i < band.size(); ++i) {
     std::vector<Vec3d> leg = straight(mesh, band[i - 1], band[i]);
-    if (leg.empty()) {  // round a corner that came between them
+    if (leg.empty()) {  // A corner came between the points: go around it.
       const auto way = mesh.path_between(band[i - 1], band[i]);
       if (!way) return way.status();
       leg.assign(way->points.begin() + 1, way->points.end());

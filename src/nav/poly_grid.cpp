@@ -9,13 +9,13 @@
 namespace gsnav::detail {
 namespace {
 
-constexpr double kRounding = 1e-9;  // metres
+constexpr double kRounding = 1e-9;  // Metres.
 constexpr double kPolygonsPerCell = 1.0;
-constexpr double kLeastSide = 0.25;  // metres
+constexpr double kLeastSide = 0.25;  // Metres.
 constexpr double kMaxSideCells = 2048.0;
-constexpr double kMostEntries = 16.0;  // a polygon
+constexpr double kMostEntries = 16.0;  // Per polygon.
 
-/// Cells [low, high] along one axis that reach into an interval; none where high < low.
+/// Cells [low, high] along one axis that overlap an interval. Empty if high < low.
 struct Cells {
   std::int64_t low = 0, high = -1;
 };
@@ -27,7 +27,7 @@ Cells cells_of(double from, double to, double side, std::int64_t n) noexcept {
           static_cast<std::int64_t>(clamp(std::floor(to / side), 0.0, most))};
 }
 
-/// How far a coordinate lies outside an interval.
+/// Distance of a coordinate from an interval.
 double outside(double v, double low, double high) noexcept { return max(max(low - v, v - high), 0.0); }
 
 }  // namespace
@@ -47,8 +47,8 @@ void PolyGrid::build(const PolyMesh& mesh) {
   low_ = all.low;
   const double width = all.high.x - all.low.x, depth = all.high.z - all.low.z;
   const double count = max(static_cast<double>(mesh.polys.size()) / kPolygonsPerCell, 1.0);
-  // Never many more cells, and entries of them, than polygons: what overlaps or is thin gets larger
-  // cells.
+  // Limit the number of cells and entries relative to the polygons. Overlapping or thin polygons get
+  // larger cells.
   const double most_side = clamp(2 * count, 8.0, kMaxSideCells);
   side_ = max(max(std::sqrt(width * depth / count), max(width, depth) / most_side), kLeastSide);
   const auto columns_of = [&](PolyId id) {
@@ -68,7 +68,7 @@ void PolyGrid::build(const PolyMesh& mesh) {
     if (columns_ * rows_ == 1 || entries <= kMostEntries * (count + 4)) break;
   }
   first_.assign(static_cast<std::size_t>(columns_ * rows_) + 1, 0);
-  // Counted first, then filled.
+  // Count, then fill.
   const auto each_cell = [&](PolyId id, const auto& f) {
     const Cells x = columns_of(id), z = rows_of(id);
     for (std::int64_t r = z.low; r <= z.high; ++r) {
@@ -90,7 +90,7 @@ NavPoint PolyGrid::nearest(const PolyMesh& mesh, const Vec3d& q, const Vec3d& ha
   const Cells columns = cells_of(x - half.x, x + half.x, side_, columns_);
   const Cells rows = cells_of(z - half.z, z + half.z, side_, rows_);
   if (columns.high < columns.low || rows.high < rows.low) return {};
-  // The point's own cell, which may lie outside the grid.
+  // Cell of the point, which may lie outside the grid.
   constexpr double kFar = 1e15;
   const auto cx = static_cast<std::int64_t>(clamp(std::floor(x / side_), -kFar, kFar));
   const auto cz = static_cast<std::int64_t>(clamp(std::floor(z / side_), -kFar, kFar));
@@ -129,7 +129,7 @@ NavPoint PolyGrid::nearest(const PolyMesh& mesh, const Vec3d& q, const Vec3d& ha
       }
     }
   };
-  // Rings of cells around the point's own, until they are farther than what was found.
+  // Visit rings of cells around the point until they are farther away than the best point found.
   for (std::int64_t ring = max(away(cx, columns), away(cz, rows)); ring <= last; ++ring) {
     if (ring > 0 && border + static_cast<double>(ring - 1) * side_ > distance) break;
     for (std::int64_t r = max(cz - ring, rows.low); r <= min(cz + ring, rows.high); ++r) {

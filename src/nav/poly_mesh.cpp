@@ -56,7 +56,8 @@ double PolyMesh::height(PolyId id, const Vec3d& q) const noexcept {
   if (p.count == 0) return q.y;
   const Vec3d& o = corners[p.first];
   if (p.planar) return o.y + p.rise_x * (q.x - o.x) + p.rise_z * (q.z - o.z);
-  // The triangle that q is in, or is least outside of: points on edges always find one.
+  // The triangle that contains q or is nearest to containing it, so that points on edges always find
+  // one.
   double best = -std::numeric_limits<double>::max(), y = o.y;
   for (std::uint32_t i = p.tri_first; i < p.tri_first + p.tri_count; ++i) {
     const Share &s = share_1[i], &t = share_2[i];
@@ -101,7 +102,7 @@ void PolyMesh::finish() {
       parent[max(a, b)] = min(a, b);
     }
   }
-  // Number islands by falling area; equal areas by their least polygon.
+  // Number islands by decreasing area. Equal areas are ordered by their smallest polygon.
   std::vector<std::uint32_t> roots;
   std::vector<double> root_area(polys.size(), 0.0);
   for (std::uint32_t i = 0; i < polys.size(); ++i) {
@@ -155,11 +156,10 @@ void PolyMesh::finish() {
   grid.build(*this);
 }
 
-/// Height triangles where they tile the polygon, else its fan.
+/// Splits a polygon into sampling pieces: its height triangles if they tile it, else a fan of triangles.
 void PolyMesh::add_pieces(PolyId id) {
   Poly& p = polys[id];
-  constexpr double kOff =
-      1e-5;  // metres: what float32 makes of corners some hundred metres from the origin
+  constexpr double kOff = 1e-5;  // Metres. Error of float32 corners some hundred metres from the origin.
   double area = 0, covered = 0, around = 0;
   for (std::uint32_t k = 1; k + 1 < p.count; ++k)
     area += area_xz(corner(p, 0), corner(p, k), corner(p, k + 1));
@@ -173,7 +173,7 @@ void PolyMesh::add_pieces(PolyId id) {
     for (const Vec3d& q : {a, b, c}) tiled = tiled && holds(id, q, kOff);
     pieces.push_back({tris[t], id});
   }
-  // A sliver may have no height triangles; each polygon has a piece.
+  // A sliver may have no height triangles, but every polygon needs a piece.
   p.tiled = tiled && pieces.size() > first && std::abs(covered - std::abs(area)) <= kOff * around;
   if (p.tiled) return;
   pieces.resize(first);
@@ -220,8 +220,8 @@ void PolyMesh::prepare_sampling() {
 Vec3d PolyMesh::point_in(const Piece& piece, Rng& rng) const noexcept {
   const auto [o, a, b] = triangle(piece);
   double u = rng.uniform(), v = rng.uniform();
-  const bool beyond =
-      u + v > 1;  // the other half of the parallelogram; selected, for it is as likely as not
+  const bool beyond = u + v > 1;  // Reflect points of the other half of the parallelogram. Branch-free,
+                                  // because both halves are equally likely.
   u = beyond ? 1 - u : u;
   v = beyond ? 1 - v : v;
   Vec3d q{o.x + u * (a.x - o.x) + v * (b.x - o.x), o.y + u * (a.y - o.y) + v * (b.y - o.y),

@@ -11,11 +11,12 @@
 namespace gsnav::detail {
 namespace {
 
-constexpr double kLevel = 1e-3;   // metres: a polygon as flat as this is one face
-constexpr double kBeside = 1e-2;  // metres that a height sample may lie off its polygon's edge
-constexpr double kSliver = 1e-8;  // square metres
+constexpr double kLevel = 1e-3;   // Metres. A polygon that deviates less from a plane is one face.
+constexpr double kBeside = 1e-2;  // Largest distance of a height sample from the edge of its polygon,
+                                  // metres.
+constexpr double kSliver = 1e-8;  // m².
 
-/// The polygon cut into triangles by clipping ears, the fattest first.
+/// Cuts a polygon into triangles by ear clipping, the best-shaped ear first.
 std::vector<Sheet> clipped(PolyId id, const std::vector<Vec3d>& c) {
   std::vector<Sheet> own;
   std::vector<std::uint32_t> left;

@@ -8,13 +8,13 @@
 
 namespace gsnav::detail {
 
-/// The disc around a body on the ground, and its mean velocity in a tick.
+/// Disc around a body on the ground plane, and its mean velocity during a tick.
 struct Disc {
   Ground at, velocity;
   double radius = 0;
 };
 
-/// The disc around a body's capsules that reach into [low, high]; radius 0 where none does.
+/// Disc around those capsules of a body that reach into the heights [low, high]. Radius 0 if none does.
 inline Disc disc_of(View<const DynamicCapsule> capsules, double low, double high,
                     double seconds) noexcept {
   const auto reaches = [&](const Capsule<double>& c) {
@@ -43,11 +43,12 @@ inline Disc disc_of(View<const DynamicCapsule> capsules, double low, double high
   return disc;
 }
 
-/// Bodies as somebody expects them who knows one tick of their motion: as known within the tick, and
-/// then in the pose of its end at their mean velocity.
+/// Predicted motion of bodies: as given during the tick, then in their final pose at their mean
+/// velocity.
 class PredictedBodies {
  public:
-  /// Those that may be met within `seconds` from the tick's begin by an agent no faster than `speed`.
+  /// Selects the bodies that an agent no faster than `speed` may meet within `seconds` from the begin of
+  /// the tick.
   PredictedBodies(const CapsuleSet& bodies, const AgentState& agent, double speed, double seconds)
       : tick_(bodies.t1() - bodies.t0()) {
     const Ground at{agent.position.x, agent.position.z};
@@ -58,7 +59,7 @@ class PredictedBodies {
       if (length(d.at - at) - d.radius - agent.radius > (speed + length(d.velocity)) * seconds + 0.5)
         continue;
       Body b{d, bodies.capsules_of(g)};
-      // Limbs leave the disc of the tick's begin.
+      // Limbs may leave the disc of the first pose.
       for (const DynamicCapsule& c : b.known) {
         for (const Vec3d& p : {c.motion.end.p0, c.motion.end.p1}) {
           const Ground off = Ground{p.x, p.z} - d.at - d.velocity * tick_;
@@ -72,8 +73,8 @@ class PredictedBodies {
   std::size_t size() const noexcept { return bodies_.size(); }
   double tick() const noexcept { return tick_; }
 
-  /// When somebody of this size, who walks so within [from, from + seconds] and stands where the walk
-  /// ends, is first touched, in seconds from the tick's begin; `from + seconds` where never.
+  /// Time of first contact, in seconds from the begin of the tick, for an agent that walks during [from,
+  /// from + seconds] and then stands. Returns `from + seconds` if there is none.
   double first_contact(const SurfaceWalk& walk, double radius, double height, double from,
                        double seconds) const {
     const double end = from + seconds;
@@ -99,7 +100,7 @@ class PredictedBodies {
     View<const DynamicCapsule> known;
   };
 
-  /// When the way from p at time t0 to q at time t1 meets a body; infinity where it does not.
+  /// Time at which the motion from p at time t0 to q at time t1 meets a body. Infinity if it does not.
   double contact(const Body& b, const Vec3d& p, const Vec3d& q, double t0, double t1, double radius,
                  double height) const {
     const double reach = b.disc.radius + radius + 1e-3;

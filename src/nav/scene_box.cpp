@@ -9,8 +9,9 @@
 namespace gsnav::detail::solids {
 
 Aabb<double> scene_box(std::span<const GaussianSet> sets, const GaussianNavOptions& options) {
-  constexpr double kCoarse = 1.0;   // metres
-  constexpr double kSparse = 0.02;  // of what the middle Gaussian's coarse cell holds: not the scene
+  constexpr double kCoarse = 1.0;   // Metres.
+  constexpr double kSparse = 0.02;  // Cells with less than this fraction of the median Gaussian's cell
+                                    // are not part of the scene.
   constexpr double kFar = 1e7;
   using Cell = std::array<std::int64_t, 3>;
   std::map<Cell, double> mass;

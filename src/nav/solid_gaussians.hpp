@@ -7,25 +7,25 @@
 #include "gaussian_voxels.hpp"
 #include "gsnav/detail/frame/set_rows.hpp"
 
-// The steps between a scene's Gaussians and its solid voxels.
+// Steps from a scene's Gaussians to its solid voxels.
 
 namespace gsnav::detail::solids {
 
-/// One opaque Gaussian in the world.
+/// An opaque Gaussian in world coordinates.
 struct Solid {
   Vec3d mean;
-  Mat3d axes;  // columns: principal axes times standard deviations
+  Mat3d axes;  // Columns: principal axes times standard deviations.
   double opacity;
 };
 
-/// A set with what placing its Gaussians takes.
+/// A set with the transform of its Gaussians.
 struct PlacedSet {
   const GaussianSet* set = nullptr;
   Mat3d placed{};
   explicit PlacedSet(const GaussianSet& s)
       : set(&s), placed(rotation_matrix(s.world_from_asset.rotation) * s.world_from_asset.scale) {}
 
-  /// False where the Gaussian is fainter than `min_opacity`, or not finite.
+  /// Reads a Gaussian. Returns false if its opacity is below `min_opacity` or a value is not finite.
   bool read(std::size_t i, double min_opacity, Solid& s) const {
     const ShapeRows& g = set->gaussians.shape;
     s.opacity = static_cast<double>(opacity_of(g, i));
@@ -63,11 +63,12 @@ inline bool inside(const Aabb<double>& box, const Vec3d& p) noexcept {
   return true;
 }
 
-/// Box of the densest connected part of the scene and of every part with a tenth of its mass: outliers
-/// and a far shell of sky are parts of their own.
+/// Box of the heaviest connected part of the scene and of every part with at least a tenth of its mass.
+/// Outliers and a distant sky are separate parts.
 Aabb<double> scene_box(std::span<const GaussianSet> sets, const GaussianNavOptions& options);
 
-/// Fills `g.runs`. Errors: out_of_memory.
+/// Fills `g.runs`.
+/// @return out_of_memory.
 Status rasterise_tiles(VoxelGrid& g, std::span<const GaussianSet> sets, const GaussianNavOptions& o,
                        ThreadPool& pool, GaussianNavReport& report);
 

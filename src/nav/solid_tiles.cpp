@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The voxels that opaque Gaussians fill, tile by tile.
+// Voxels that opaque Gaussians fill, tile by tile.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,11 +12,11 @@
 namespace gsnav::detail::solids {
 namespace {
 
-/// What one Gaussian adds to the voxels that it reaches. Widened by the variance of a voxel, so that a
-/// disk thinner than a voxel still meets its centre.
+/// Contribution of one Gaussian to the voxels that it reaches. It is widened by the variance of a voxel,
+/// so that a disc thinner than a voxel reaches the centre.
 class Splat {
  public:
-  /// False where it reaches no voxel of the grid.
+  /// Prepares a Gaussian. Returns false if it reaches no voxel of the grid.
   bool set(const VoxelGrid& g, const Solid& s, double sigmas) {
     const double vc = g.cell * g.cell / 12.0, vl = g.level * g.level / 12.0;
     Mat3d cov = s.axes * transpose(s.axes);
@@ -48,7 +48,7 @@ class Splat {
   void column(const VoxelGrid& g, std::size_t x, std::size_t z, double cut, F&& f) const {
     const double dx = g.low.x + (static_cast<double>(x) + 0.5) * g.cell - mean_.x;
     const double dz = g.low.z + (static_cast<double>(z) + 0.5) * g.cell - mean_.z;
-    // q is a parabola over the level: the levels to look at, one more on each side for rounding.
+    // q is a parabola over the level. Solve it for the levels, with one more on each side for rounding.
     const double side = inv_(1, 0) * dx + inv_(1, 2) * dz, bend = inv_(1, 1);
     const double least =
         inv_(0, 0) * dx * dx + 2 * inv_(0, 2) * dx * dz + inv_(2, 2) * dz * dz - side * side / bend;
@@ -66,7 +66,7 @@ class Splat {
   }
 
   double opacity() const noexcept { return opacity_; }
-  std::size_t first[3] = {}, last[3] = {};  ///< voxels that it may reach, along each axis
+  std::size_t first[3] = {}, last[3] = {};  ///< Range of voxels that it may reach along each axis.
 
  private:
   Mat3d inv_{};
@@ -74,10 +74,11 @@ class Splat {
   double opacity_ = 0;
 };
 
-constexpr std::size_t kTile = 64;  // columns a side that one thread rasterises at a time
-constexpr std::size_t kBrick = 8;  // voxels a side that get memory together
+constexpr std::size_t kTile = 64;  // Side of the tile of columns that one thread rasterizes at a time.
+constexpr std::size_t kBrick = 8;  // Side of the block of voxels that is allocated together.
 
-/// -log(1 - alpha) of the Gaussians so far, in bricks of 8 x 8 x 8 voxels that one of them has touched.
+/// Sum of -log(1 - alpha) over Gaussians, in bricks of 8 x 8 x 8 voxels that are allocated when first
+/// touched.
 class TileMass {
  public:
   explicit TileMass(std::size_t levels)
@@ -88,7 +89,7 @@ class TileMass {
     std::fill(table_.begin(), table_.end(), kNoBrick);
     mass_.clear();
   }
-  /// `x` and `z` within the tile.
+  /// Value of a voxel. `x` and `z` are within the tile.
   float& at(std::size_t x, std::size_t y, std::size_t z) {
     std::uint32_t& brick = table_[(z / kBrick * (kTile / kBrick) + x / kBrick) * high_ + y / kBrick];
     if (brick == kNoBrick) {
@@ -97,20 +98,22 @@ class TileMass {
     }
     return mass_[brick * kVoxels + (z % kBrick * kBrick + x % kBrick) * kBrick + y % kBrick];
   }
-  /// Appends the solid runs of a column. Returns how many. A voxel is solid with a mass of `least`. Of
-  /// two voxels with a sheet on the face between them, the heavier one is solid too, where a voxel
-  /// around that face would be.
+  /// Appends the solid runs of a column and returns their number. A voxel is solid if its mass is at
+  /// least `least`. If a thin sheet lies on the face between two voxels, the heavier one is solid too,
+  /// provided that a voxel centred on that face would be.
   std::uint32_t runs(std::size_t x, std::size_t z, std::size_t levels, float least,
                      std::vector<SolidRun>& out) const {
     const std::size_t before = out.size();
     const std::uint32_t* bricks = table_.data() + (z / kBrick * (kTile / kBrick) + x / kBrick) * high_;
     const auto mass = [&](std::size_t y) {
-      if (y >= levels || bricks[y / kBrick] == kNoBrick) return 0.0f;  // below 0 too: y wraps around
+      if (y >= levels || bricks[y / kBrick] == kNoBrick)
+        return 0.0f;  // Indices below 0 wrap around and
+                      // are caught too.
       return mass_[bricks[y / kBrick] * kVoxels + (z % kBrick * kBrick + x % kBrick) * kBrick +
                    y % kBrick];
     };
-    // Splat widens a thin sheet to a variance of level^2 / 12. On the face between two voxels it has
-    // exp(1.5) times the geometric mean of their masses, and the voxels below and above have none.
+    // Splat widens a thin sheet to a variance of level^2 / 12. On the face between two voxels its mass
+    // is exp(1.5) times the geometric mean of their masses, and the next voxels have almost none.
     constexpr float kFace = 4.4816890703f;
     const auto sheet = [&](std::size_t y) {
       return mass(y) < least && mass(y + 1) < least &&
@@ -145,14 +148,14 @@ class TileMass {
   std::vector<float> mass_;
 };
 
-/// Gaussians that reach each tile of columns, in their order.
+/// Gaussians that reach each tile of columns, in order.
 struct TileLists {
   struct Reach {
-    std::uint16_t x0 = 1, x1 = 0, z0 = 1, z1 = 0;  // none where x0 > x1
+    std::uint16_t x0 = 1, x1 = 0, z0 = 1, z1 = 0;  // Empty if x0 > x1.
   };
   std::size_t nx, nz;
   std::vector<std::size_t> first;
-  std::vector<std::uint32_t> rows;  // numbered through all sets
+  std::vector<std::uint32_t> rows;  // Numbered through all sets.
 
   TileLists(const VoxelGrid& g, std::span<const GaussianSet> sets, const GaussianNavOptions& o,
             GaussianNavReport& report)
@@ -198,7 +201,7 @@ struct TileRuns {
   std::vector<SolidRun> runs;
 };
 
-/// The runs of all tiles, column by column.
+/// Joins the runs of all tiles, column by column.
 Status join_tiles(VoxelGrid& g, const TileLists& lists, std::vector<TileRuns>& tiles) {
   g.first.assign(g.nx * g.nz + 1, 0);
   const auto columns = [&](std::size_t t, const auto& f) {
@@ -262,7 +265,7 @@ Status rasterise_tiles(VoxelGrid& g, std::span<const GaussianSet> sets, const Ga
       while (set + 1 < begins.size() && lists.rows[k] >= begins[set + 1]) ++set;
       if (!placed[set].read(lists.rows[k] - begins[set], o.min_opacity, s) || !splat.set(g, s, o.sigmas))
         continue;
-      // Within this, one Gaussian alone makes a voxel solid.
+      // Within this distance, the Gaussian alone makes a voxel solid.
       const double enough = o.solid_alpha < 0.99 && s.opacity > o.solid_alpha
                                 ? 2 * std::log(s.opacity / o.solid_alpha) - 1e-6
                                 : -1.0;

@@ -8,8 +8,9 @@
 namespace gsnav::detail::floors {
 namespace {
 
-constexpr double kStairHead = 1.0;    // metres: floor around stairs that is levelled with them
-constexpr double kRampRadius = 0.15;  // metres that heights of stairs are averaged over
+constexpr double kStairHead = 1.0;    // Distance up to which the floor around stairs is levelled with
+                                      // them, metres.
+constexpr double kRampRadius = 0.15;  // Radius for averaging heights of stairs, metres.
 
 }  // namespace
 
@@ -109,7 +110,7 @@ void Floors::find_heights() {
       const std::size_t c = x + g_.nx * z;
       for (std::uint32_t r = g_.first[c]; r < g_.first[c + 1]; ++r) {
         if (label_[r] == kNotWalkable) continue;
-        // A floor's own runs are near its plane already; what is farther is seen through a gap.
+        // A floor's own runs are near its plane. A more distant run is seen through a gap.
         const std::size_t top = g_.runs[r].top(), reach = (label_[r] >= 0 ? 1 : 2) * s_.climb;
         tops.clear();
         for (std::size_t k = z - min<std::size_t>(z, near); k <= min(z + near, g_.nz - 1); ++k) {
@@ -140,8 +141,7 @@ void Floors::level_ramps(std::span<const Piece> pieces, std::vector<Mark>& out) 
     for (const auto& [c, run] : p.runs) ramp_[run] = height_[run];
     ground.insert(ground.end(), p.runs.begin(), p.runs.end());
   }
-  // Treads near a floor's own height are marked as that floor, and the risers between them as no
-  // floor.
+  // Treads near a floor's height are marked as that floor, and the risers between them as no floor.
   std::size_t next = ground.size();
   const auto add = [&](std::size_t c, std::uint32_t run) {
     if (ramp_[run] != kNoLevel) return;
@@ -180,7 +180,7 @@ void Floors::level_ramps(std::span<const Piece> pieces, std::vector<Mark>& out) 
   for (std::size_t i = 0; i < tops.size(); ++i) {
     const auto [c, run] = ground[i];
     SolidRun& r = g_.runs[run];
-    // What stands out may hang above the run below, which it then rests on.
+    // The part that sticks out may hang above the run below. It then rests on that run.
     r.low = min(r.low, run > g_.first[c] ? max(tops[i], g_.runs[run - 1].end) : tops[i]);
     ramp_[run] = max(r.low, tops[i]);
     r.end = min(r.end, static_cast<std::uint16_t>(ramp_[run] + 1));

@@ -11,8 +11,8 @@ namespace gsnav {
 namespace {
 
 constexpr double kMaxCoordinate = 1e9;
-constexpr double kRounding = 1e-9;  // metres
-constexpr double kShortest = 1e-6;  // metres: a remainder below this is not slid
+constexpr double kRounding = 1e-9;  // Metres.
+constexpr double kShortest = 1e-6;  // Metres. Shorter remainders of a step do not slide.
 
 bool valid(const AgentState& a) noexcept {
   return is_finite(a.position) && is_finite(a.radius) && is_finite(a.height) && a.radius >= 0 &&
@@ -20,7 +20,7 @@ bool valid(const AgentState& a) noexcept {
          std::abs(a.position.y) <= kMaxCoordinate && std::abs(a.position.z) <= kMaxCoordinate;
 }
 
-/// Distance of two boxes.
+/// Distance between two boxes.
 double distance(const Aabb<double>& a, const Aabb<double>& b) noexcept {
   double d2 = 0;
   for (int k = 0; k < 3; ++k) {
@@ -37,9 +37,9 @@ struct Stepper {
   const CapsuleSet& bodies;
   SweepRules<double> rules;
   StepResult& out;
-  bool alone = false;  ///< no body is near the way ahead
+  bool alone = false;  ///< True if no body is near the path ahead.
 
-  /// Adds what the agent may touch at a place.
+  /// Extends a box by everything that the agent may touch at a position.
   void add_reach(Aabb<double>& box, const Vec3d& place) const {
     const Capsule<double> solid = agent_capsule(place, agent.radius, agent.height);
     const double reach = solid.radius + 2 * rules.skin + kShortest;
@@ -49,8 +49,8 @@ struct Stepper {
     }
   }
 
-  /// Finds out whether any body is near a way that begins where the agent is. A body whose swept box
-  /// stays away cannot be hit, so leaving all of them out changes no bit.
+  /// Checks whether any body is near a path that begins at the agent. A body whose swept box stays away
+  /// cannot be hit, so ignoring all bodies then changes no bit of the result.
   void look_around(std::span<const WalkPoint> way) {
     alone = bodies.empty();
     if (alone) return;
@@ -60,8 +60,8 @@ struct Stepper {
     alone = !bodies.meets(box);
   }
 
-  /// Sweeps the agent from a to b during [ua, ub]. A body whose swept box stays away cannot be hit, so
-  /// leaving it out changes no bit.
+  /// Sweeps the agent from a to b during [ua, ub]. Bodies whose swept box stays away cannot be hit and
+  /// are skipped.
   FirstImpact<double> sweep_leg(const Vec3d& a, const Vec3d& b, double ua, double ub) const {
     FirstImpact<double> best;
     const Capsule<double> from = agent_capsule(a, agent.radius, agent.height);
@@ -84,20 +84,19 @@ struct Stepper {
   }
 
   void report_contact(const FirstImpact<double>& hit, double u) const {
-    if (out.blocked_by == BlockedBy::capsule) return;  // the first stands
+    if (out.blocked_by == BlockedBy::capsule) return;  // Keep the first contact.
     out.blocked_by = BlockedBy::capsule;
     out.toi = u;
     out.avatar = hit.avatar;
     out.bone = hit.bone;
-    // The sweep's coordinates are relative to the leg's start.
+    // The sweep's coordinates are relative to the start of the leg.
     out.contact_point =
         hit.sweep.point + agent_capsule(out.path.back().position, agent.radius, agent.height).p0;
     out.normal = hit.sweep.normal;
     out.agent_caused = hit.sweep.agent_closing;
   }
 
-  /// Goes from the end of the path to `to`, or as far as bodies permit. Returns the impact that stopped
-  /// it.
+  /// Moves from the end of the path to `to`, or until a body stops the agent. Returns the impact.
   FirstImpact<double> go(const WalkPoint& to) const {
     if (alone) {
       out.path.push_back(to);
@@ -120,13 +119,14 @@ struct Stepper {
     return hit;
   }
 
-  /// Follows a walk until a body stops it. `fraction`, of the walk that was done, counts its legs only:
-  /// the first point may lie off the start (a centimetre above a bump, or where the agent was put), and
-  /// the way onto it is swept too.
+  /// Follows a walk until a body stops it. `fraction` is the part of the walk that was completed,
+  /// counting its legs only. The first point of the walk may differ from the start (up to 1 cm above a
+  /// bump, or where the caller placed the agent); the motion to it is swept too.
   struct Followed {
     FirstImpact<double> hit;
     double fraction = 0;
-    bool turned_back = false;  ///< a wall turned what a body had turned against the desired way
+    bool turned_back = false;  ///< A wall turned the motion, after a body had turned it, against the
+                               ///< desired direction.
   };
   Followed follow(const SurfaceWalk& walk, const Vec3d& desired) const {
     const double begin = out.path.back().fraction, span = 1.0 - begin;
@@ -148,7 +148,7 @@ struct Stepper {
     return done;
   }
 
-  /// The agent stands where it is for the rest of the tick.
+  /// Lets the agent stand for the rest of the tick.
   void stand() const {
     if (alone) return;
     const WalkPoint& at = out.path.back();
@@ -161,7 +161,7 @@ struct Stepper {
   }
 };
 
-/// `motion` (ground plane) without its parts against the contact normals met so far; zero in a corner
+/// Removes from `motion` (ground plane) the parts against the contact normals so far. Zero in a corner
 /// between two.
 Vec3d along_contacts(const Vec3d& motion, const SmallVector<Vec3d, 4>& normals) noexcept {
   Vec3d v = motion;
@@ -175,7 +175,8 @@ Vec3d along_contacts(const Vec3d& motion, const SmallVector<Vec3d, 4>& normals) 
   return v;
 }
 
-/// Walks and slides along bodies until the motion is used up. False where the agent is not on the mesh.
+/// Walks and slides along bodies until the motion is used up. Returns false if the agent is not on the
+/// mesh.
 bool walk_and_slide(const NavMesh& mesh, const Vec3d& desired, const StepOptions& options,
                     Stepper& stepper) {
   StepResult& out = stepper.out;
@@ -193,14 +194,16 @@ bool walk_and_slide(const NavMesh& mesh, const Vec3d& desired, const StepOptions
     const Stepper::Followed done = stepper.follow(walk, desired);
     if (done.turned_back || !done.hit.hit || !options.slide || slides >= options.max_slides) return true;
     const Vec3d n{done.hit.sweep.normal.x, 0, done.hit.sweep.normal.z};
-    if (!(norm(n) > 1e-6)) return true;  // from straight above or below: no way along the ground
+    if (!(norm(n) > 1e-6))
+      return true;  // Contact from directly above or below: there is no direction
+                    // along the ground.
     normals.push_back(normalized(n));
     motion = along_contacts(motion * (1.0 - done.fraction), normals);
     if (!(norm(motion) > kShortest) || !(dot(motion, desired) > 0)) return true;
   }
 }
 
-/// Finds the surface under an agent that does not move. False where there is none.
+/// Finds the surface below an agent that does not move. Returns false if there is none.
 bool stand_on(const NavMesh& mesh, const StepOptions& options, Stepper& stepper) {
   WalkPoint& at = stepper.out.path.back();
   const SurfaceWalk here = mesh.walk({at.position, at.poly}, {}, options.slide);
@@ -233,7 +236,7 @@ StepResult step(const NavMesh& mesh, const AgentState& agent, const Vec3d& asked
   if (options.compat == StepCompat::habitat_gs)
     return detail::step_as_habitat_gs(mesh, agent, desired, bodies, options);
   SweepRules<double> rules;
-  rules.skin = max(options.skin, kRounding);  // points that touch have no direction between them
+  rules.skin = max(options.skin, kRounding);  // Points that touch define no direction between them.
   Stepper stepper{agent, bodies, rules, out};
   out.path.push_back({agent.position, agent.poly, 0.0});
   const double asked = length_xz(desired);
@@ -262,7 +265,7 @@ Clearance clearance(const AgentState& agent, const CapsuleSet& bodies, double t)
   Aabb<double> box;
   box.add(solid.p0 - r);
   box.add(solid.p1 + r);
-  // Begin with the avatar whose box is nearest: most of the others are then too far away to matter.
+  // Begin with the avatar whose box is nearest. Most others are then too far away to matter.
   const std::span<const CapsuleSet::Group> groups = bodies.groups();
   std::size_t first = 0;
   double nearest = std::numeric_limits<double>::infinity();
@@ -274,7 +277,9 @@ Clearance clearance(const AgentState& agent, const CapsuleSet& bodies, double t)
   }
   for (std::size_t i = 0; i < groups.size(); ++i) {
     const CapsuleSet::Group& g = groups[i == 0 ? first : (i <= first ? i - 1 : i)];
-    if (distance(box, g.swept) > max(best.distance, 0.0) + kRounding) continue;  // boxes tell no depth
+    if (distance(box, g.swept) > max(best.distance, 0.0) + kRounding)
+      continue;  // Boxes do not give the
+                 // depth of an overlap.
     nearest_body<double>(solid, bodies.capsules_of(g), u, best);
   }
   return best;

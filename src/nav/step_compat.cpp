@@ -11,7 +11,7 @@ namespace {
 constexpr double kLeastSpacing = 0.05, kMostSamples = 10, kShortest = 1e-6, kBack = 1e-4;
 constexpr int kHalvings = 6;
 
-/// The body that touches an agent at `base`, the first by (avatar, bone), where the tick begins.
+/// First capsule, by (avatar, bone), that touches an agent at `base` at the begin of the tick.
 const DynamicCapsule* touched_at(const Vec3d& base, const AgentState& agent, const CapsuleSet& bodies) {
   const Capsule<double> solid{base, base + Vec3d{0, agent.height, 0}, agent.radius};
   for (const DynamicCapsule& c : bodies.capsules()) {
@@ -55,7 +55,7 @@ StepResult step_as_habitat_gs(const NavMesh& mesh, const AgentState& agent, cons
       }
       const double kept = max(low - kBack, 0.0);
       out.position = from + chord * kept;
-      // Off the surface, perhaps: the polygon that is nearest.
+      // The position may be off the surface. Use the nearest polygon.
       if (const auto near = mesh.snap_point(out.position)) out.poly = near->poly;
       out.blocked_by = BlockedBy::capsule;
       out.toi = kept;

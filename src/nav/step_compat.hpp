@@ -5,7 +5,7 @@
 
 namespace gsnav::detail {
 
-/// See StepCompat::habitat_gs; the input is valid.
+/// See StepCompat::habitat_gs. The input must be valid.
 StepResult step_as_habitat_gs(const NavMesh& mesh, const AgentState& agent, const Vec3d& desired,
                               const CapsuleSet& bodies, const StepOptions& options);
 

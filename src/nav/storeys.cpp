@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Storeys: where floors stand in squares of a metre, and how far each goes on.
+// Storeys: heights of floors in square patches of 1 m, and how far each floor extends.
 #include <algorithm>
 #include <cmath>
 
@@ -9,8 +9,8 @@ namespace gsnav::detail::floors {
 namespace {
 
 constexpr std::size_t kBeside =
-    3;  // patches around a floor in which what is nearer than kApart is furniture
-constexpr double kLeastStorey = 4.0;  // square metres
+    3;  // Number of patches around a floor within which a level nearer than kApart is furniture.
+constexpr double kLeastStorey = 4.0;  // m².
 
 }  // namespace
 
@@ -81,7 +81,7 @@ std::optional<PatchLevel> Floors::fit(std::size_t patch, const PatchLevel& expec
   if (weight < least_columns()) return std::nullopt;
   columns = weight;
   PatchLevel out{expected.storey, max(base + sum / weight, 0.0), expected.gx, expected.gz};
-  // The slope of what lies near that level, by least squares.
+  // Slope of the points near that level, by least squares.
   double n = 0, mu = 0, mv = 0, my = 0;
   const auto near = [&](const Top& t) {
     return std::abs(t.off - (static_cast<std::ptrdiff_t>(best) - reach)) <= 2;
@@ -153,7 +153,7 @@ void Floors::find_storeys() {
     const Seed seed{peak.patch, level};
     grow({&seed, 1}, 1);
     if (storeys_.back().columns >= least) continue;
-    // Too small: what it took is free again.
+    // Too small: release its patches.
     const auto id = static_cast<std::int32_t>(storeys_.size() - 1);
     for (const std::size_t p : storeys_.back().patches) {
       std::erase_if(patches_[p], [&](const PatchLevel& l) { return l.storey == id; });

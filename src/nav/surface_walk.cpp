@@ -5,20 +5,21 @@
 
 #include "poly_mesh.hpp"
 
-// A straight walk crosses convex polygons one after the other; only at a corner or a wall, where it
-// makes no progress, are all polygons around the point looked at. Which of them the direction enters, or
-// along which wall it slides farthest, is then decided without regard to the polygon it came from.
+// A straight walk crosses convex polygons one after the other. Only at a corner or a wall, where it
+// makes no progress, all polygons around the point are examined. The polygon that the direction enters,
+// or the wall along which it slides farthest, is then chosen independently of the polygon that it came
+// from.
 
 namespace gsnav::detail {
 namespace {
 
-constexpr double kTouch = 1e-9;       // metres: closer than this is at it
-constexpr double kParallel = 1e-12;   // sine of an angle
-constexpr std::size_t kMaxFan = 64;   // polygons around one point
-constexpr double kOffSurface = 0.01;  // metres: a leg that leaves the surface by more is cut
+constexpr double kTouch = 1e-9;       // Metres. Closer points coincide.
+constexpr double kParallel = 1e-12;   // Sine of an angle.
+constexpr std::size_t kMaxFan = 64;   // Polygons around one point.
+constexpr double kOffSurface = 0.01;  // Metres. A leg that leaves the surface by more is split.
 
 struct Exit {
-  double t = std::numeric_limits<double>::max();  // in units of the direction given
+  double t = std::numeric_limits<double>::max();  // In units of the given direction.
   std::uint32_t edge = 0;
   bool found = false;
 };
@@ -34,7 +35,7 @@ Exit exit_of(const PolyMesh& m, PolyId id, const Vec3d& p, const Direction& d) n
   Exit best;
   for (std::uint32_t k = 0; k < poly.count; ++k) {
     const Vec3d &a = m.corner(poly, k), &b = m.corner(poly, k + 1);
-    const double nx = b.z - a.z, nz = a.x - b.x;  // outward: corners run counter-clockwise
+    const double nx = b.z - a.z, nz = a.x - b.x;  // Outward normal. Corners are counter-clockwise.
     const double rate = d.x * nx + d.z * nz;
     if (!(rate > 0 && rate * rate > least * (nx * nx + nz * nz))) continue;
     const double t = max(((a.x - p.x) * nx + (a.z - p.z) * nz) / rate, 0.0);
@@ -55,7 +56,7 @@ struct Fan {
   std::size_t count = 0;
 };
 
-/// All polygons that meet at p, reached across edges that touch it.
+/// All polygons that meet at p, found across edges that touch it.
 Fan fan_at(const PolyMesh& m, PolyId start, const Vec3d& p) noexcept {
   Fan fan;
   fan.polys[fan.count++] = start;
@@ -71,7 +72,7 @@ Fan fan_at(const PolyMesh& m, PolyId start, const Vec3d& p) noexcept {
   return fan;
 }
 
-/// The way on from p: the polygon that is entered, the direction and where that leaves the polygon.
+/// Continuation from p: the polygon that is entered, the direction, and where that leaves the polygon.
 struct Way {
   PolyId poly = kNoPoly;
   Direction d{};
@@ -91,7 +92,7 @@ Way enter(const PolyMesh& m, const Fan& fan, const Vec3d& p, const Direction& d)
   return best;
 }
 
-/// The fastest way along a wall that stops d at p; `normal` is set to the wall's.
+/// Fastest motion along a wall that stops direction d at p. Sets `normal` to the wall's normal.
 Way slide_along_wall(const PolyMesh& m, const Fan& fan, const Vec3d& p, const Direction& d, bool slide,
                      Vec3d& normal) noexcept {
   Way best;
@@ -120,18 +121,18 @@ Way slide_along_wall(const PolyMesh& m, const Fan& fan, const Vec3d& p, const Di
   return best;
 }
 
-/// Where a straight leg within a polygon meets sides of its height triangles: the height of the surface
-/// is straight between.
+/// Points where a straight leg inside a polygon crosses sides of its height triangles. Between them the
+/// height of the surface is linear.
 struct Bends {
   struct Bend {
-    double share = 0;  ///< of the leg
-    Vec3d at{};        ///< on the surface
+    double share = 0;  ///< Fraction of the leg.
+    Vec3d at{};        ///< Point on the surface.
   };
   SmallVector<Bend, 16> list;
 
   Bends(const PolyMesh& m, PolyId id, const Vec3d& a, const Vec3d& b) {
-    // A leg along the rim may run outside of all triangles by a rounding, or past a sample that lies
-    // beside its side: what is nearly met counts, and costs no more than a look at the height there.
+    // By rounding, a leg along the boundary may run outside of all triangles, or past a sample next to
+    // its side. Near misses therefore count; they cost one lookup of the height.
     constexpr double kNearly = -0.1;
     const PolyMesh::Poly& poly = m.polys[id];
     for (std::uint32_t i = poly.tri_first; i < poly.tri_first + poly.tri_count; ++i) {
@@ -143,7 +144,7 @@ struct Bends {
       };
       const std::array<double, 3> from = shares(a), to = shares(b);
       if (min(min(from[0], from[1]), from[2]) >= 0 && min(min(to[0], to[1]), to[2]) >= 0) {
-        list.clear();  // all of it in one
+        list.clear();  // The whole leg lies in one triangle.
         return;
       }
       for (std::size_t k = 0; k < 3; ++k) {
@@ -161,8 +162,8 @@ struct Bends {
     std::sort(list.begin(), list.end(), [](const Bend& p, const Bend& q) { return p.share < q.share; });
   }
 
-  /// Calls f(bend) for those without which the way over bends [first, end) from a to b would leave the
-  /// surface, in order.
+  /// Calls f(bend), in order, for the bends in [first, end) without which the path from a to b would
+  /// leave the surface.
   template <class F>
   void each(const Bend& a, const Bend& b, std::size_t first, std::size_t end, const F& f) const {
     std::size_t worst = end;
@@ -233,7 +234,8 @@ void PolyMesh::walk(PolyId start_poly, const Vec3d& start, double dx, double dz,
     arrive(to, poly, 1.0 - left, ends_here ? 1.0 : 1.0 - (left - t));
     if (ends_here) break;
     left -= t;
-    // The point keeps the polygon of the leg that leads to it: whoever cuts that leg short stands on it.
+    // The point keeps the polygon of the leg that leads to it. If that leg is cut short, the agent
+    // stands on it.
     const PolyId next = neighbours[polys[poly].first + way.exit.edge];
     if (next != kNoPoly) poly = next;
   }

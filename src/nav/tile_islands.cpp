@@ -9,8 +9,8 @@
 namespace gsnav::detail {
 namespace {
 
-/// Keeps the polygons of a tile that `drop` does not name. Those lie on other islands: no neighbour is
-/// lost.
+/// Removes the polygons of a tile marked in `drop`. These lie on other islands, so the rest keeps all
+/// its neighbours.
 void keep_others(TilePolygons& tile, const std::vector<bool>& drop) {
   rcPolyMesh& m = *tile.polys;
   rcPolyMeshDetail& d = *tile.heights;
@@ -41,7 +41,7 @@ void keep_others(TilePolygons& tile, const std::vector<bool>& drop) {
 }  // namespace
 
 bool drop_small_islands(const dtNavMesh& mesh, double least, std::span<TilePolygons> tiles) {
-  std::vector<TilePolygons*> of;  // Detour's tiles
+  std::vector<TilePolygons*> of;  // Tiles as Detour numbers them.
   std::vector<std::size_t> first;
   std::size_t count = 0;
   for (TilePolygons& t : tiles) {
@@ -52,7 +52,7 @@ bool drop_small_islands(const dtNavMesh& mesh, double least, std::span<TilePolyg
   }
   std::vector<bool> seen(count, false);
   std::vector<std::vector<bool>> drop(of.size());
-  using Poly = std::pair<std::size_t, std::size_t>;  // tile, polygon
+  using Poly = std::pair<std::size_t, std::size_t>;  // Tile and polygon.
   std::vector<Poly> island;
   std::vector<std::pair<std::size_t, unsigned short>> regions;
   bool any = false;

@@ -7,9 +7,9 @@
 
 namespace gsnav::detail {
 
-/// Takes islands of fewer cells than `least` out of the tiles that `mesh` was made of, in order. Recast
-/// does so within a tile, and keeps what touches a tile's border whatever its size. True where there
-/// were any.
+/// Removes islands with fewer than `least` cells from the tiles that `mesh` was made from, in order.
+/// Recast does so inside a tile, but keeps islands of any size that touch the tile's border. Returns
+/// true if any island was removed.
 bool drop_small_islands(const dtNavMesh& mesh, double least, std::span<TilePolygons> tiles);
 
 }  // namespace gsnav::detail

@@ -11,12 +11,12 @@
 namespace gsnav::detail {
 namespace {
 
-constexpr double kSame = 1e-3;  // metres: vertices of two tiles that are one
+constexpr double kSame = 1e-3;  // Metres. Vertices of two tiles that are closer coincide.
 
 using Triangle = PolyMesh::Corners;
-using Points = std::vector<std::uint32_t>;  // of the mesh
+using Points = std::vector<std::uint32_t>;  // Indices into the mesh's points.
 
-/// A border's line on the ground plane, in metres from where it begins.
+/// Line of a border on the ground plane. Positions are in metres from its start.
 class Line {
  public:
   Line(const Vec3d& a, const Vec3d& b)
@@ -40,8 +40,8 @@ class Seams {
 
   void close() {
     weld();
-    // Where many polygons lie on one another, as in files that nobody built, no more than half as many
-    // are added, nor more than there are points.
+    // Limit the triangles that are added, by half their number and by the number of points. Files not
+    // made by Recast may stack many polygons.
     left_ = min(m_.tris.size() / 2, m_.points.size()) + 8;
     extra_.resize(m_.polys.size());
     each_seam([&](PolyId p, PolyId q, const Line& line) {
@@ -57,7 +57,7 @@ class Seams {
   }
 
  private:
-  /// f(p, q, line) for each stretch of border, p the first of the two polygons.
+  /// Calls f(p, q, line) for each part of a border, where p and q are its polygons and p < q.
   template <class F>
   void each_seam(const F& f) {
     for (PolyId p = 0; p < m_.polys.size(); ++p) {
@@ -71,12 +71,12 @@ class Seams {
     }
   }
 
-  /// Makes one vertex of those of several tiles that meet on borders, in all polygons that have them.
+  /// Merges vertices of several tiles that meet on borders, in all polygons that have them.
   void weld() {
-    using Key = std::pair<std::uint32_t, std::array<double, 3>>;  // tile, place
+    using Key = std::pair<std::uint32_t, std::array<double, 3>>;  // Tile and position.
     std::map<Key, std::size_t> number;
     std::vector<Vec3d> place;
-    std::vector<std::size_t> same;  // an earlier vertex, or itself
+    std::vector<std::size_t> same;  // Index of an earlier vertex, or the vertex itself.
     const auto root = [&](std::size_t i) {
       while (same[i] != i) i = same[i] = same[same[i]];
       return i;
@@ -116,7 +116,7 @@ class Seams {
     }
   }
 
-  /// Moves a polygon's corners on the border to its height triangles' there.
+  /// Moves a polygon's corners on the border to those of its height triangles.
   void settle(PolyId id, const Line& line) {
     const Points fixed = vertices_on(id, line);
     const PolyMesh::Poly& poly = m_.polys[id];
@@ -127,7 +127,8 @@ class Seams {
     }
   }
 
-  /// The nearest on the ground plane of those that are the same as v; null where none is.
+  /// Point of the list nearest to v on the ground plane, among those that coincide with v. Null if there
+  /// is none.
   const Vec3d* nearest(const Vec3d& v, const Points& list) const noexcept {
     const Vec3d* best = nullptr;
     double least = kSame;
@@ -141,7 +142,7 @@ class Seams {
     return best;
   }
 
-  /// Vertices of the height triangles of a polygon within the stretch, each once.
+  /// Distinct vertices of the height triangles of a polygon on this part of the border.
   Points vertices_on(PolyId id, const Line& line) const {
     Points out;
     each_triangle(id, [&](const Triangle& t) {
@@ -165,7 +166,7 @@ class Seams {
     }
   }
 
-  /// Splits the height triangle of a polygon that has point v inside its side on the border.
+  /// Splits the height triangle of a polygon whose side on the border contains point v.
   void insert(PolyId id, std::uint32_t v, const Line& line) {
     if (left_ == 0) return;
     const double at = line.along(m_.points[v]);
@@ -188,7 +189,7 @@ class Seams {
       if (split(m_.tris[poly.tri_first + t])) return;
     }
     for (std::size_t t = 0; t < extra_[id].size(); ++t) {
-      Triangle one = extra_[id][t];  // the list grows
+      Triangle one = extra_[id][t];  // A copy, because the list grows.
       if (!split(one)) continue;
       extra_[id][t] = one;
       return;
@@ -212,7 +213,7 @@ class Seams {
 
   PolyMesh& m_;
   const std::vector<std::uint32_t>& tile_of_;
-  std::vector<std::vector<Triangle>> extra_;  ///< by polygon
+  std::vector<std::vector<Triangle>> extra_;  ///< By polygon.
   std::size_t left_ = 0;
 };
 

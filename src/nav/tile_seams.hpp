@@ -7,9 +7,10 @@
 
 namespace gsnav::detail {
 
-/// Makes one surface of a mesh of tiles, before PolyMesh::finish: along a border both sides get the
-/// vertices of either, in the very same places. Recast samples each tile's heights for itself, and
-/// Detour joins edges that share a stretch. `tile_of` is each polygon's tile.
+/// Joins the surfaces of tiles: along a border, both sides get the vertices of both at identical
+/// positions. This is needed because Recast samples the heights of each tile separately, and Detour
+/// joins edges that only partly overlap. Call before PolyMesh::finish().
+/// @param tile_of Tile of each polygon.
 void close_seams(PolyMesh& mesh, const std::vector<std::uint32_t>& tile_of);
 
 }  // namespace gsnav::detail

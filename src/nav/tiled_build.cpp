@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The build in tiles. Each looks at a border of the agent's radius and three cells around it, so that
-// erosion and filters see what they would see in one tile: the same cells can be walked on.
+// Builds in tiles. Each tile includes a border of the agent's radius plus three cells, so that erosion
+// and filters see the same context as in a single tile. The walkable cells are therefore the same.
 #include <algorithm>
 #include <functional>
 #include <mutex>
@@ -17,14 +17,14 @@
 namespace gsnav::detail {
 namespace {
 
-constexpr int kBesideRadius = 3;  // cells that the border has beyond the agent's radius
+constexpr int kBesideRadius = 3;  // Cells of the border in addition to the agent's radius.
 
 /// Tiles over a box, on one lattice of cells.
 struct TileGrid {
   const NavMeshSettings& settings;
   Aabb<double> box;
-  int border = 0, nx = 0, nz = 0;  ///< tiles
-  int width = 0, depth = 0;        ///< cells of the box
+  int border = 0, nx = 0, nz = 0;  ///< `border` in cells; `nx` and `nz` are numbers of tiles.
+  int width = 0, depth = 0;        ///< Size of the box in cells.
 
   TileGrid(const NavMeshSettings& s, const Aabb<double>& b)
       : settings(s), box(b), border(VoxelSettings(s).radius + kBesideRadius) {
@@ -37,7 +37,7 @@ struct TileGrid {
     return static_cast<std::size_t>(nx) * static_cast<std::size_t>(nz);
   }
   double side() const noexcept { return settings.tile_size * settings.cell_size; }
-  /// The tile's own box, `cells` wider on each side.
+  /// Box of a tile, enlarged by `cells` on each side.
   Aabb<double> box_of(std::size_t tile, int cells) const noexcept {
     const auto columns = static_cast<std::size_t>(nx);
     const double x = static_cast<double>(tile % columns), z = static_cast<double>(tile / columns);
@@ -45,8 +45,8 @@ struct TileGrid {
     return {{box.low.x + x * side() - rim, box.low.y, box.low.z + z * side() - rim},
             {box.low.x + (x + 1) * side() + rim, box.high.y, box.low.z + (z + 1) * side() + rim}};
   }
-  /// Takes what lies beyond the box's cells out of a tile with its border: a triangle that ends with the
-  /// box touches one cell more.
+  /// Clears cells of a tile and its border that lie outside the box. A triangle that ends at the
+  /// boundary of the box touches one cell more.
   void clip(std::size_t tile, rcHeightfield& field) const noexcept {
     const auto columns = static_cast<std::size_t>(nx);
     const int x0 = static_cast<int>(tile % columns) * settings.tile_size - border;
@@ -54,7 +54,7 @@ struct TileGrid {
     for (int z = 0; z < field.height; ++z) {
       for (int x = 0; x < field.width; ++x) {
         const bool inside = x0 + x >= 0 && z0 + z >= 0 && x0 + x < width && z0 + z < depth;
-        if (!inside) field.spans[x + z * field.width] = nullptr;  // the field keeps its pools
+        if (!inside) field.spans[x + z * field.width] = nullptr;  // The field keeps its pools.
       }
     }
   }
@@ -72,7 +72,8 @@ struct TileGrid {
   }
 };
 
-/// Triangles of each tile with its border, in the order of the input: on that depends what a span is.
+/// Triangles of each tile with its border, in the order of the input, because spans depend on that
+/// order.
 struct TriangleLists {
   std::vector<std::size_t> first;
   std::vector<std::uint32_t> triangles;
@@ -146,7 +147,7 @@ Result<NavMeshPtr> link_tiles(const TileGrid& grid, std::span<const TilePolygons
       return no_memory();
     (void)tile->release();  // NOLINT: Detour frees it
   }
-  // Detour reckons with three neighbours an edge of a border and leaves out silently what is more.
+  // Detour provides for three neighbours per border edge and silently omits further ones.
   for (int t = 0; t < params.maxTiles; ++t) {
     const dtMeshTile& tile = *std::as_const(*mesh).getTile(t);
     if (tile.linksFreeList != DT_NULL_LINK) continue;
@@ -157,7 +158,7 @@ Result<NavMeshPtr> link_tiles(const TileGrid& grid, std::span<const TilePolygons
   return mesh;
 }
 
-/// Polygons of one tile.
+/// Builds the polygons of one tile.
 Result<TilePolygons> build_tile(const TileGrid& grid, const TriangleLists& lists, std::size_t tile,
                                 std::span<const Vec3d> vertices,
                                 std::span<const NavMesh::Triangle> triangles, const Vec3d& origin,
@@ -193,8 +194,8 @@ Result<NavMesh> build_in_tiles(const NavMeshSettings& settings, std::span<const 
   std::vector<TilePolygons> tiles(grid.count());
   std::vector<Status> failed(tiles.size() + 1);
   std::optional<TriangleHeights> heights;
-  // The most work first, so that no thread is left with it at the end. Piece 0, the heights, has all
-  // triangles but does a twentieth as much with each as a tile.
+  // Largest pieces first, so that no thread is left with one at the end. Piece 0 computes the heights.
+  // It reads all triangles, with about a twentieth of a tile's work for each.
   std::vector<std::pair<std::size_t, std::uint32_t>> work{{triangles.size() / 20, 0}};
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     work.emplace_back(lists.first[i + 1] - lists.first[i], static_cast<std::uint32_t>(i + 1));

@@ -52,7 +52,7 @@ TimedPlan plan_in_time(const NavMesh& mesh, const AgentState& agent, const Vec3d
     own = std::move(*made);
     field = &*own;
   }
-  // Nearer than the margin to somebody, the agent may at least not be touched.
+  // If the agent starts nearer to a body than the margin, only avoid contact.
   double margin = o.margin;
   const double gap =
       clearance({start.position, agent.radius, agent.height, start.poly}, ticks[0], ticks[0].t0())

@@ -15,9 +15,9 @@
 
 namespace gsnav::detail {
 
-/// Safe-interval search for plan_in_time: places are those of the static path and of a lattice around
-/// it, states a place and one of the intervals in which it is safe to stand there, each with the
-/// earliest arrival.
+/// Safe-interval search for plan_in_time. Places lie on the shortest path and on a lattice around it. A
+/// state is a place with one of the intervals in which it is safe to stand there, and the earliest
+/// arrival.
 class TimeSearch {
  public:
   TimeSearch(const NavMesh& mesh, const TimedBodies& bodies, const GeodesicField& field,
@@ -46,7 +46,7 @@ class TimeSearch {
     plan.states = states_.size();
     if (best == kNone) {
       plan.status = open_.empty() ? TimedPlanStatus::caught : TimedPlanStatus::gave_up;
-      if (latest == kNone) latest = 0;  // not even the start was looked at
+      if (latest == kNone) latest = 0;  // Not even the start was expanded.
       trace(latest, plan);
       stay(states_[latest], plan);
       return plan;
@@ -62,32 +62,33 @@ class TimeSearch {
   }
 
  private:
-  static constexpr double kSame = 1e-6;   // metres
-  static constexpr double kStorey = 0.5;  // metres: lattice points closer than this in height are one
+  static constexpr double kSame = 1e-6;   // Metres.
+  static constexpr double kStorey = 0.5;  // Metres. Lattice points with a smaller height difference
+                                          // coincide.
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
-  /// The way from one place to the next along the surface; no points where a wall is in it.
+  /// Path from one place to the next along the surface. Empty if a wall is in between.
   using Leg = WalkPoints;
-  /// Ticks [first, last) during which somebody who stands there is clear of all.
+  /// Ticks [first, last) during which an agent that stands there meets no body.
   struct Interval {
     std::size_t first = 0, last = 0;
     std::size_t arrival = std::numeric_limits<std::size_t>::max();
   };
   struct Place {
     NavPoint point;
-    double left = 0;  ///< to the goal along the surface, metres
+    double left = 0;  ///< Distance to the goal along the surface, metres.
     std::int64_t column = 0, row = 0;
     bool in_lattice = false;
-    std::uint32_t next = kNone;  ///< on the static path
+    std::uint32_t next = kNone;  ///< Next place on the shortest path.
     std::vector<Interval> safe;
   };
   struct State {
     std::uint32_t place = 0;
     std::uint32_t interval = 0;
     std::size_t tick = 0;
-    std::size_t left = 0;  ///< when it left the parent's place
+    std::size_t left = 0;  ///< Tick at which the parent's place was left.
     std::uint32_t parent = kNone;
-    bool rests = false;  ///< until the end of what is known
+    bool rests = false;  ///< Stays until the end of the known motion.
   };
 
   std::size_t arrival(std::uint32_t place, std::uint32_t interval) const {
@@ -108,12 +109,12 @@ class TimeSearch {
     return static_cast<std::uint32_t>(places_.size() - 1);
   }
 
-  /// The places of the static path, no farther apart than a cell, as far as the known motion allows.
+  /// Creates the places of the shortest path, at most a cell apart, as far as the known motion allows.
   void follow(const NavPoint& start, const NavPoint& goal, const NavPath& path) {
     const double time = bodies_.begin(bodies_.ticks()) - bodies_.begin(0),
                  reach = o_.speed * time + o_.cell;
     const double tick = o_.speed * bodies_.seconds(0);
-    // Whole ticks, so that none is lost on the way from one to the next.
+    // Use whole ticks, so that no time is lost between places.
     const double spacing = max(std::floor(o_.cell / max(tick, 1e-9)), 1.0) * tick;
     std::uint32_t last = add(start);
     places_[last].in_lattice = true;
@@ -154,14 +155,14 @@ class TimeSearch {
       if (place.safe[i].first <= s.tick && s.tick <= place.safe[i].last) interval = i;
     }
     if (s.place == goal_ || s.tick == bodies_.ticks()) {
-      // Nobody has to stand there afterwards.
+      // The agent need not stand there afterwards.
       if (interval == kNone) {
         place.safe.push_back({s.tick, s.tick});
         interval = static_cast<std::uint32_t>(place.safe.size() - 1);
       }
     } else if (interval == kNone) {
       if (s.parent != kNone) return;
-      place.safe.push_back({s.tick, s.tick});  // the start, from which the first leg may lead at once
+      place.safe.push_back({s.tick, s.tick});  // The start, which the first leg may leave at once.
       interval = static_cast<std::uint32_t>(place.safe.size() - 1);
     }
     std::size_t& known = place.safe[interval].arrival;
@@ -208,7 +209,7 @@ class TimeSearch {
         }
       }
     } else {
-      // Off the lattice: to the points of the cell that it is in.
+      // Off the lattice: try the corners of its cell.
       const Vec3d origin = places_[0].point.position;
       const auto c0 = static_cast<std::int64_t>(std::floor((here.x - origin.x) / o_.cell));
       const auto r0 = static_cast<std::int64_t>(std::floor((here.z - origin.z) / o_.cell));
@@ -218,7 +219,7 @@ class TimeSearch {
     }
   }
 
-  /// The lattice's place that is straight ahead of `from`; kNone where a wall is between.
+  /// Lattice place at a cell, reached straight from `from`. kNone if a wall is in between.
   std::uint32_t lattice_place(std::uint32_t from, std::int64_t column, std::int64_t row) {
     const Vec3d origin = places_[0].point.position, here = places_[from].point.position;
     auto& known = in_cell_[{column, row}];
@@ -244,13 +245,14 @@ class TimeSearch {
     return walk.points;
   }
 
-  /// Leaves as soon as the leg is clear, while it is safe to wait, for each time in which it may arrive.
+  /// Departs as soon as the leg is clear, while waiting is safe, once for each safe interval in which it
+  /// may arrive.
   void depart(std::uint32_t s, std::uint32_t to, const Leg& leg) {
     const State at = states_[s];
     const std::size_t until = places_[at.place].safe[at.interval].last;
     double length = 0;
     for (std::size_t i = 1; i < leg.size(); ++i) length += norm(leg[i].position - leg[i - 1].position);
-    const auto ticks_from = [&](std::size_t k) {  // 0: not within what is known
+    const auto ticks_from = [&](std::size_t k) {  // Returns 0 if the known motion ends before.
       double seconds = 0;
       for (std::size_t n = k; n < bodies_.ticks(); ++n) {
         seconds += bodies_.seconds(n);
@@ -262,7 +264,7 @@ class TimeSearch {
     for (std::size_t k = at.tick; k <= until && k < bodies_.ticks(); ++k) {
       const std::size_t count = ticks_from(k);
       if (count == 0) return;
-      // Only one arrival in each safe interval is of use: the first.
+      // Only the first arrival in each safe interval matters.
       const auto& safe = places_[to].safe;
       std::size_t interval = safe.size();
       for (std::size_t i = 0; i < safe.size(); ++i) {
@@ -306,7 +308,7 @@ class TimeSearch {
     return leg.back().position;
   }
 
-  /// The points up to a state: a wait where it left later than it came.
+  /// Writes the points up to a state, with a wait where a place was left later than reached.
   void trace(std::uint32_t state, TimedPlan& plan) const {
     std::vector<std::uint32_t> chain;
     for (std::uint32_t s = state; s != kNone; s = states_[s].parent) chain.push_back(s);
@@ -322,7 +324,7 @@ class TimeSearch {
       plan.points.push_back({p.position, p.poly, bodies_.begin(at.tick)});
     }
   }
-  /// Waits as long as that is safe.
+  /// Waits as long as it is safe.
   void stay(const State& at, TimedPlan& plan) const {
     const double until = bodies_.begin(last_tick(at));
     if (until > plan.points.back().time) {

@@ -10,10 +10,10 @@
 
 namespace gsnav::detail {
 
-/// The bodies of consecutive ticks as an agent of one size meets them.
+/// Bodies of consecutive ticks, for collision tests of an agent with one size.
 class TimedBodies {
  public:
-  /// `margin` metres beyond touching count as contact.
+  /// Prepares the bodies. A distance of less than `margin` metres counts as contact.
   TimedBodies(std::span<const CapsuleSet> ticks, double radius, double height, double margin)
       : ticks_(ticks), radius_(min(radius, 0.5 * height)), height_(height), margin_(margin) {
     for (const CapsuleSet& tick : ticks_) {
@@ -28,8 +28,9 @@ class TimedBodies {
   }
   double seconds(std::size_t tick) const noexcept { return ticks_[tick].t1() - ticks_[tick].t0(); }
 
-  /// Whether nobody is met on the way from a to b during a tick, which takes all of it; `path` are the
-  /// points between where it is no straight line, with their fractions of the tick.
+  /// Returns true if no body is met on the way from a to b during a tick. The motion takes the whole
+  /// tick.
+  /// @param path Points in between if the way is not straight, with their fractions of the tick.
   bool clear(std::size_t tick, const Vec3d& a, const Vec3d& b,
              std::span<const WalkPoint> path = {}) const {
     const Aabb<double> box = swept(a, b, path);
@@ -44,9 +45,9 @@ class TimedBodies {
   }
 
  private:
-  static constexpr double kRounding = 1e-3;  // metres
+  static constexpr double kRounding = 1e-3;  // Metres.
 
-  /// A disc on the ground that moves evenly and holds a body throughout a tick.
+  /// Disc on the ground that moves linearly and contains a body during a tick.
   struct MovingDisc {
     double x0 = 0, z0 = 0, x1 = 0, z1 = 0, radius = 0;
   };
@@ -59,7 +60,8 @@ class TimedBodies {
       d.x1 += share * (c.motion.end.p0.x + c.motion.end.p1.x);
       d.z1 += share * (c.motion.end.p0.z + c.motion.end.p1.z);
     }
-    // Ends of a capsule move evenly, too: farthest from the middle at the beginning or the end.
+    // The ends of a capsule move linearly too, so they are farthest from the centre at the begin or the
+    // end.
     for (const DynamicCapsule& c : capsules) {
       const double r = max(c.motion.begin.radius, c.motion.end.radius);
       for (const Vec3d& p : {c.motion.begin.p0, c.motion.begin.p1}) {
@@ -72,7 +74,7 @@ class TimedBodies {
     return d;
   }
 
-  /// True where the way stays away from the disc: what is in it need not be looked at.
+  /// Returns true if the way stays away from the disc. Its capsules can then be skipped.
   bool passes(const MovingDisc& d, const Vec3d& a, const Vec3d& b,
               std::span<const WalkPoint> path) const noexcept {
     const double reach = d.radius + radius_ + margin_ + kRounding;
@@ -118,8 +120,8 @@ class TimedBodies {
     }
     return true;
   }
-  /// Whether first_impact() would have something to report of this body: the first evaluation says so of
-  /// most.
+  /// Returns true if first_impact() would report this body. For most bodies the first evaluation
+  /// decides.
   static bool meets(const MovingCapsule<double>& agent, const MovingCapsule<double>& body, double u0,
                     double u1) noexcept {
     constexpr SweepRules<double> rules;
@@ -142,8 +144,8 @@ class TimedBodies {
 
   std::span<const CapsuleSet> ticks_;
   double radius_, height_, margin_;
-  std::vector<MovingDisc> discs_;   ///< of each tick's groups
-  std::vector<std::size_t> first_;  ///< of each tick
+  std::vector<MovingDisc> discs_;   ///< For each tick, its groups.
+  std::vector<std::size_t> first_;  ///< Begin of each tick in `discs_`.
 };
 
 }  // namespace gsnav::detail

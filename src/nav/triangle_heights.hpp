@@ -12,10 +12,10 @@
 namespace gsnav::detail {
 
 /// Heights of the triangles that a NavMesh was built from. Recast places its surface on the tops of
-/// voxels, up to a cell height above the floor; this gives the floor back.
+/// voxels, up to one cell height above the floor. This class recovers the floor.
 class TriangleHeights {
  public:
-  /// Positions relative to `origin`; `box` holds them all.
+  /// Stores the triangles with positions relative to `origin`. `box` must contain them all.
   TriangleHeights(std::span<const Vec3d> vertices, std::span<const NavMesh::Triangle> triangles,
                   const Vec3d& origin, const Aabb<double>& box)
       : low_(box.low) {
@@ -64,7 +64,7 @@ class TriangleHeights {
   std::size_t index(double v, std::size_t n) const noexcept {
     return static_cast<std::size_t>(clamp(v / side_, 0.0, static_cast<double>(n - 1)));
   }
-  /// f(cell) for each that the box of a triangle reaches into.
+  /// Calls f(cell) for each cell that the box of a triangle overlaps.
   template <class F>
   void each_cell(const std::array<Vec3d, 3>& p, const F& f) const {
     const std::size_t x0 = index(min(p[0].x, min(p[1].x, p[2].x)) - low_.x, nx_);
@@ -76,7 +76,7 @@ class TriangleHeights {
     }
   }
   static bool covers(const std::array<Vec3d, 3>& t, const Vec3d& p) noexcept {
-    constexpr double kRounding = -1e-6;  // square metres: seams between triangles belong to both
+    constexpr double kRounding = -1e-6;  // m². Seams between triangles belong to both.
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec3d &a = t[k], &b = t[(k + 1) % 3];
       // Facing up is clockwise in (x, z).
@@ -89,7 +89,8 @@ class TriangleHeights {
   double side_ = 1.0;
   std::size_t nx_ = 1, nz_ = 1;
   std::vector<std::uint32_t> first_,
-      in_cells_;  ///< of each cell in `in_cells_`, and one past the last; faces
+      in_cells_;  ///< `first_`: begin of each cell in `in_cells_`, and one past the last. `in_cells_`:
+                  ///< indices of faces.
   std::vector<Face> faces_;
   std::vector<std::array<Vec3d, 3>> corners_;
 };

@@ -13,12 +13,12 @@
 namespace gsnav::detail {
 namespace {
 
-constexpr double kWeld = 1e-4;      // metres: points of an edge closer than this are one
-constexpr double kStraight = 1e-9;  // radians
+constexpr double kWeld = 1e-4;      // Metres. Closer points of an edge coincide.
+constexpr double kStraight = 1e-9;  // Radians.
 constexpr double kPi = 3.14159265358979323846;
 constexpr std::uint64_t kWall = ~std::uint64_t{0};
 
-/// The neighbour's edge that lies against edge k of a polygon, kNone at a wall.
+/// Edge of the neighbour that lies against edge k of a polygon. kNone at a wall.
 std::uint32_t opposite(const PolyMesh& m, const PolyMesh::Poly& p, PolyId id, std::uint32_t k) {
   const PolyId other = m.neighbours[p.first + k];
   if (other == kNoPoly) return UnfoldedMesh::kNone;
@@ -37,14 +37,14 @@ std::uint32_t opposite(const PolyMesh& m, const PolyMesh::Poly& p, PolyId id, st
   return found;
 }
 
-/// A point at which an edge of a polygon is cut.
+/// Point at which an edge of a polygon is cut.
 struct Cut {
-  double t = 0;           ///< share of the edge's length
-  std::uint64_t key = 0;  ///< of the stretch up to the next cut, the same on both sides; kWall at a wall
+  double t = 0;           ///< Fraction of the edge's length.
+  std::uint64_t key = 0;  ///< Key of the part up to the next cut, equal on both sides. kWall at a wall.
 };
-using Cuts = std::vector<std::vector<Cut>>;  ///< [edge of a polygon]
+using Cuts = std::vector<std::vector<Cut>>;  ///< Indexed by the edge of a polygon.
 
-/// Where the parts of edge e, and those of the neighbour's edge f against it, begin and end.
+/// Begins and ends of the parts of edge e and of the neighbour's edge f against it.
 std::vector<double> cut_places(const PolySheets& sheets, std::uint32_t e, std::uint32_t f,
                                double length) {
   std::vector<double> at;
@@ -59,8 +59,8 @@ std::vector<double> cut_places(const PolySheets& sheets, std::uint32_t e, std::u
   return at;
 }
 
-/// Neighbours may have their corners at different places of a common edge. Cuts both sides at all of
-/// them, so that the stretches between are twins.
+/// Cuts both sides of a common edge at the corners of both neighbours, which may be at different
+/// positions. The parts in between then become twins.
 Cuts cut_edges(const PolyMesh& mesh, const PolySheets& sheets) {
   constexpr std::uint32_t none = UnfoldedMesh::kNone;
   Cuts cuts(mesh.corners.size());
@@ -76,14 +76,14 @@ Cuts cut_edges(const PolyMesh& mesh, const PolySheets& sheets) {
         if (f != none) cuts[f].push_back({1 - t, keys - 1});
         ++keys;
       }
-      // Seen from its other end, a stretch begins at the next cut.
+      // Seen from its other end, a part begins at the next cut.
       if (f != none) std::reverse(cuts[f].begin(), cuts[f].end());
     }
   }
   return cuts;
 }
 
-/// Makes a face of each sheet, with an edge for each stretch between cuts.
+/// Makes a face from each sheet, with one edge per part between cuts.
 class FaceMaker {
  public:
   FaceMaker(const PolyMesh& mesh, const Cuts& cuts, UnfoldedMesh& out)
@@ -114,7 +114,7 @@ class FaceMaker {
     out_.faces.push_back(face);
   }
 
-  /// After the last polygon.
+  /// Joins the polygons. Call after the last one.
   void join_polygons() {
     begin_polygon();
     std::sort(keyed_.begin(), keyed_.end());
@@ -137,7 +137,7 @@ class FaceMaker {
     out_.edges[f].twin = e;
   }
 
-  /// An edge between two sheets of one polygon.
+  /// Adds an edge between two sheets of one polygon.
   void add_inner_edge(const Vec3d& a, const Vec3d& b) {
     const std::uint32_t e = add_edge(a);
     const auto twin = inner_.find({b.x, b.y, b.z, a.x, a.y, a.z});
@@ -148,7 +148,7 @@ class FaceMaker {
     }
   }
 
-  /// The edges of a sheet from a to b, on edge `side` of the polygon.
+  /// Adds the edges of a sheet from a to b, on edge `side` of the polygon.
   void add_stretches(const PolyMesh::Poly& poly, std::uint32_t side, const Vec3d& a, const Vec3d& b) {
     const std::vector<Cut>& cut = cuts_[poly.first + side];
     const Vec3d &p = mesh_.corner(poly, side), &q = mesh_.corner(poly, side + 1);
@@ -170,8 +170,9 @@ class FaceMaker {
   const PolyMesh& mesh_;
   const Cuts& cuts_;
   UnfoldedMesh& out_;
-  std::map<std::array<double, 6>, std::uint32_t> inner_;  ///< edge by its ends, of the polygon at hand
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> keyed_;  ///< (key of the stretch, edge)
+  std::map<std::array<double, 6>, std::uint32_t> inner_;  ///< Edges of the current polygon by their
+                                                          ///< ends.
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> keyed_;  ///< Pairs (key of the part, edge).
 };
 
 }  // namespace
@@ -219,8 +220,8 @@ void UnfoldedMesh::unfold() {
 }
 
 void UnfoldedMesh::fan_out() {
-  // Polygons of a file may overlap, so that an edge is the twin of two others. Where the two edges are
-  // not each other's twins, they are walls.
+  // Polygons of a file may overlap, so that an edge is the twin of two others. Edges that are not mutual
+  // twins become walls.
   std::vector<std::uint32_t> twins(edges.size());
   for (std::uint32_t e = 0; e < edges.size(); ++e) twins[e] = edges[e].twin;
   for (std::uint32_t e = 0; e < edges.size(); ++e) {

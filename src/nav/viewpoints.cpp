@@ -12,13 +12,13 @@ namespace gsnav {
 
 namespace {
 
-/// Places tried along each axis of a cube.
+/// Positions tried along each axis of a cube.
 constexpr int kTries = 4;
 
 using Key = std::array<std::int64_t, 3>;
 
 struct Choice {
-  double distance;  // squared, from the middle of the cube, on the ground plane
+  double distance;  // Squared distance from the middle of the cube on the ground plane.
   Vec3d place;
 };
 
@@ -37,7 +37,7 @@ void offer(std::map<Key, Choice>& chosen, const Vec3d& floor, double height, dou
   if (!is_new && order(here) < order(at->second)) at->second = here;
 }
 
-/// f(point) for the points of a lattice of `step` on a triangle, and for its centroid.
+/// Calls f(point) for the centroid of a triangle and for points on it of a lattice with spacing `step`.
 template <class F>
 void for_each_place(const std::array<Vec3d, 3>& t, double step, const F& f) {
   f((t[0] + t[1] + t[2]) * (1.0 / 3));
@@ -45,7 +45,7 @@ void for_each_place(const std::array<Vec3d, 3>& t, double step, const F& f) {
   const double area = (t[1].x - t[0].x) * (t[2].z - t[0].z) - (t[2].x - t[0].x) * (t[1].z - t[0].z);
   if (area == 0) return;
   const auto depth = std::minmax({t[0].z, t[1].z, t[2].z});
-  // Half a step aside, so that some place is near the middle of every cube.
+  // Offset by half a step, so that some position is near the middle of every cube.
   const auto first = [step](double low) { return (std::ceil(low / step - 0.5) + 0.5) * step; };
   for (double x = first(ends.first); x <= ends.second; x += step) {
     for (double z = first(depth.first); z <= depth.second; z += step) {

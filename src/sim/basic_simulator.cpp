@@ -6,7 +6,7 @@
 namespace gsnav {
 namespace {
 
-/// FNV-1a: the same on every platform, which std::hash is not.
+/// FNV-1a hash. Unlike std::hash, it is the same on every platform.
 std::uint64_t hash(std::string_view text, std::uint64_t h) noexcept {
   for (const char c : text) h = (h ^ static_cast<unsigned char>(c)) * 0x100000001b3ull;
   return h;

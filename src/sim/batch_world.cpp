@@ -114,7 +114,7 @@ Status BatchWorld::reset(const ParallelFor& run, std::span<const std::uint8_t> m
                " environments");
   }
   if (!mask.empty() && !begun_) return bad("reset: the first one is of all environments");
-  begun_ = false;  // until all has gone well
+  begun_ = false;  // Set to true again only when everything has succeeded.
   finished_.clear();
   final_metrics_.clear();
   resetting_.clear();
@@ -207,7 +207,7 @@ Status BatchWorld::act(const ParallelFor& run, std::span<const A> actions,
     }
     (done ? resetting_ : stepping_).push_back(e);
   }
-  begun_ = false;  // until all has gone well
+  begun_ = false;  // Set to true again only when everything has succeeded.
   if (Status s = make_bodies(run, stepping_); !s) return s;
   run(stepping_.size(), [&](std::size_t k) {
     const std::size_t i = stepping_[k];

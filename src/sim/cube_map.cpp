@@ -9,7 +9,8 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// Face from sensor: rows are the face's right, down and forward. Forward, right, back, left, up, down.
+/// Rotation from the sensor to each face. Rows are the face's right, down and forward directions. Order:
+/// forward, right, back, left, up, down.
 constexpr std::array<Mat3d, CubeMap::kFaces> kFaceFromSensor{{
     {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
     {{{0, 0, -1}, {0, 1, 0}, {1, 0, 0}}},
@@ -19,7 +20,7 @@ constexpr std::array<Mat3d, CubeMap::kFaces> kFaceFromSensor{{
     {{{1, 0, 0}, {0, 0, -1}, {0, 1, 0}}},
 }};
 
-/// The denominator of the double sphere's projection of a unit vector with depth z.
+/// Denominator of the double sphere projection for a unit vector with depth z.
 double sphere_scale(const FisheyeLens& lens, double z) noexcept {
   const double shifted = lens.xi + z;
   return lens.alpha * std::sqrt(1.0 - z * z + shifted * shifted) + (1.0 - lens.alpha) * shifted;
@@ -72,7 +73,7 @@ CubeMap::CubeMap(const SensorSpec& spec) {
     for (int column = 0; column < width; ++column) {
       const auto ray = sensor_ray(spec, column + 0.5, row + 0.5);
       if (!ray) continue;
-      // The face whose axis is nearest: all of its rays are within 45 degrees on either side.
+      // The face whose axis is nearest to the ray. Its rays are within 45 degrees in each direction.
       std::size_t face = 0;
       for (std::size_t k = 1; k < kFaces; ++k) {
         if (dot(kFaceFromSensor[k].row[2], *ray) > dot(kFaceFromSensor[face].row[2], *ray)) face = k;
@@ -103,9 +104,9 @@ Camera CubeMap::face_camera(const Camera& sensor, std::size_t face) const noexce
 
 namespace {
 
-/// The four pixels around a place and how much each weighs.
+/// The four pixels around a position, and interpolation between them.
 struct Corners {
-  std::size_t first;  // of the upper left
+  std::size_t first;  // Index of the upper left pixel.
   float fx, fy;
   Corners(float x, float y, int side) noexcept {
     const float most = static_cast<float>(side - 2);

@@ -11,7 +11,7 @@ Status bad(const char* field, double value, const char* rule) {
           std::string("EpisodeRules.") + field + " = " + std::to_string(value) + ": " + rule};
 }
 
-/// Only islands that are wide enough are drawn from, in proportion to their area.
+/// Islands with a radius of at least `least_radius`.
 std::vector<std::size_t> wide_islands(const NavMesh& navmesh, double least_radius) {
   std::vector<std::size_t> wide;
   for (std::size_t i = 0; i < navmesh.island_count(); ++i) {
@@ -56,7 +56,7 @@ Result<PointNavEpisode> generate_episode(const NavMesh& navmesh, Rng& rng, const
                                          std::to_string(rules.min_island_radius) + " m"};
   }
   for (int goals = 0; goals < rules.max_goals; ++goals) {
-    // A start on another island could never reach the goal: both are drawn from one.
+    // Draw both from one island. A start on another island could not reach the goal.
     const std::size_t island = draw_island(navmesh, islands, rng);
     const Vec3d goal = navmesh.random_point(rng, island).position;
     for (int tries = 0; tries < rules.retries_per_goal; ++tries) {

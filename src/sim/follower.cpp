@@ -13,23 +13,25 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 const SnapOptions kSnap{{0.5, 1.0, 0.5}};
 
-// Charges, in metres of path.
-constexpr double kContact = 6.0;   // a step that touches an avatar
-constexpr double kNearness = 0.9;  // a step at distance 0 within the comfort distance
-constexpr double kStuck = 0.2;     // a move that a wall stops
+// Penalties, in metres of path.
+constexpr double kContact = 6.0;   // Step that touches an avatar.
+constexpr double kNearness = 0.9;  // Step within the comfort distance, scaled by nearness: full at
+                                   // distance 0.
+constexpr double kStuck = 0.2;     // Move that a wall stops.
 
-/// Wait, turn, walk straight on, then follow the path. All zero: follow the path at once.
+/// Wait, turn, walk straight, then follow the path. All zero: follow the path at once.
 struct Plan {
-  int waits = 0, turns = 0, walks = 0;  // turns > 0: to the left
+  int waits = 0, turns = 0, walks = 0;  // Positive turns are to the left.
 };
 
 struct Outlook {
   double cost = std::numeric_limits<double>::infinity();
-  double charge = 0.0;  // the part of the cost that is not distance
+  double charge = 0.0;  // Part of the cost that is not distance.
   Action first = Action::stop;
 };
 
-/// How the path goes on from a place: what is left of it, and where it turns next.
+/// Continuation of the shortest path from a position: its remaining length, and the direction to its
+/// next corner.
 struct Guide {
   double left = std::numeric_limits<double>::infinity();
   double bearing = 0.0;
@@ -42,7 +44,7 @@ Guide guide(const NavMesh& mesh, const Vec3d& from, const Vec3d& goal, double be
   g.left = path->length;
   for (const Vec3d& p : path->points) {
     const Vec3d d = p - from;
-    if (std::hypot(d.x, d.z) < 0.05) continue;  // a corner just passed gives no direction
+    if (std::hypot(d.x, d.z) < 0.05) continue;  // A corner that was just passed gives no direction.
     g.bearing = std::atan2(-d.x, -d.z);
     break;
   }
@@ -78,7 +80,7 @@ class Lookahead {
         yaw += a == Action::turn_left ? turn_ : -turn_;
       }
       const CapsuleSet& now = bodies_.empty() ? nobody : bodies_[static_cast<std::size_t>(i)];
-      // Later steps count less: the plan is made again before they come.
+      // Later actions count less, because a new plan is made before they happen.
       const double weight = 1.0 - 0.5 * i / horizon_;
       if (a == Action::move_forward || !now.empty()) {
         const StepResult r = gsnav::step(world_.navmesh(), agent, displacement, now,
@@ -95,7 +97,8 @@ class Lookahead {
         }
       }
       if (way.left < reach_) {
-        out.cost = out.charge - c.forward_step * (horizon_ - 1 - i);  // the steps not needed
+        out.cost = out.charge - c.forward_step * (horizon_ - 1 - i);  // Reward for actions that are not
+                                                                      // needed.
         return out;
       }
     }
@@ -105,7 +108,7 @@ class Lookahead {
   }
 
  private:
-  /// What the plan says about step i; stop where it leaves it to the path.
+  /// Action that the plan prescribes for step i. Action::stop means that the path decides.
   Action scripted(const Plan& plan, int i) const noexcept {
     const Action to = plan.turns < 0 ? Action::turn_right : Action::turn_left;
     const Action fro = plan.turns < 0 ? Action::turn_left : Action::turn_right;
@@ -165,7 +168,7 @@ Action GeodesicFollower::next(const World& world) const {
       consider({wait, 0, 0});
       consider({wait, -1, 0});
     }
-    for (const int k : {3, 6, 9}) {  // turn away and stay there
+    for (const int k : {3, 6, 9}) {  // Turn away and stay there.
       consider({horizon - k, k, 0});
       consider({horizon - k, -k, 0});
     }

@@ -9,7 +9,7 @@ namespace gsnav {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kPerAction = 0.0125;  // of a step: the shorter of two ways that are as good
+constexpr double kPerAction = 0.0125;  // In forward steps. Prefers the shorter of two equally good ways.
 constexpr double kPerCollision = 0.025;
 
 }  // namespace
@@ -67,7 +67,7 @@ Result<Action> GreedyGeodesicFollower::next(const AgentPose& pose) {
       const WalkPoint& end = walk.points.back();
       const double reward = (left - field_.distance({end.position, end.poly})) / task_.forward_step -
                             kPerAction * (k + 1) - (walk.hit_wall ? kPerCollision : 0.0);
-      // A wall that lets nothing through is no way, however near the goal is behind it.
+      // Ignore directions in which a wall allows almost no motion, however near the goal is behind it.
       const bool moves = norm(end.position - at.position) > 0.01 * task_.forward_step;
       if (moves && reward > best + 1e-9) {
         best = reward;
@@ -80,7 +80,7 @@ Result<Action> GreedyGeodesicFollower::next(const AgentPose& pose) {
     return Action::move_forward;
   }
   const Action way = turns > 0 ? Action::turn_left : Action::turn_right;
-  // To and fro without a step: two ways look the same from either side, so one is carried out.
+  // Alternating turns without a step: two ways look equally good from either side. Complete one of them.
   recent_.push_back(way);
   std::size_t changes = 0;
   for (std::size_t i = 1; i < recent_.size(); ++i) changes += recent_[i] != recent_[i - 1] ? 1 : 0;

@@ -9,10 +9,10 @@
 namespace gsnav {
 namespace {
 
-constexpr double kBaseline = 35.130;  // focal length times baseline: disparity = kBaseline / z
-constexpr double kSteps = 8.0;        // of disparity in one
+constexpr double kBaseline = 35.130;  // Focal length times baseline: disparity = kBaseline / z.
+constexpr double kSteps = 8.0;        // Quantization steps per unit of disparity.
 constexpr double kDisparitySigma = 1.0 / 36.0;
-constexpr double kShiftSigma = 0.25;  // pixels
+constexpr double kShiftSigma = 0.25;  // Pixels.
 
 }  // namespace
 

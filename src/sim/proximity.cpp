@@ -31,7 +31,7 @@ void add_capsule(Aabb<double>& box, const Capsule<double>& c) {
   }
 }
 
-/// Nothing in one box is nearer to anything in the other than this; overlap has no bound.
+/// Lower bound of the distance between objects in two boxes. If the boxes overlap, -infinity.
 double least_distance(const Aabb<double>& a, const Aabb<double>& b) {
   double square = 0.0;
   for (int k = 0; k < 3; ++k) {
@@ -41,14 +41,13 @@ double least_distance(const Aabb<double>& a, const Aabb<double>& b) {
   return square > 0 ? sqrt(square) - kRounding : -std::numeric_limits<double>::infinity();
 }
 
-/// How fast a point of a body moves at most, metres a tick: points between the ends are no faster than
-/// those.
+/// Largest speed of any point of a body, metres per tick. It occurs at an end of the segment.
 double speed_of(const MovingCapsule<double>& m) {
   return max(norm(m.end.p0 - m.begin.p0), norm(m.end.p1 - m.begin.p1)) +
          abs(m.end.radius - m.begin.radius);
 }
 
-/// The same of whoever walks along `path`; infinity where it jumps.
+/// Largest speed of an agent on `path`, metres per tick. Infinity if the path jumps.
 double speed_of(std::span<const WalkPoint> path) {
   double speed = 0.0;
   for (std::size_t i = 1; i < path.size(); ++i) {
@@ -60,15 +59,15 @@ double speed_of(std::span<const WalkPoint> path) {
   return speed;
 }
 
-/// How far whoever walks along `path` goes.
+/// Length of the path, metres.
 double length_of(std::span<const WalkPoint> path) {
   double length = 0.0;
   for (std::size_t i = 1; i < path.size(); ++i) length += norm(path[i].position - path[i - 1].position);
   return length;
 }
 
-/// A body, how fast it and the agent approach each other at most, and how near it was at the tick's
-/// begin, at its end and at the last look. Metres.
+/// A capsule near the agent: the largest speed at which the two approach each other (metres per tick),
+/// and their gap (metres) at the start of the tick, at its end and at the last evaluation.
 struct Near {
   const DynamicCapsule* body;
   double speed, first, last, gap;
@@ -76,12 +75,12 @@ struct Near {
 
 struct Scratch {
   std::vector<Near> near;
-  std::vector<double> bounds;  // of each of an avatar's capsules
+  std::vector<double> bounds;  // One per capsule of an avatar.
   std::vector<std::size_t> order;
 };
 
-/// One avatar's least distance during the tick. A gap changes no faster than both move: bodies that
-/// cannot come nearer than what was already found are not looked at again.
+/// Computes the smallest distance to one avatar during the tick. A gap changes no faster than both move,
+/// so capsules that cannot come nearer than the best distance so far are skipped.
 class Approach {
  public:
   Approach(std::span<const WalkPoint> path, double agent_speed, double agent_length, double radius,
@@ -94,8 +93,8 @@ class Approach {
         scratch_(scratch),
         near_(scratch.near) {}
 
-  /// Looks at the boxes that the agent (`reach`) and the avatar's capsules sweep; returns a lower bound
-  /// of find().
+  /// Bounds the distance by boxes: `reach` is the box that the agent sweeps. Returns a lower bound of
+  /// find().
   double look(const Aabb<double>& reach, View<const DynamicCapsule> avatar) {
     avatar_ = avatar;
     scratch_.bounds.resize(avatar.size);
@@ -110,8 +109,8 @@ class Approach {
     return scratch_.bounds[nearest_];
   }
 
-  /// After look(): the least distance. Looks at a few times for a good one; then each leg shows that
-  /// nothing is nearer, or how near it is.
+  /// Computes the smallest distance. Call after look(). It samples a few times for a good candidate,
+  /// then proves for each leg that nothing is nearer or finds how near it is.
   double find() {
     double best = sampled();
     for (std::size_t c = 0; c < avatar_.size; ++c) {
@@ -121,9 +120,9 @@ class Approach {
   }
 
  private:
-  /// A distance that the avatar comes to, nearly always the least.
+  /// Distance at one of several sampled times, almost always the smallest.
   double sampled() {
-    // Capsules that stay farther away than one of them is at the begin are not looked at.
+    // Skip capsules whose bound exceeds the distance of the nearest one at the start.
     const auto take = [this](std::size_t c) {
       const double speed = agent_speed_ + speed_of(avatar_[c].motion);
       near_.push_back({&avatar_[c], speed * (1 + kRounding) + kRounding, 0.0, 0.0, 0.0});
@@ -147,7 +146,7 @@ class Approach {
       if (2 * i != kSamples) offer(static_cast<double>(i) / kSamples);
     }
     for (const WalkPoint& p : path_) offer(clamp(p.fraction, 0.0, 1.0));
-    // Golden sections around the best sample.
+    // Golden-section search around the best sample.
     constexpr double kGolden = 0.6180339887498949;
     double low = max(best_at_ - 1.0 / kSamples, 0.0), high = min(best_at_ + 1.0 / kSamples, 1.0);
     gap(best_at_);
@@ -156,7 +155,7 @@ class Approach {
     double at_a = gap(a), at_b = gap(b);
     for (int i = 0; i < 13; ++i) {
       best_ = min(best_, min(at_a, at_b));
-      // The last look was between low and high.
+      // The last evaluation was between low and high.
       if (i == 3) drop([&](const Near& n) { return n.gap - n.speed * (high - low); });
       if (at_a < at_b) {
         high = b;
@@ -195,19 +194,19 @@ class Approach {
       best_at_ = u;
     }
   }
-  /// Forgets the bodies that stay farther away than the best, by a lower bound of their gap.
+  /// Removes capsules whose gap is, by a lower bound, above the best distance.
   template <class Bound>
   void drop(const Bound& bound) {
     std::erase_if(near_, [&](const Near& n) { return bound(n) > best_; });
   }
 
-  /// The least of `best` and the gap to one capsule, leg by leg.
+  /// Minimum of `best` and the gap to one capsule, leg by leg.
   double pass(const MovingCapsule<double>& body, double best) const {
     const double tolerance = kTolerance + kShare * (agent_length_ + speed_of(body));
     const WalkPoint start{path_.empty() ? Vec3d{} : path_.front().position, kNoPoly, 0.0};
     WalkPoint from = start;
     for (std::size_t i = 0; i <= path_.size(); ++i) {
-      // It stands still after the last point.
+      // After the last point the agent stands still.
       const WalkPoint to = i < path_.size() ? path_[i] : WalkPoint{from.position, kNoPoly, 1.0};
       if (to.fraction > from.fraction || i == path_.size()) {
         const double u0 = clamp(from.fraction, 0.0, 1.0), u1 = clamp(to.fraction, 0.0, 1.0);
@@ -228,15 +227,15 @@ class Approach {
     return best;
   }
 
-  static constexpr double kTolerance = 1e-6;  // metres
-  static constexpr double kShare = 1e-4;      // of what both move in a tick
+  static constexpr double kTolerance = 1e-6;  // Metres.
+  static constexpr double kShare = 1e-4;      // Fraction of the motion of both during a tick.
 
   std::span<const WalkPoint> path_;
   double agent_speed_, agent_length_, radius_, height_;
   Scratch& scratch_;
   std::vector<Near>& near_;
   View<const DynamicCapsule> avatar_;
-  std::size_t nearest_ = 0;  // by bounds
+  std::size_t nearest_ = 0;  // Index of the capsule with the smallest bound.
   double best_ = std::numeric_limits<double>::infinity(), best_at_ = 0.0;
 };
 
@@ -251,7 +250,7 @@ void closest_approach(std::span<const WalkPoint> path, double radius, double hei
   for (const WalkPoint& p : path) add_capsule(reach, agent_capsule(p.position, radius, height));
   if (path.empty()) add_capsule(reach, agent_capsule({}, radius, height));
   for (std::size_t g = 0; g < groups.size(); ++g) out[g] = least_distance(reach, groups[g].swept);
-  // Whoever may be nearest first: the others are then known to be farther.
+  // Start with the avatar that may be nearest, so that the others can be skipped.
   thread_local Scratch scratch;
   std::vector<std::size_t>& order = scratch.order;
   order.resize(groups.size());

@@ -72,7 +72,7 @@ Status validate_detail(const SimulatorScene& scene, const DetailChoice& choice) 
 
 void append_bodies(const SimulatorScene& scene, double t0, double t1, std::vector<DynamicCapsule>& out,
                    const CapsuleSet* before) {
-  std::span<const CapsuleSet::Group> there;  // by avatar
+  std::span<const CapsuleSet::Group> there;  // One group per avatar.
   if (before != nullptr) there = before->groups();
   for (std::size_t i = 0; i < scene.avatars.size(); ++i) {
     const auto number = static_cast<std::uint32_t>(i);

@@ -45,7 +45,7 @@ std::size_t scene_bytes(const SimulatorScene& scene) noexcept {
   }
   const AvatarAsset* last = nullptr;
   for (const AvatarActor& a : scene.avatars) {
-    if (a.asset().get() == last) continue;  // a crowd of one body has it once
+    if (a.asset().get() == last) continue;  // Avatars with the same body share its memory.
     last = a.asset().get();
     sum += cloud_bytes(last->cloud) + bytes_of(last->skinning_weights) + bytes_of(last->joint_indices);
   }
@@ -108,7 +108,7 @@ void SceneLibrary::make_room() {
   while (bytes_ > budget_) {
     Slot* oldest = nullptr;
     for (Slot& s : slots_) {
-      // Nobody but get() hands out pointers, so a count of one is exact.
+      // Only get() hands out pointers, so a count of one is exact.
       if (s.state != State::there || s.scene.use_count() > 1 || s.waiting > 0) continue;
       if (oldest == nullptr || s.used < oldest->used) oldest = &s;
     }
@@ -143,7 +143,9 @@ Result<std::shared_ptr<const SimulatorScene>> SceneLibrary::get(std::size_t inde
   want(index);
   ++slot.waiting;
   news_.wait(lock, [&] {
-    if (slot.state == State::absent) want(index);  // another who waited has taken its failure
+    if (slot.state == State::absent)
+      want(index);  // Another waiting thread may have taken the error of
+                    // the failed load.
     return slot.state == State::there || slot.state == State::failed;
   });
   --slot.waiting;

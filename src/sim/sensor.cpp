@@ -23,7 +23,7 @@ std::vector<SensorSpec> rgbd_sensors(int height, int width, double hfov, const V
 std::vector<SensorSpec> pointnav_v2_sensors() {
   std::vector<SensorSpec> out = rgbd_sensors(360, 640, 70.0, {0.0, 0.88, 0.0});
   for (SensorSpec& s : out) {
-    s.orientation = {-0.3490659, 0.0, 0.0};  // 20 degrees down
+    s.orientation = {-0.3490659, 0.0, 0.0};  // 20 degrees down.
     s.far_plane = 10.0;
   }
   out[0].noise.kind = NoiseKind::gaussian;
@@ -68,7 +68,7 @@ Status validate(const SensorSpec& s) {
     if (!is_finite(f)) return bad("fisheye.principal_point_offset", std::to_string(f), "must be finite");
   }
   if (fisheye && (!(s.fisheye.focal_length[0] > 0) || !(s.fisheye.focal_length[1] > 0))) {
-    // Where the double sphere's projection ends: further off the axis an image point would come twice.
+    // Limit of the double sphere projection. Beyond it, two directions would share an image point.
     const double a = s.fisheye.alpha, z = std::cos(s.hfov * std::numbers::pi / 360.0),
                  shifted = s.fisheye.xi + z;
     const double w = a > 0.5 ? (1 - a) / a : a / (1 - a);

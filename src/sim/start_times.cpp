@@ -15,8 +15,8 @@ Status draw_start_times(std::span<PointNavEpisode> episodes, const SimulatorScen
   Rng rng(seed ^ 0x7469636bull);
   for (PointNavEpisode& e : episodes) {
     for (int tries = 0; tries < 100; ++tries) {
-      // At a multiple of the control period many episodes meet the same moments, whose bodies are then
-      // made once.
+      // At multiples of the control period, many episodes share the same intervals, whose bodies are
+      // then computed once.
       e.start_time = task.control_period * std::floor(rng.uniform(0.0, 600.0) / task.control_period);
       std::vector<DynamicCapsule> now;
       append_bodies(scene, e.start_time, e.start_time, now);

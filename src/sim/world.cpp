@@ -15,14 +15,14 @@ constexpr double kPi = 3.14159265358979323846;
 
 double wrapped(double angle) noexcept { return std::remainder(angle, 2 * kPi); }
 
-/// Heading of a rotation: where it takes -Z, on the ground plane.
+/// Heading of a rotation: the direction of the rotated -Z on the ground plane.
 double yaw_of(Quatd q) noexcept {
-  normalize(q);  // files round; zero is no turn
+  normalize(q);  // Values in files are rounded. A zero quaternion counts as no rotation.
   const Vec3d f = rotate(q, Vec3d{0, 0, -1});
   return std::atan2(-f.x, -f.z);
 }
 
-/// Episodes name points on the surface; this is what rounding in files may have moved them by.
+/// Tolerance for episodes from files: their points lie on the surface except for rounding.
 const SnapOptions kSnap{{0.5, 1.0, 0.5}};
 
 }  // namespace
@@ -67,7 +67,7 @@ Status World::set_state(const WorldState& state) {
       return bad("goal.poly", std::to_string(state.goal.poly) + " is no polygon of this NavMesh");
     }
     if (a.poly != kNoPoly &&
-        navmesh_->island_of(a.poly) == kNoIsland) {  // steps find a place without one
+        navmesh_->island_of(a.poly) == kNoIsland) {  // step() finds a polygon if there is none.
       return bad("agent.poly", std::to_string(a.poly) + " is no polygon of this NavMesh");
     }
     if (!navmesh_->snap_point(a.position, {{0.1, 0.5, 0.1}})) {
@@ -116,13 +116,14 @@ Status World::reset(const PointNavEpisode& episode) {
   return {};
 }
 
-/// Turns and displacement of one substep, the same in all of them but for the turns at the beginning.
+/// Turns and displacement of one substep. All substeps are equal, except that turns happen before the
+/// first.
 struct World::Motion {
-  double first_turn = 0.0;  // radians, before the first substep
-  double tilt = 0.0;        // radians
-  double chord = 0.0;       // metres forward in each substep,
-  double side = 0.0;        // and to the left,
-  double bend = 0.0;        // while turning by this much, radians
+  double first_turn = 0.0;  // Before the first substep, radians.
+  double tilt = 0.0;        // Radians.
+  double chord = 0.0;       // Forward displacement per substep, metres.
+  double side = 0.0;        // Displacement to the left per substep, metres.
+  double bend = 0.0;        // Turn during the substep, radians.
 };
 
 Status World::ready() const {
@@ -166,7 +167,7 @@ Result<World::Motion> World::motion_of(const VelocityCommand& command) const {
   const double dt = config_.control_period / config_.substeps;
   Motion m;
   m.bend = command.angular * dt;
-  // The chord of an arc of length v dt that turns by `bend`.
+  // Chord of an arc of length v dt that turns by `bend`.
   const double half = 0.5 * m.bend;
   const double straight = dt * (abs(half) > 1e-9 ? std::sin(half) / half : 1.0);
   m.chord = command.linear * straight;
@@ -231,7 +232,7 @@ Result<StepInfo> World::make_bodies_and_move(const Motion& motion) {
 }
 
 double World::tick(int k) const noexcept {
-  // Counted from the start, so that long episodes do not drift.
+  // Compute from the start so that errors do not accumulate.
   const double actions = s_.steps + static_cast<double>(k) / config_.substeps;
   return s_.start_time + actions * config_.control_period;
 }

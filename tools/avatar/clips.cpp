@@ -14,7 +14,7 @@ namespace gsnav_avatar {
 using namespace gsnav;
 
 Result<MotionClip> load_clip(const ClipSource& source, const Skeleton& skeleton) {
-  // FILE or FILE:NAME for a clip of several.
+  // FILE, or FILE:NAME for one clip of a file with several.
   std::string file = source.clip, name;
   if (const std::size_t colon = file.rfind(':'); colon != file.npos && !std::filesystem::exists(file)) {
     name = file.substr(colon + 1);
@@ -46,7 +46,7 @@ Result<MotionClip> load_clip(const ClipSource& source, const Skeleton& skeleton)
     if (m) {
       motion.skeleton = m->mesh.skeleton;
       clips = std::move(m->clips);
-    } else {  // no skin with a mesh, say: motion alone
+    } else {  // For example a file without a skinned mesh: read its motion alone.
       auto bare = io::load_gltf_clips(file, skeleton, options);
       if (!bare) return bare.status();
       for (const std::string& w : bare->warnings) std::printf("  %s\n", printable(w).c_str());

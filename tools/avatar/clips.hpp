@@ -8,8 +8,8 @@
 
 namespace gsnav_avatar {
 
-/// The clip of a file on the given skeleton: as it is where the file's joints are the skeleton's, else
-/// retargeted by names.
+/// Loads the clip of a file for a skeleton. If the file has other joints than the skeleton, the clip is
+/// retargeted by joint names.
 gsnav::Result<gsnav::MotionClip> load_clip(const ClipSource& source, const gsnav::Skeleton& skeleton);
 
 }  // namespace gsnav_avatar

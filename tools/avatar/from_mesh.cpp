@@ -35,7 +35,7 @@ Result<io::LoadedSkinnedMesh> load_mesh(const MeshCommand& c, bool makehuman) {
   return io::load_makehuman(c.input, options);
 }
 
-/// The clip that was asked for: one of the mesh's own, or a file's.
+/// The requested clip: one of the mesh file, or of another file.
 Result<MotionClip> clip_of(const MeshCommand& c, const io::LoadedSkinnedMesh& mesh) {
   std::string names;
   for (const io::NamedClip& n : mesh.clips) {
@@ -53,7 +53,7 @@ Result<MotionClip> clip_of(const MeshCommand& c, const io::LoadedSkinnedMesh& me
   return load_clip(source, mesh.mesh.skeleton);
 }
 
-/// Greatest extent along an axis, metres.
+/// Largest extent along an axis, metres.
 double size_of(const SkinnedMesh& mesh) {
   Aabb<double> box{};
   for (const Vec3d& p : mesh.positions) box.add(p);
@@ -61,7 +61,7 @@ double size_of(const SkinnedMesh& mesh) {
   return max(size.x, max(size.y, size.z));
 }
 
-/// Joint to root frame at `count` times of the clip.
+/// Transforms from joints to the root at `count` times of the clip.
 Poses poses_of(const Skeleton& skeleton, const MotionClip& clip, std::size_t count) {
   Poses out(count);
   LocalPose pose;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// gsnav-avatar: Gaussian avatars from rigged meshes, walks for them, and pictures of both.
+// gsnav-avatar: makes Gaussian avatars from rigged meshes, walks for them, and pictures of both.
 #include <cstdio>
 
 #include "commands.hpp"
@@ -8,7 +8,7 @@
 
 namespace {
 
-/// Whether what the command makes can be written, asked before it is made.
+/// Checks, before any work, that the outputs of the command can be written.
 gsnav::Status outputs_status(const gsnav_avatar::Options& o) {
   if (o.walk) return gsnav::check_output_path(o.walk->out);
   if (o.strip) return gsnav::check_output_path(o.strip->out);

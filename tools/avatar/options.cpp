@@ -27,7 +27,7 @@ bool parse_point(const std::string& text, gsnav::Vec3d& out) {
   return at == end;
 }
 
-/// FILE or FILE=AMOUNT.
+/// Parses FILE or FILE=AMOUNT.
 bool parse_target(const std::string& text, std::pair<std::string, double>& out) {
   const std::size_t equals = text.rfind('=');
   out = {text.substr(0, equals), 1.0};

@@ -11,22 +11,22 @@
 
 namespace gsnav_avatar {
 
-/// Where a clip comes from.
+/// Source of a clip.
 struct ClipSource {
-  std::string clip;    ///< a file (.bvh, .amc, .glb, .gltf, a driver's .npz), or a clip's name in the
-                       ///< body's own file
-  std::string asf;     ///< skeleton of an .amc
-  double scale = 0.0;  ///< metres a unit of the clip's file; 0: 1, or what the .asf says
+  std::string clip;    ///< A file (.bvh, .amc, .glb, .gltf, or a driver's .npz), or the name of a clip
+                       ///< in the body's own file.
+  std::string asf;     ///< Skeleton of an .amc file.
+  double scale = 0.0;  ///< Metres per unit of the clip's file. 0: 1, or the unit of the .asf file.
   bool z_up = false;
 };
 
-/// from-gltf and from-makehuman.
+/// Options of from-gltf and from-makehuman.
 struct MeshCommand {
   std::string input, out, driver;
-  std::vector<std::string> skins;                       // glTF; empty: all
-  double scale = 1.0;                                   // metres a unit of the input
-  std::string skeleton, weights;                        // MakeHuman
-  std::vector<std::pair<std::string, double>> targets;  // MakeHuman
+  std::vector<std::string> skins;                       // For glTF. Empty: all.
+  double scale = 1.0;                                   // Metres per unit of the input.
+  std::string skeleton, weights;                        // For MakeHuman.
+  std::vector<std::pair<std::string, double>> targets;  // For MakeHuman.
   ClipSource clip;
   std::size_t gaussians = 100000;
   std::uint64_t seed = 1;
@@ -61,8 +61,7 @@ struct Options {
   std::optional<StripCommand> strip;
 };
 
-/// Reads the command line; prints help or what is wrong and sets `exit_code` where nothing is left to
-/// do.
+/// Reads the command line. If there is nothing left to do, prints help or an error and sets `exit_code`.
 std::optional<Options> parse_options(int argc, char** argv, int& exit_code);
 
 }  // namespace gsnav_avatar

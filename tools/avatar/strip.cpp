@@ -21,7 +21,7 @@ using namespace gsnav;
 
 namespace {
 
-/// What stands around the walker; none where nothing was named.
+/// Scene around the walker. Empty if none was named.
 Result<std::optional<GaussianCloud>> load_surroundings(const StripCommand& c) {
   if (c.flat) {
     auto flat = make_default_scene();
@@ -55,7 +55,7 @@ Status make_strip(const StripCommand& c) {
   scene.avatars.push_back(*actor);
   if (surroundings->has_value()) {
     scene.assets.push_back({std::make_shared<const GaussianCloud>(std::move(**surroundings))});
-    // (x, y, z) of a scene with Z upwards is (x, z, -y) here.
+    // (x, y, z) of a scene with Z up is (x, z, -y) here.
     if (c.z_up)
       scene.assets.back().world_from_asset = {axis_angle(Vec3d{1, 0, 0}, -1.5707963267948966), {}, 1.0};
   }

@@ -24,7 +24,7 @@ namespace {
 
 Result<NavMesh> find_mesh(const WalkCommand& c) {
   if (!c.flat) return load_navmesh(c.navmesh);
-  const auto flat = make_default_scene(0.05);  // its mesh does not depend on the density
+  const auto flat = make_default_scene(0.05);  // The NavMesh does not depend on the density.
   if (!flat) return flat.status();
   NavMeshSettings settings;
   settings.agent_radius = 0.25;
@@ -34,10 +34,11 @@ Result<NavMesh> find_mesh(const WalkCommand& c) {
 struct WalkPath {
   std::vector<Vec3d> points;
   double length = 0.0;
-  double clearance = std::numeric_limits<double>::infinity();  ///< least distance to the mesh's edges
+  double clearance = std::numeric_limits<double>::infinity();  ///< Smallest distance to the edges of the
+                                                               ///< mesh.
 };
 
-/// The shortest path through all stops on the surface, kept away from the mesh's edges.
+/// The shortest path through all stops on the surface, moved away from the edges of the mesh.
 Result<WalkPath> lay_path(const NavMesh& mesh, const WalkCommand& c) {
   std::vector<Vec3d> stops{c.from};
   stops.insert(stops.end(), c.via.begin(), c.via.end());
@@ -76,12 +77,13 @@ double lowest_gaussian(const AvatarAsset& asset) {
   return y;
 }
 
-/// What a walk consists of, frame by frame.
+/// A walk, frame by frame.
 struct RecordedWalk {
-  std::vector<std::vector<Affine3<double>>> joints;  ///< to the world
-  std::vector<Vec3d> bodies;                         ///< places on the floor
-  std::size_t steady_first = 0, steady_last = 0;     ///< frames at full speed, none where first >= last
-  double turned = 0.0;                               ///< radians of turns on the spot
+  std::vector<std::vector<Affine3<double>>> joints;  ///< Transforms to the world.
+  std::vector<Vec3d> bodies;                         ///< Positions on the floor.
+  std::size_t steady_first = 0, steady_last = 0;     ///< Range of frames at full speed. Empty if first
+                                                     ///< >= last.
+  double turned = 0.0;                               ///< Radians of turns in place.
 
   void print_slides(const std::vector<Foot>& feet, const std::string& when) const {
     FootSlideMeter meter(feet);
@@ -114,7 +116,7 @@ RecordedWalk record(const AvatarActor& actor, const WalkTrajectory& path, double
   return out;
 }
 
-/// Prints how far feet slide; with --lock-feet holds them, and prints it again.
+/// Prints how far feet slide. With --lock-feet, holds them in place and prints it again.
 Status hold_feet(const WalkCommand& c, const Skeleton& skeleton, const std::vector<Foot>& feet,
                  RecordedWalk& walk) {
   walk.print_slides(feet, c.lock_feet ? " as recorded" : "");

@@ -71,7 +71,7 @@ void Canvas::triangle(const gsnav::Vec2<double> (&p)[3], Rgb color, float alpha)
              std::max({p[0].x, p[1].x, p[2].x}), std::max({p[0].y, p[1].y, p[2].y}), width_, height_);
   for (int y = b.y0; y < b.y1; ++y) {
     for (int x = b.x0; x < b.x1; ++x) {
-      bool inside = true;  // no smoothing: neighbours share their edges
+      bool inside = true;  // No smoothing, because neighbours share their edges.
       for (int i = 0; i < 3 && inside; ++i) {
         const auto &a = p[i], &c = p[(i + 1) % 3];
         const double e = sign * ((c.x - a.x) * (y + 0.5 - a.y) - (c.y - a.y) * (x + 0.5 - a.x));
@@ -90,7 +90,7 @@ void Canvas::rect(int x, int y, int w, int h, Rgb color, float alpha) {
 
 namespace {
 
-/// Five rows of three bits, top first.
+/// Five rows of three bits, top row first.
 std::uint16_t glyph_of(char c) {
   static constexpr std::uint16_t kDigits[10] = {075557, 026227, 071747, 071717, 055711,
                                                 074717, 074757, 071111, 075757, 075717};

@@ -14,7 +14,7 @@ struct Rgb {
   float r = 0, g = 0, b = 0;
 };
 
-/// A picture to draw on, coordinates in pixels, y downwards. Edges are smoothed over one pixel.
+/// Picture to draw on. Coordinates are in pixels, y down. Edges are smoothed over one pixel.
 class Canvas {
  public:
   Canvas(int width, int height, Rgb fill);
@@ -23,7 +23,7 @@ class Canvas {
   int height() const { return height_; }
 
   void blend(int x, int y, Rgb color, float alpha);
-  /// A line with round ends; a disc where both ends are equal.
+  /// Draws a line with round ends, or a disc if both ends are equal.
   void stroke(double x0, double y0, double x1, double y1, double radius, Rgb color, float alpha);
   void disc(double x, double y, double radius, Rgb color, float alpha) {
     stroke(x, y, x, y, radius, color, alpha);
@@ -31,11 +31,11 @@ class Canvas {
   void ring(double x, double y, double radius, double width, Rgb color, float alpha);
   void triangle(const gsnav::Vec2<double> (&p)[3], Rgb color, float alpha);
   void rect(int x, int y, int w, int h, Rgb color, float alpha);
-  /// Digits, letters and . - / % , : + ( ), three pixels by five times `scale`; letters are capitals,
-  /// but for m, which stands for metres.
+  /// Draws text in a font of 3 x 5 pixels times `scale`: digits, letters and . - / % , : + ( ). Letters
+  /// are capitals, except m, which stands for metres.
   void text(int x, int y, std::string_view s, int scale, Rgb color);
   static int text_width(std::string_view s, int scale);
-  /// Copies 8-bit pixels [h][w][3] to (x, y).
+  /// Copies 8-bit pixels, shape [h][w][3], to (x, y).
   void paste(const std::uint8_t* rgb, int w, int h, int x, int y);
 
   std::vector<std::uint8_t> bytes() const;

@@ -9,8 +9,9 @@ class App;
 
 namespace gsnav_tools {
 
-/// Adds `--device`, by default "best". A name that is no device of this machine is refused with a list
-/// of those that are. `float64` is set by "serial64"; null: there is no such name.
+/// Adds `--device`, with the default "best". Other names than those of the machine's devices are
+/// rejected with a list of these.
+/// @param float64 Set to true by "serial64". Null: that name is not available.
 void add_device_option(CLI::App& app, gsnav::Device& device, bool* float64 = nullptr);
 
 }  // namespace gsnav_tools

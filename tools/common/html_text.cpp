@@ -15,7 +15,7 @@ std::string to_text(double value, std::chars_format form, int precision) {
   const auto end =
       std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, form, precision).ptr;
   std::string text(buffer.data(), end);
-  const std::size_t e = text.find('e');  // 1e-05 is 1e-5
+  const std::size_t e = text.find('e');  // Write 1e-05 as 1e-5.
   if (e != text.npos && text.size() == e + 4 && text[e + 2] == '0') text.erase(e + 2, 1);
   return text;
 }

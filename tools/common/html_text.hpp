@@ -7,21 +7,21 @@
 
 namespace gsnav_tools {
 
-/// Text for HTML and SVG, inside elements and attributes: & < > " ' become entities, control characters
+/// Escapes text for HTML and SVG elements and attributes: & < > " ' become entities. Control characters
 /// that XML forbids are dropped.
 std::string escape(std::string_view text);
 
-/// RFC 4648.
+/// Encodes as base64 (RFC 4648).
 std::string base64(std::string_view bytes);
 
-/// A number for people: `digits` significant ones, no exponent between 1e-4 and 1e6; "inf" and "-inf"; a
-/// dash for nothing and for what is no number.
+/// Formats a number for people: `digits` significant digits, no exponent between 1e-4 and 1e6, "inf" or
+/// "-inf", and a dash for a missing value or NaN.
 std::string format(std::optional<double> value, int digits = 3);
 
-/// A number that somebody chose, a budget or a tick: up to 4 significant digits, no zeros behind them.
+/// Formats a round number such as a budget or a tick: up to 4 significant digits without trailing zeros.
 std::string format_round(double value);
 
-/// A coordinate in SVG: two decimals, in every locale.
+/// Formats a coordinate for SVG: two decimals in every locale.
 std::string coordinate(double value);
 
 }  // namespace gsnav_tools

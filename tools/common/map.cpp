@@ -14,9 +14,10 @@ namespace {
 using gsnav::Vec3d;
 
 constexpr Rgb kEdge{0.20f, 0.47f, 0.70f}, kInk{0.1f, 0.1f, 0.1f};
-constexpr double kMargin = 0.6;       // metres around the NavMesh
-constexpr double kLeastIsland = 1.5;  // metres: episodes use no smaller ones
-constexpr double kCutHeight = 1.95;   // metres above the floor: what hangs higher would hide the rooms
+constexpr double kMargin = 0.6;       // Metres around the NavMesh.
+constexpr double kLeastIsland = 1.5;  // Metres. Episodes use no smaller islands.
+constexpr double kCutHeight = 1.95;   // Metres above the floor. Higher parts of the scene would hide the
+                                      // rooms.
 
 void draw_scene(Canvas& canvas, const MapFrame& f, const MapContent& m, double floor) {
   const gsnav::GaussianCloud& c = *m.cloud;
@@ -30,11 +31,11 @@ void draw_scene(Canvas& canvas, const MapFrame& f, const MapContent& m, double f
       order.push_back(static_cast<std::uint32_t>(i));
     }
   }
-  // Painted from the floor up; ties in file order, so that the picture is the same every time.
+  // Paint from the floor up. Ties are in file order, so that the picture is reproducible.
   std::stable_sort(order.begin(), order.end(),
                    [&](std::uint32_t a, std::uint32_t b) { return at[a].y < at[b].y; });
   for (const std::uint32_t i : order) {
-    // Seen from above a Gaussian is a stroke along its longest axis, as wide as its middle one.
+    // Seen from above, a Gaussian is a stroke along its longest axis with the width of its middle axis.
     const double sizes[3] = {c.scales[0][i], c.scales[1][i], c.scales[2][i]};
     const auto axis = static_cast<int>(std::max_element(sizes, sizes + 3) - sizes);
     const double longest = sizes[axis], least = *std::min_element(sizes, sizes + 3);
@@ -57,7 +58,7 @@ void draw_scene(Canvas& canvas, const MapFrame& f, const MapContent& m, double f
 
 void dashed(Canvas& canvas, const MapFrame& f, const std::vector<Vec3d>& points, double radius,
             Rgb color) {
-  double phase = 0;  // pixels along the whole line
+  double phase = 0;  // Pixels along the whole line.
   for (std::size_t i = 1; i < points.size(); ++i) {
     const double ax = f.x(points[i - 1]), ay = f.y(points[i - 1]), bx = f.x(points[i]),
                  by = f.y(points[i]);
@@ -130,7 +131,7 @@ void draw_ground(Canvas& canvas, const MapFrame& f, const MapContent& m) {
         {f.x(t[0]), f.y(t[0])}, {f.x(t[1]), f.y(t[1])}, {f.x(t[2]), f.y(t[2])}};
     const auto on = m.navmesh->snap_point((t[0] + t[1] + t[2]) * (1.0 / 3.0), {{0.1, 0.5, 0.1}});
     if (!on || m.navmesh->island_radius(m.navmesh->island_of(on->poly)) < kLeastIsland)
-      continue;  // a table top
+      continue;  // For example a table top.
     canvas.triangle(p, kMapNavMesh, 0.32f);
     for (int i = 0; i < 3; ++i)
       canvas.stroke(p[i].x, p[i].y, p[(i + 1) % 3].x, p[(i + 1) % 3].y, 0.4, kEdge, 0.35f);

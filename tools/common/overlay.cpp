@@ -13,10 +13,12 @@ namespace {
 using gsnav::Vec3d;
 
 constexpr Rgb kNavMeshEdge{0.25f, 0.75f, 1.0f};
-constexpr double kNear = 0.05;     // metres: nothing nearer is drawn
-constexpr double kSurface = 0.12;  // metres that a line on the floor may lie behind the scene's depth
-constexpr double kBody = 0.6;      // the same for a body's axis, which is inside of its surface
-constexpr double kPiece = 0.15;    // metres of line that are hidden or not as one
+constexpr double kNear = 0.05;     // Metres. Nearer points are not drawn.
+constexpr double kSurface = 0.12;  // Metres that a line on the floor may lie behind the depth of the
+                                   // scene.
+constexpr double kBody = 0.6;      // Metres for the axis of a body, which is inside its surface.
+constexpr double kPiece = 0.15;    // Length of the pieces of a line that are hidden or shown as a whole,
+                                   // metres.
 
 struct Point {
   double x, y, z;

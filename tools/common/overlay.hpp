@@ -11,21 +11,21 @@
 
 namespace gsnav_tools {
 
-/// A view to draw on: the picture, its camera and its depth [H][W] (metres, 0: nothing there).
+/// A view to draw on: picture, camera and depth, shape [H][W], metres. 0: nothing there.
 struct DrawnView {
   Canvas& canvas;
   const gsnav::Camera& camera;
   std::span<const float> depth;
 };
 
-/// Edges of triangles within `reach` metres, where nothing of the scene is nearer.
+/// Draws the edges of triangles within `reach` metres where the scene does not hide them.
 void draw_navmesh(const DrawnView& view, std::span<const std::array<gsnav::Vec3d, 3>> triangles,
                   double reach = 8.0);
 
-/// A capsule where nothing of the scene is clearly nearer.
+/// Draws a capsule where the scene is not clearly nearer.
 void draw_capsule(const DrawnView& view, const gsnav::Capsule<double>& capsule, Rgb color, float alpha);
 
-/// Capsules, each in its avatar's colour, where nothing of the scene is clearly nearer.
+/// Draws capsules, each in the colour of its avatar, where the scene is not clearly nearer.
 void draw_capsules(const DrawnView& view, std::span<const gsnav::DynamicCapsule> bodies);
 
 }  // namespace gsnav_tools

@@ -18,8 +18,7 @@ std::string version() {
          std::to_string(GSNAV_VERSION_PATCH);
 }
 
-/// What to say of an option that there is not, with one that was perhaps meant; empty where all are
-/// known.
+/// Error message for an unknown option, with a suggestion. Empty if all options are known.
 std::string unknown_option(const CLI::App& app) {
   for (const std::string& word : app.remaining(true)) {
     if (!word.starts_with("-")) continue;
@@ -41,7 +40,8 @@ std::optional<int> parse_options(CLI::App& app, int argc, const char* const* arg
   const std::string name = argc > 0 ? std::filesystem::path(argv[0]).filename().string() : "";
   app.name(name);
   app.set_version_flag("--version", name + " " + version());
-  std::setvbuf(stdout, nullptr, _IOLBF, BUFSIZ);  // what goes to a pipe keeps its place among errors
+  std::setvbuf(stdout, nullptr, _IOLBF, BUFSIZ);  // Line buffering keeps output to a pipe in order with
+                                                  // errors.
   try {
     app.parse(argc, argv);
     if (check) check();

@@ -12,17 +12,17 @@ class App;
 namespace gsnav_tools {
 
 // Exit statuses of all programs.
-inline constexpr int kFailed = 1;  ///< what was asked for could not be done
-inline constexpr int kUsage = 2;   ///< the command line cannot be
+inline constexpr int kFailed = 1;  ///< The task failed.
+inline constexpr int kUsage = 2;   ///< The command line is invalid.
 
-/// Reads the command line; adds --version. Prints help, the version, or what is wrong: control
-/// characters of arguments become \xHH, so that a file name cannot steer a terminal. Returns nothing if
-/// the program goes on, else the status to exit with. `check` looks at options together and throws
-/// CLI::ValidationError.
+/// Reads the command line and adds --version. Prints help, the version or an error. Control characters
+/// of arguments are printed as \xHH, so that a file name cannot control the terminal.
+/// @param check Checks combinations of options. It throws CLI::ValidationError.
+/// @return nothing if the program continues, else the exit status.
 std::optional<int> parse_options(CLI::App& app, int argc, const char* const* argv,
                                  const std::function<void()>& check = {});
 
-/// Prints "PROGRAM: `message`" on stderr. Returns kFailed.
+/// Prints "PROGRAM: `message`" to stderr. Returns kFailed.
 int fail(const std::string& program, const std::string& message);
 
 }  // namespace gsnav_tools

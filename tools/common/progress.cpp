@@ -19,7 +19,7 @@ std::function<void(const std::string&, double)> progress_printer() {
           open = false](const std::string& name, double share) mutable {
     const bool terminal = isatty(fileno(stderr)) != 0;
     if (name != task || (share <= 0 && !open)) {
-      if (open) std::fputc('\n', stderr);  // the line of the task before
+      if (open) std::fputc('\n', stderr);  // End the line of the previous task.
       task = name;
       begin = Clock::now();
       shown = {};

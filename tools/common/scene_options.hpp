@@ -11,7 +11,7 @@
 #include "gsnav/render.hpp"
 #include "gsnav/sim.hpp"
 
-// What scene a program works on: the same options in all of them.
+// Scene options shared by all programs.
 
 namespace CLI {
 class App;
@@ -23,32 +23,32 @@ struct SceneOptions {
   std::string scene = "default";
   std::string up = "auto";
   double time = 0;
-  std::string storage = "full";   ///< full, compact, packed
-  std::string profile = "exact";  ///< exact, fast, lod
+  std::string storage = "full";   ///< One of full, compact, packed.
+  std::string profile = "exact";  ///< One of exact, fast, lod.
   double lod_error = gsnav::LodChoice{}.pixels;
-  std::string lod_levels = "shipped";  ///< shipped, built
-  std::string visible_sets;            ///< auto or a file; empty: none
+  std::string lod_levels = "shipped";  ///< One of shipped, built.
+  std::string visible_sets;            ///< "auto" or a file. Empty: none.
   std::vector<std::string> meshes;
-  std::string navmesh = "auto";  ///< as gsnav::OpenOptions::navmesh
-  double cell_size = 0.05;       ///< metres
-  std::vector<double> crop;      ///< x0 y0 z0 x1 y1 z1 in the world; empty: all of the scene
+  std::string navmesh = "auto";  ///< See gsnav::OpenOptions::navmesh.
+  double cell_size = 0.05;       ///< Metres.
+  std::vector<double> crop;      ///< World box as x0 y0 z0 x1 y1 z1. Empty: the whole scene.
   int avatars = 3;
   std::uint64_t seed = 1;
   double density = 1.0;
   gsnav::Device device;
 };
 
-/// Adds all of them; their defaults are `o`'s. `float64` as of add_device_option.
+/// Adds all scene options, with the values of `o` as defaults. See add_device_option for `float64`.
 void add_scene_options(CLI::App& app, SceneOptions& o, bool* float64 = nullptr);
-/// As the library takes them.
+/// Converts the options to those of the library.
 gsnav::OpenOptions open_options(const SceneOptions& o);
 
-/// Opens the scene. What there is to say goes to `notes`; warnings and progress go to stderr. Errors:
-/// invalid_argument naming options that do not go together; those of gsnav::open_scene.
+/// Opens the scene. Prints information to `notes`, and warnings and progress to stderr.
+/// @return invalid_argument for options that cannot be combined; the errors of gsnav::open_scene.
 gsnav::Result<gsnav::OpenedScene> open_scene(const SceneOptions& o, const gsnav::OpenOptions& how,
                                              std::FILE* notes);
 
-/// How the profile draws.
+/// Rendering quality of the profile.
 gsnav::Quality quality_of(const SceneOptions& o);
 gsnav::DetailChoice detail_of(const SceneOptions& o, const gsnav::OpenedScene& scene);
 

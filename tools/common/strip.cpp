@@ -12,7 +12,7 @@ namespace {
 constexpr Rgb kPaper{1, 1, 1}, kLetters{0.1f, 0.1f, 0.1f};
 constexpr int kGap = 4, kText = 2, kBand = 5 * kText + 2 * kGap;
 
-/// A bar in the colours of depth between its ends' distances.
+/// Draws a bar with the depth colours between the distances at its ends.
 void draw_scale(Canvas& sheet, int x, int y) {
   constexpr int kSteps = 120, kStep = 1;
   char near[16], far[16];

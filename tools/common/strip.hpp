@@ -10,18 +10,19 @@
 
 namespace gsnav_tools {
 
-// Range of depth colours in pictures for people, metres.
+// Range of the depth colours in pictures, metres.
 inline constexpr float kDepthNear = 0.3f, kDepthFar = 7.0f;
 
-/// What an agent saw at one moment.
+/// View of an agent at one time.
 struct Shot {
   double seconds = 0;
-  std::vector<std::uint8_t> rgb, depth;  ///< [h][w][3]; depth in colours from kDepthNear to kDepthFar
+  std::vector<std::uint8_t> rgb, depth;  ///< Shape [h][w][3]. `depth` is in colours from kDepthNear to
+                                         ///< kDepthFar.
 };
 Shot shot_of(double seconds, std::span<const float> rgb, std::span<const float> depth);
 
-/// Shots side by side, `w` x `h` pixels each: colour above depth, the time above, and below the scale of
-/// depth colours.
+/// Draws shots side by side, `w` x `h` pixels each: colour above depth, with the time on top and the
+/// scale of depth colours at the bottom.
 Canvas draw_strip(std::span<const Shot> shots, int w, int h);
 
 }  // namespace gsnav_tools

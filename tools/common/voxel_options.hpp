@@ -12,11 +12,11 @@ class App;
 
 namespace gsnav_tools {
 
-/// Adds --cell-size and --crop: of the voxels that a NavMesh is built from.
+/// Adds --cell-size and --crop for the voxels that a NavMesh is built from.
 void add_voxel_options(CLI::App& app, double& cell_size, std::vector<double>& crop,
                        const std::string& group);
 
-/// The box of two corners, x y z each.
+/// Box of two corners, x y z each.
 gsnav::Aabb<double> box_of(const std::vector<double>& corners);
 
 }  // namespace gsnav_tools

@@ -12,32 +12,31 @@
 
 namespace gsnav_convert {
 
-/// How far a cloud is from the one that it was made of, row by row: the largest of each field. Nothing
-/// is clamped.
+/// Largest difference per field between a cloud and its source, row by row. Values are not clamped.
 struct FieldErrors {
-  double mean = 0;          ///< metres
-  double scale = 0;         ///< ratio minus one, of scales that are not zero
-  double scale_metres = 0;  ///< of all
-  double rotation = 0;      ///< angle between the quaternions, radians
+  double mean = 0;          ///< Metres.
+  double scale = 0;         ///< Ratio minus one, over scales that are not zero.
+  double scale_metres = 0;  ///< Metres, over all scales.
+  double rotation = 0;      ///< Angle between the quaternions, radians.
   double opacity = 0;
-  double colour = 0;  ///< of degree 0: 0.5 + kSh0 coefficient
-  double bands = 0;   ///< of a higher SH coefficient
+  double colour = 0;  ///< Degree 0: 0.5 + kSh0 coefficient.
+  double bands = 0;   ///< Higher SH coefficients.
 };
 
-/// Row source_rows[i] of the source became row made_rows[i].
+/// Compares row source_rows[i] of the source with row made_rows[i] of the result.
 FieldErrors largest_field_errors(const gsnav::GaussianCloud& source,
                                  const std::vector<std::uint32_t>& source_rows,
                                  const gsnav::GaussianCloud& made,
                                  const std::vector<std::uint32_t>& made_rows);
 
 struct ImageErrors {
-  double psnr = 0;     ///< over all images, dB of 1; infinite where they are the same
-  double worst = 0;    ///< of one image
-  double largest = 0;  ///< difference of a value
+  double psnr = 0;     ///< Over all images, dB for peak 1. Infinity if they are equal.
+  double worst = 0;    ///< Smallest PSNR of an image, dB.
+  double largest = 0;  ///< Largest difference of a value.
 };
 
-/// Renders both from each camera as gsnav-render does: each in its own sort order, ties of depth in the
-/// order in which it was read. Values above 1 are compared too.
+/// Renders both clouds from each camera as gsnav-render does: in the cloud's own sort order, with ties
+/// of depth in reading order. Values above 1 are compared too.
 gsnav::Result<ImageErrors> image_errors(const gsnav::GaussianCloud& source,
                                         const gsnav::GaussianCloud& made,
                                         const std::vector<gsnav::Camera>& cameras);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// gsnav-convert IN... OUT: any scene that the library reads, edited, in any format that it writes.
+// gsnav-convert IN... OUT: edits any scene that the library reads and writes it in any format that it
+// writes.
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
@@ -45,7 +46,8 @@ Result<GaussianCloud> load(const Options& o) {
   return scene;
 }
 
-/// Names an option whose value no scene can be edited by, or ok.
+/// Checks that a scene can be edited with these values.
+/// @return an error with the option.
 Status validate(const Options& o) {
   const std::pair<const char*, std::vector<double>> all[] = {{"--crop", o.crop},
                                                              {"--rotate", o.rotate},
@@ -65,7 +67,7 @@ Status validate(const Options& o) {
   return {};
 }
 
-/// Whether all of a cloud is finite: what is edited may have left the range of its numbers.
+/// Returns true if all values of a cloud are finite. Edits may exceed the range of float32.
 bool is_finite(const GaussianCloud& cloud) {
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Vec3d m = cloud.mean(i);
@@ -76,7 +78,7 @@ bool is_finite(const GaussianCloud& cloud) {
   return true;
 }
 
-/// Crops and prunes in the axes of the input, then turns, scales and moves, in this order.
+/// Crops and prunes in the axes of the input. Then rotates, scales and moves, in this order.
 Status edit(GaussianCloud& cloud, const Options& o) {
   if (!o.crop.empty()) {
     Aabb<double> box;
@@ -128,7 +130,7 @@ std::uintmax_t bytes_of(const std::filesystem::path& out) {
   return sum;
 }
 
-/// Says how many values the format could not hold.
+/// Prints how many values the format could not hold.
 void print_clamped(const io::ClampedValues& c) {
   const auto line = [](std::uint64_t n, const char* what) {
     if (n != 0) std::printf("  %llu %s\n", static_cast<unsigned long long>(n), what);
@@ -139,8 +141,9 @@ void print_clamped(const io::ClampedValues& c) {
   line(c.lost_bands, "SH coefficients lost: the format has no bands");
 }
 
-/// Reads the file back as anybody would and says what became of the cloud, ties of depth in the order of
-/// the rows read included. `rows`: the cloud's in the file's order.
+/// Reads the file back and prints the differences from the cloud, including ties of depth in the order
+/// of the rows read.
+/// @param rows Rows of the cloud in the order of the file.
 Status compare(const GaussianCloud& source, const std::vector<std::uint32_t>& rows,
                const std::string& out, const Options& o) {
   auto back = io::load_scene(out, {.keep_zero_bands = true});
@@ -237,7 +240,7 @@ int main(int argc, char** argv) {
   auto cloud = load(o);
   if (!cloud) return fail(cloud.message());
   if (Status s = edit(*cloud, o); !s) return fail(s.message());
-  // The source keeps the order in which it was read, whatever the file gets.
+  // The source keeps its reading order, whatever order the file has.
   std::vector<std::uint32_t> as_read = cloud->row_ids;
   const bool chunks = lower_case(out).ends_with(".compressed.ply");
   if (chunks || o.order == "space") {

@@ -31,7 +31,7 @@ std::string file_text(const fs::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// Whether a file of this name in the folder of an evaluation is a journal.
+/// Returns true if a file with this name in the folder of an evaluation is a journal.
 bool is_journal(const std::string& name) {
   if (name == "journal.jsonl") return true;
   constexpr std::string_view kFront = "journal.", kEnd = ".jsonl";
@@ -41,14 +41,14 @@ bool is_journal(const std::string& name) {
   return rank.find_first_not_of("0123456789") == std::string::npos;
 }
 
-/// Whether a file of this name in its folder `episodes` is a picture of one.
+/// Returns true if a file with this name in the folder `episodes` is a picture of an episode.
 bool is_picture(const std::string& name) {
   const std::size_t digits = name.find_first_not_of("0123456789");
   return digits != 0 && digits != std::string::npos &&
          (name.substr(digits) == "_strip.png" || name.substr(digits) == "_map.png");
 }
 
-/// The files of a folder whose names `wanted` takes, in order; none where there is no folder.
+/// Files of a folder with names accepted by `wanted`, in order. Empty if there is no such folder.
 std::vector<fs::path> files_in(const fs::path& folder, bool (*wanted)(const std::string&)) {
   std::vector<fs::path> out;
   std::error_code error;
@@ -73,7 +73,7 @@ Status remove_pictures(const fs::path& folder) {
   return {};
 }
 
-/// A file's first line where it has a whole one.
+/// First line of a file. Empty if it is incomplete.
 std::string first_line(const std::string& text) {
   return text.substr(0, std::min(text.find('\n'), text.size()));
 }
@@ -92,7 +92,7 @@ Result<std::vector<OptionValue>> Journal::recorded_options(const fs::path& folde
 Status Journal::check_options(const fs::path& folder, const Options& options, bool views) {
   for (const fs::path& path : files_in(folder, is_journal)) {
     const std::string text = file_text(path);
-    if (text.find('\n') == std::string::npos) continue;  // begun again
+    if (text.find('\n') == std::string::npos) continue;  // The journal is started again.
     const auto header = read_header(path, first_line(text));
     if (!header) return header.status();
     if (Status s = compare_options(path, *header, options, views); !s) return s;
@@ -104,7 +104,7 @@ Status Journal::read(const fs::path& path, const Options& options, const Stage& 
                      const Contents& made_of, bool own, bool views) {
   const std::string text = file_text(path);
   std::size_t whole = 0,
-              line = 0;  // what follows the last end of a line was cut off while being written
+              line = 0;  // Text after the last line end was cut off while it was written.
   for (std::size_t at = 0, end; (end = text.find('\n', at)) != std::string::npos; at = whole = end + 1) {
     const std::string one = text.substr(at, end - at);
     if (++line == 1) {
@@ -167,7 +167,7 @@ Result<Journal> Journal::open(const fs::path& folder, const Options& options, co
   Journal j;
   j.path_ = folder / (rank == 0 ? "journal.jsonl" : "journal." + std::to_string(rank) + ".jsonl");
   const Contents made_of = contents_of(stage);
-  if (file_text(j.path_).find('\n') == std::string::npos) {  // none, or a header that was cut off
+  if (file_text(j.path_).find('\n') == std::string::npos) {  // There is no header, or it was cut off.
     if (Status s =
             rank == 0 && files_in(folder, is_journal).empty() ? remove_pictures(folder) : Status();
         !s)
@@ -201,7 +201,7 @@ Status Journal::lock() {
   lock_ = std::shared_ptr<const void>(this, [file](const void*) { ::close(file); });
   struct stat held {
   }, there{};
-  // A process that began the journal at the same moment has put another file in place of this one.
+  // A process that started the journal at the same time has replaced this file by another.
   const bool own = ::flock(file, LOCK_EX | LOCK_NB) == 0 && ::fstat(file, &held) == 0 &&
                    ::stat(path_.c_str(), &there) == 0 && held.st_ino == there.st_ino;
   if (own) return {};

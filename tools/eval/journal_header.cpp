@@ -46,7 +46,7 @@ Contents contents_of(const Stage& stage) {
     for (const auto& c : {b.motion.begin, b.motion.end})
       vector(h, c.p0), vector(h, c.p1), h.value(c.radius);
   };
-  // Bodies as they are met, at times that no walk repeats.
+  // Hash the bodies at times that no periodic walk repeats.
   constexpr int kTimes = 32;
   constexpr double kApart = 7.390625;
   std::vector<gsnav::DynamicCapsule> bodies;
@@ -125,7 +125,7 @@ Status compare_options(const fs::path& path, const Header& header, const Options
   for (std::size_t i = 0; i < now.size(); ++i) {
     const OptionValue& was = header.options[i];
     if (now[i].value == was.value || (!views && now[i].role == OptionRole::view)) continue;
-    // Files may lie elsewhere: their contents are compared.
+    // Files may be elsewhere. Their contents are compared.
     if (now[i].names_file && !was.value.empty() && now[i].role == OptionRole::file) continue;
     return {Errc::invalid_argument, path.string() + " was recorded with " + shown(was) +
                                         ", but this run has " + shown(now[i]) +

@@ -10,9 +10,9 @@ namespace gsnav_eval {
 
 using Json = nlohmann::ordered_json;
 
-/// The JSON of a line. Nesting is bounded, since copies and dump() take stack for each level.
+/// Parses a line of JSON. Nesting is limited, because copies and dump() recurse.
 inline Json parse_line(const std::string& line) {
-  constexpr int kDepth = 4;  // a journal's own lines have two levels
+  constexpr int kDepth = 4;  // Lines of a journal have two levels.
   return Json::parse(line, [](int depth, Json::parse_event_t, const Json&) {
     if (depth > kDepth)
       throw gsnav::Error(gsnav::Errc::invalid_file,

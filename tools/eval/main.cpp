@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// gsnav-eval: plays episodes by a policy, journals each as it ends, and makes a page of them.
+// gsnav-eval: plays episodes with a policy, records each in a journal, and makes a page of the results.
 #include <chrono>
 #include <cstdio>
 #include <exception>
@@ -31,7 +31,7 @@ struct Timings {
   std::size_t played = 0;
 };
 
-/// What came out: equal bytes for equal runs, on any number of threads, also where a run was broken off.
+/// Results. Equal runs give equal bytes, on any number of threads and after interruptions.
 std::string metrics_json(const Options& o, const gsnav::MetricsSummary& means, const Journal& journal,
                          const Stage& stage) {
   Json j;

@@ -18,7 +18,7 @@ std::string text_of(const T& value) {
   } else if constexpr (std::is_arithmetic_v<T>) {
     std::array<char, 32> text{};
     return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value)
-                             .ptr};  // the shortest that reads back
+                             .ptr};  // Shortest text that reads back as the same value.
   } else {
     std::string all;
     for (const auto& v : value) all += (all.empty() ? "" : "\n") + text_of(v);
@@ -26,8 +26,8 @@ std::string text_of(const T& value) {
   }
 }
 
-/// Calls f(flag, value, role, whether the value is a file's name) for each option that decides
-/// something.
+/// Calls f(flag, value, role, names_file) for each option that affects an evaluation. `names_file` is
+/// true if the value is the name of a file.
 template <class O, class F>
 void for_each_option(O& o, const F& f) {
   using enum OptionRole;
@@ -80,7 +80,7 @@ gsnav::Status take_options(const CLI::App& app, const std::vector<OptionValue>& 
       words.push_back(v.flag + "=" + v.value);
     }
   }
-  std::reverse(words.begin(), words.end());  // as CLI11 wants them
+  std::reverse(words.begin(), words.end());  // CLI11 expects the words in reverse order.
   CLI::App again;
   Options read;
   add_world_options(again, read);
@@ -89,7 +89,7 @@ gsnav::Status take_options(const CLI::App& app, const std::vector<OptionValue>& 
   } catch (const CLI::ParseError& e) {
     return {gsnav::Errc::invalid_argument, e.what()};
   }
-  // What the command line gave stays: it is compared with the journal's later.
+  // Options given on the command line are kept. They are compared with the journal later.
   for_each_option(options, [&](const char* flag, auto& to, OptionRole, bool) {
     if (app.get_option(flag)->count() > 0) return;
     for_each_option(read, [&](const char* other, auto& from, OptionRole, bool) {

@@ -9,7 +9,7 @@
 
 namespace gsnav_eval {
 
-/// What both programs, and the viewer, are asked for.
+/// Options shared by the programs and the viewer.
 struct Options : gsnav_tools::SceneOptions {
   int episodes = 10;
   std::string out = "out";
@@ -17,37 +17,38 @@ struct Options : gsnav_tools::SceneOptions {
   double hfov = 90.0;
   double eye_height = 1.5;
   int max_steps = 500;
-  std::string policy = "follower";  ///< follower, greedy, random
-  std::string episode_file;         ///< empty: generated
-  std::string preset = "avatar";    ///< v1, v2, avatar
+  std::string policy = "follower";  ///< One of follower, greedy, random.
+  std::string episode_file;         ///< Empty: generate episodes.
+  std::string preset = "avatar";    ///< One of v1, v2, avatar.
 };
 
-/// Whether --navmesh names a file.
+/// Returns true if --navmesh names a file.
 bool names_navmesh(const Options& options);
 
-/// Scene, people, episodes, body and picture.
+/// Adds options of the scene, people, episodes, body and images.
 void add_scene_options(CLI::App& app, Options& options);
-/// These and the policy: the options that decide what happens: an evaluation goes on, and is replayed,
-/// only with the same ones.
+/// Adds the options of add_scene_options and the policy. These determine the outcome, so an evaluation
+/// can be continued or replayed only with the same values.
 void add_world_options(CLI::App& app, Options& options);
 
-/// What an option of add_world_options decides.
+/// Effect of an option of add_world_options.
 enum class OptionRole {
-  result,  ///< what happens
-  file,    ///< what happens, by the content of the file that it names
-  view,    ///< the pictures
+  result,  ///< Affects the outcome.
+  file,    ///< Affects the outcome through the content of a file.
+  view,    ///< Affects the images only.
 };
-/// An option as a command line has it.
+/// An option as given on a command line.
 struct OptionValue {
-  std::string flag;   ///< with its dashes
-  std::string value;  ///< several are lines
+  std::string flag;   ///< With dashes.
+  std::string value;  ///< Several values are separated by line breaks.
   OptionRole role = OptionRole::result;
-  bool names_file = false;  ///< the value is a file's name
+  bool names_file = false;  ///< The value is the name of a file.
 };
-/// All options that decide something: not --out, and not --device, which changes no metric.
+/// All options that affect an evaluation. Excludes --out, and --device, which changes no metric.
 std::vector<OptionValue> option_values(const Options& options);
-/// Sets those options that `app` was not given from `values`, by the rules of the command line. Errors:
-/// invalid_argument, naming the option.
+/// Sets the options that are missing on the command line of `app` to `values`, with the checks of the
+/// command line.
+/// @return invalid_argument, with the option.
 gsnav::Status take_options(const CLI::App& app, const std::vector<OptionValue>& values,
                            Options& options);
 

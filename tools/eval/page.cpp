@@ -69,7 +69,7 @@ std::string figure(const Picture& p, const std::string& what) {
          ";base64," + base64(p.bytes) + "\"/><figcaption>" + escape(what) + "</figcaption></figure>\n";
 }
 
-/// What the lines and discs of maps stand for, in their colours.
+/// Legend of the lines and discs on maps, in their colours.
 std::string map_legend() {
   const std::pair<gsnav_tools::Rgb, const char*> marks[] = {
       {gsnav_tools::kMapStart, "start"},
@@ -114,7 +114,7 @@ std::string page(const Options& o, const gsnav::MetricsSummary& s, const std::ve
   std::size_t shown = 0;
   for (const Entry& e : entries) {
     const gsnav::EpisodeMetrics& m = e.record->metrics;
-    constexpr std::size_t kOpen = 3;  // at first
+    constexpr std::size_t kOpen = 3;  // Number of entries that are open at first.
     out += std::string(shown++ < kOpen ? "<details open>" : "<details>") + "<summary>episode " +
            escape(e.record->id) + ": " +
            (m.success       ? "reached"

@@ -8,13 +8,14 @@
 
 namespace gsnav_eval {
 
-/// A picture inside the page; no bytes: there is none.
+/// Picture embedded in the page. No bytes: there is none.
 struct Picture {
   const char* type = "png";
   std::string bytes;
 };
-/// A PNG file for the page: as a JPEG, a tenth as large, where the build has libjpeg. Errors: those of
-/// reading it.
+/// Converts a PNG file for the page. If the build has libjpeg, the result is a JPEG of about a tenth of
+/// the size.
+/// @return an error of reading the file.
 gsnav::Result<Picture> page_picture(const std::string& png_file);
 
 /// An episode on the page.
@@ -23,7 +24,7 @@ struct Entry {
   Picture strip, map;
 };
 
-/// The evaluation as one HTML page that needs nothing else.
+/// The evaluation as one self-contained HTML page.
 std::string page(const Options& options, const gsnav::MetricsSummary& summary,
                  const std::vector<Entry>& entries);
 

@@ -10,12 +10,14 @@ namespace gsnav_eval {
 
 using gsnav::Simulator;
 
-/// The simulator that draws for an evaluation. Errors: as of Simulator::create.
+/// Creates the simulator that renders an evaluation.
+/// @return the errors of Simulator::create.
 gsnav::Result<Simulator> make_simulator(const Options& options, const Stage& stage);
 
-/// Plays a record's actions again. Errors: invalid_file where they do not lead to its metrics (another
-/// scene or version made it); what the simulator reports. `look(simulator, step)` is called before the
-/// first and after each action.
+/// Repeats the actions of a record. `look(simulator, step)` is called before the first and after each
+/// action.
+/// @return invalid_file if the actions do not lead to the record's metrics, because another scene or
+/// version made it; errors of the simulator.
 template <class Look>
 gsnav::Status replay(Simulator& sim, const gsnav::PointNavEpisode& episode, const Record& record,
                      const Look& look) {

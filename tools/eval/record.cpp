@@ -29,7 +29,7 @@ Json to_json(const Record& r) {
           {"actions", actions}};
 }
 
-/// Thrown with "FIELD = VALUE: RULE".
+/// Throws an error "FIELD = VALUE: RULE".
 [[noreturn]] void refuse(const std::string& field, const Json& value, const std::string& rule) {
   constexpr std::size_t kShown = 60;
   std::string shown = value.dump(-1, ' ', true, Json::error_handler_t::replace);
@@ -48,7 +48,7 @@ std::size_t count(const Json& j, const std::string& field) {
   return j.get<std::size_t>();
 }
 
-/// A number; null, which JSON has for infinity.
+/// Reads a number. JSON null stands for infinity.
 double number(const Json& j, const std::string& field) {
   if (j.is_null()) return std::numeric_limits<double>::infinity();
   if (!j.is_number()) refuse(field, j, "must be a number");
@@ -100,9 +100,10 @@ Record from_json(const Json& j, const Stage& stage) {
   return r;
 }
 
-/// Whether two values of a field are equal. Mathematical libraries of other machines round differently.
+/// Returns true if two values of a field are equal within a tolerance. Mathematical libraries of other
+/// machines round differently.
 bool same(const Json& a, const Json& b) {
-  constexpr double kTolerance = 1e-6;  // metres, rates or rewards; relative above 1
+  constexpr double kTolerance = 1e-6;  // Metres, rates or rewards. Relative for values above 1.
   if (!a.is_number_float() || !b.is_number_float()) return a == b;
   const double x = a.get<double>(), y = b.get<double>();
   return x == y || (std::isfinite(y) && std::abs(x - y) <= kTolerance * std::max(1.0, std::abs(y)));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// gsnav-replay: an episode of an evaluation once more, from any camera.
+// gsnav-replay: shows an episode of an evaluation again, from any camera.
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -31,7 +31,7 @@ namespace fs = std::filesystem;
 
 struct ReplayOptions {
   std::size_t episode = 0;
-  std::vector<double> eye, target;  // none: the agent's own camera
+  std::vector<double> eye, target;  // empty: the agent's own camera
   std::string frames = "replay";
   std::string video;
   int every = 1;
@@ -39,7 +39,7 @@ struct ReplayOptions {
   bool inset = false;
 };
 
-/// Where everything was at each step, [T]...
+/// Positions and other values at each step. All have the shape [T]...
 struct Track {
   std::vector<double> positions, yaws, times, clearances;
   Status save(const fs::path& path) const {
@@ -52,13 +52,14 @@ struct Track {
   }
 };
 
-/// Where the agent is at one moment.
+/// Pose of the agent at one moment.
 struct Moment {
   double time = 0;  ///< seconds on the scene's clock
   gsnav::AgentPose agent;
 };
 
-/// The moment between two, at `t` in [0, 1]. The agent moves in a straight line and turns the short way.
+/// The moment between a (t = 0) and b (t = 1). The agent moves in a straight line and turns by the
+/// smaller angle.
 Moment between(const Moment& a, const Moment& b, double t) {
   Moment m = b;
   if (t == 1) return m;
@@ -94,7 +95,7 @@ class Painter {
     return p;
   }
 
-  /// [height][width][3] bytes: what the chosen camera sees.
+  /// Picture of the chosen camera, [height][width][3] bytes.
   gsnav::Result<std::vector<std::uint8_t>> paint(const Moment& m) {
     if (!fixed_) return view(own_camera(m, 1), m.time);
     auto rgb = view(*fixed_, m.time);
@@ -123,7 +124,7 @@ class Painter {
  private:
   explicit Painter(gsnav::Renderer renderer) : renderer_(std::move(renderer)) {}
 
-  /// The agent's own camera, its image `share` times smaller.
+  /// The agent's own camera with an image that is `share` times smaller.
   gsnav::Camera own_camera(const Moment& m, int share) const {
     gsnav::SensorSpec spec = own_;
     for (int& side : spec.resolution) side /= share;
@@ -137,14 +138,14 @@ class Painter {
   }
 
   gsnav::Renderer renderer_;
-  gsnav::Frames<float> frames_;  // its memory is used again
+  gsnav::Frames<float> frames_;  // reused for every picture
   gsnav::SensorSpec own_;
   std::optional<gsnav::Camera> fixed_;
   double radius_ = 0, height_ = 0;
   bool inset_ = false;
 };
 
-/// Follows a replay: keeps its track, and hands pictures to a folder or a video.
+/// Follows a replay: records its track, and writes pictures to a folder or a video.
 class Recorder {
  public:
   Recorder(const Options& o, const ReplayOptions& r, Painter painter)

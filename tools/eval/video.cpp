@@ -48,11 +48,11 @@ class PipedVideo final : public Video {
     const int n = std::snprintf(
         command, sizeof command,
         "ffmpeg -y -loglevel error -f rawvideo -pix_fmt rgb24 -s %dx%d -r %g -i - "
-        "-vf 'pad=ceil(iw/2)*2:ceil(ih/2)*2' -pix_fmt yuv420p '%s'",  // its colour is at half the size
+        "-vf 'pad=ceil(iw/2)*2:ceil(ih/2)*2' -pix_fmt yuv420p '%s'",  // yuv420p needs even sizes
         width, height, rate, aside_.c_str());
     if (n < 0 || n >= static_cast<int>(sizeof command))
       return {Errc::invalid_argument, "--video: the path is too long"};
-    std::signal(SIGPIPE, SIG_IGN);  // an ffmpeg that ends early is reported, not died of
+    std::signal(SIGPIPE, SIG_IGN);  // reports an early end of ffmpeg instead of ending this program
     pipe_.reset(popen(command, "w"));
     if (pipe_ == nullptr) return {Errc::unsupported, "--video: ffmpeg cannot be run"};
     return {};
@@ -83,7 +83,7 @@ class PipedVideo final : public Video {
 };
 
 #if defined(GSNAV_HAS_WEBPMUX)
-/// Encodes an animated WebP in memory, lossy, endlessly repeated.
+/// Encodes an animated WebP in memory. It is lossy and repeats endlessly.
 class AnimatedWebp final : public Video {
  public:
   AnimatedWebp() = default;
@@ -93,7 +93,7 @@ class AnimatedWebp final : public Video {
 
   Status open(const std::string& path, int width, int height, double rate) {
     constexpr float kQuality = 80;  // of 100
-    constexpr int kMethod = 5;      // of 6: smaller files in more time
+    constexpr int kMethod = 5;      // of 6; higher values make smaller files and take longer
     WebPAnimEncoderOptions options;
     if (WebPConfigInit(&config_) == 0 || WebPAnimEncoderOptionsInit(&options) == 0)
       return {Errc::unsupported, "--video: libwebp is another version than this was built for"};
@@ -142,7 +142,7 @@ class AnimatedWebp final : public Video {
   struct Delete {
     void operator()(WebPAnimEncoder* e) const noexcept { WebPAnimEncoderDelete(e); }
   };
-  /// When picture k begins, milliseconds.
+  /// Time at which picture k begins, milliseconds.
   int begin_of(int k) const { return static_cast<int>(std::lround(k * milliseconds_)); }
   Status failed() const {
     return {Errc::out_of_memory, path_.string() + ": " + WebPAnimEncoderGetError(encoder_.get())};

@@ -10,13 +10,13 @@
 
 namespace gsnav_eval {
 
-/// A video file that is written picture by picture. It takes its name once it is whole.
+/// A video file that is written picture by picture. The file gets its name when it is complete.
 class Video {
  public:
   virtual ~Video() = default;
   /// Adds a picture, [height][width][3] bytes.
   virtual gsnav::Status add(const std::vector<std::uint8_t>& rgb) = 0;
-  /// Finishes the file. Without this call the file of before stays.
+  /// Finishes the file. Without this call a file that existed before is kept.
   virtual gsnav::Status close() = 0;
 };
 

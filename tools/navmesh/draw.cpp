@@ -13,10 +13,10 @@ namespace {
 
 using Rgb = std::array<std::uint8_t, 3>;
 
-constexpr std::size_t kMargin = 16, kFoot = 24;  // pixels; the scale is in the foot
+constexpr std::size_t kMargin = 16, kFoot = 24;  // Pixels. The scale is in the foot.
 constexpr Rgb kGround{250, 250, 248}, kBorder{40, 48, 58}, kInk{40, 48, 58};
-// Told apart by people who see colours differently (Okabe and Ito), lightened; the largest island is the
-// first.
+// Colours that people with colour-vision deficiencies can distinguish (Okabe and Ito), lightened. The
+// first is for the largest island.
 constexpr std::array<Rgb, 7> kIslands{{{160, 205, 235},
                                        {240, 210, 130},
                                        {140, 210, 185},

@@ -11,15 +11,15 @@ namespace gsnav_navmesh {
 
 struct MapPicture {
   int width = 0, height = 0;
-  std::vector<std::uint8_t> rgb;  ///< [height][width][3]
+  std::vector<std::uint8_t> rgb;  ///< Shape [height][width][3].
 };
 
-/// A map in colours: islands by number, their borders dark, a scale bar of `bar` metres at the lower
-/// left. North is -z, east x.
+/// Draws a map in colours: islands by number, with dark borders, and a scale bar of `bar` metres at the
+/// lower left. Up is -z, right is x.
 MapPicture draw(const gsnav::TopDownMap& map, double bar);
 
-/// A round length for the bar of a map this wide: 1, 2 or 5 times a power of ten, at most a quarter of
-/// it.
+/// A round length for the scale bar of a map with this width: 1, 2 or 5 times a power of ten, at most a
+/// quarter of the width.
 double bar_length(double width);
 
 }  // namespace gsnav_navmesh

@@ -30,7 +30,7 @@ Result<Similarity> placement(const Options& o, const std::string& up) {
   return placed;
 }
 
-/// Adds the triangles of a file to `all`.
+/// Appends the triangles of a file to `all`.
 Status add_triangles(const std::string& path, const Similarity& placed, NavMeshTriangles& all) {
   auto mesh = io::load_mesh(path);
   if (!mesh) return mesh.status();
@@ -44,7 +44,7 @@ Status add_triangles(const std::string& path, const Similarity& placed, NavMeshT
   return {};
 }
 
-/// The triangles of `path`, where one is given, and of the objects.
+/// Triangles of `path`, if given, and of the objects.
 Result<NavMeshTriangles> load_triangles(const Options& o, const std::string& path,
                                         const Similarity& placed) {
   NavMeshTriangles all;
@@ -65,7 +65,7 @@ Result<NavMesh> from_triangles(const Options& o) {
   return NavMesh::build(o.settings, mesh->vertices, mesh->triangles, o.threads);
 }
 
-/// Finds what is seen from where on the NavMesh, and writes it.
+/// Computes the visible sets for positions on the NavMesh, and writes them.
 Status write_visible_sets(const Options& o, const GaussianCloud& cloud, const NavMesh& mesh,
                           const Similarity& placed) {
   const auto viewpoints = navmesh_viewpoints(mesh, o.eye_heights, o.visible.spacing());

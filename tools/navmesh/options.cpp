@@ -26,7 +26,7 @@ const char kDescription[] =
     "invalid options.\nExample: gsnav-navmesh apartment.ply --agent-radius 0.2 --out apartment.navmesh "
     "--png map.png";
 
-/// FILE[@X,Y,Z[,YAW[,SCALE]]]; none where what follows the @ is something else.
+/// Parses FILE[@X,Y,Z[,YAW[,SCALE]]]. Empty if the text after @ is something else.
 std::optional<StaticObject> parse_object(const std::string& text) {
   StaticObject out;
   const std::size_t at = text.rfind('@');
@@ -48,7 +48,7 @@ std::optional<StaticObject> parse_object(const std::string& text) {
   return out;
 }
 
-/// Options that are looked at again when all are known.
+/// Options that are checked when all are known.
 struct Given {
   CLI::Option *up = nullptr, *scale = nullptr, *settings = nullptr, *object = nullptr,
               *cell_height = nullptr, *tile_size = nullptr, *mesh = nullptr, *visible_sets = nullptr;
@@ -233,7 +233,7 @@ InputKind kind_of(const std::string& input) {
 
 namespace {
 
-/// Refuses options that do not go together.
+/// Rejects options that cannot be combined.
 void check_together(Options& o, const Given& given) {
   if (kind_of(o.input) != InputKind::gaussians && given.visible_sets->count() > 0) {
     throw CLI::ValidationError("--visible-sets", o.input + " has no Gaussians");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// gsnav-render: images of a scene of Gaussians from the cameras of a file.
+// gsnav-render: renders images of a scene of Gaussians from the cameras of a file.
 #include <unistd.h>
 
 #include <algorithm>
@@ -31,7 +31,8 @@ using gsnav_render::fail;
 using gsnav_render::Options;
 using gsnav_render::Scene;
 
-/// Depth in colours over the range asked for, or over the image's own from its 2nd to 98th percentile.
+/// Colours depth over the requested range, or over the image's own range from its 2nd to its 98th
+/// percentile.
 std::vector<std::uint8_t> depth_picture(const std::vector<float>& metres, const Options& o) {
   float near = static_cast<float>(o.depth_near), far = static_cast<float>(o.depth_far);
   if (!(far > near)) {
@@ -45,7 +46,7 @@ std::vector<std::uint8_t> depth_picture(const std::vector<float>& metres, const 
   return io::colorize_depth(metres, near, far);
 }
 
-/// The files of one camera.
+/// Writes the files of one camera.
 template <class S>
 Status write_images(const Frames<S>& f, const Camera& camera, std::size_t index, const Options& o) {
   const DepthChoice& depth = o.depth_choice;
@@ -88,7 +89,7 @@ RenderOptions how_to_draw(const Options& o, const OpenedScene& scene) {
   return how;
 }
 
-/// What a camera is shown of the scene, in host memory: for the ledger and the float64 reference.
+/// The part of the scene that a camera sees, in host memory, for the ledger and the float64 reference.
 class HostView {
  public:
   HostView(std::shared_ptr<const SimulatorScene> scene, const RenderOptions& how)
@@ -101,7 +102,7 @@ class HostView {
     sets_ = whole ? scene_.assets() : details_.select(*scene_.detail(), scene_.assets(), camera);
     rules_ = whole ? config_ : details_.rules(config_);
   }
-  /// What the last camera was shown in a frame with these counts.
+  /// Ledger of the last camera, for a frame with these counts.
   FrameLedger ledger(const Camera& camera, const RenderStats& stats, const LoadReport& report) const {
     const SceneAsset& asset = scene_.scene().assets[0];
     const LodCut* const cut = asset.lod != nullptr ? &details_.cut(0) : nullptr;
@@ -110,7 +111,7 @@ class HostView {
     if (asset.visible != nullptr) l.unseen_weight = asset.visible->min_weight;
     return l;
   }
-  /// Draws by the float64 reference.
+  /// Renders with the float64 reference.
   Status render(const Camera& camera, const MeshLight& light, Frames<double>& out) {
     look(camera);
     reference_.set_config(rules_);
@@ -127,7 +128,8 @@ class HostView {
   BasicRenderer<double, SerialBackend> reference_;
 };
 
-/// `draw`: a Status of a camera, the meshes' light and the frames to write.
+/// @param draw Renders one camera with the light of the meshes into the given frames, and returns a
+/// Status.
 template <class S, class Draw>
 int run(const Options& o, const Scene& scene, HostView& host, const Draw& draw) {
   const std::vector<Camera>& cameras = scene.cameras;

@@ -87,7 +87,7 @@ void add_images(CLI::App& app, Options& o) {
   app.add_flag("--ledger", o.ledger, "print what each frame skipped, merged, limited and rounded");
 }
 
-/// Why the options do not go together, or nothing.
+/// Reason why the options cannot be combined, or an empty text.
 std::string refused(const Options& o) {
   if (!parse_depth(o.depth)) {
     return "--depth " + o.depth + ": use median, expected, accumulated, first or first:TAU, 0 < TAU < 1";

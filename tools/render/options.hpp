@@ -11,7 +11,7 @@ namespace gsnav_render {
 
 using namespace gsnav;
 
-/// Which image --depth names; first hit may carry its tau.
+/// Image that --depth selects. First-hit depth may have its own tau.
 struct DepthChoice {
   unsigned output = kMedianDepth;
   double tau = 0.5;
@@ -19,8 +19,8 @@ struct DepthChoice {
 
 struct Options : gsnav_tools::SceneOptions {
   std::string cameras, out, depth = "median", composite = "merged";
-  std::vector<double> eye, target;  ///< x y z
-  bool float64 = false;             ///< by the float64 reference, whatever the device is
+  std::vector<double> eye, target;  ///< Positions x y z.
+  bool float64 = false;             ///< Use the float64 reference, on any device.
   DepthChoice depth_choice;
   int width = 0, height = 0, orbit = 4;
   double hfov = 60, near_plane = 0.2, max_alpha = 0.99, depth_near = 0, depth_far = 0;
@@ -30,7 +30,8 @@ struct Options : gsnav_tools::SceneOptions {
 /// Prints "gsnav-render: `message`". Returns the exit status.
 int fail(const std::string& message);
 
-/// The exit status where there is nothing to draw: --help, or options that do not go together.
+/// Parses options. Returns the exit status if there is nothing to render: --help, or options that cannot
+/// be combined.
 std::optional<int> parse_options(int argc, char** argv, Options& o);
 
 }  // namespace gsnav_render

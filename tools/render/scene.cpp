@@ -12,7 +12,7 @@
 namespace gsnav_render {
 namespace {
 
-/// As it stands in the world where it stands so in a scene's file.
+/// Transforms a camera of a scene's file to the world.
 Camera in_world(Camera camera, const Similarity& world_from_file) {
   Affine3<double> back;
   back.linear = rotation_matrix(inverse(world_from_file).rotation);
@@ -20,7 +20,7 @@ Camera in_world(Camera camera, const Similarity& world_from_file) {
   return camera;
 }
 
-/// Views around a scene, or into the rooms of the flat.
+/// Views around a scene, or into the rooms of the default flat.
 Result<std::vector<Camera>> views_of(const Options& o, const OpenedScene& scene, int width, int height) {
   std::vector<Camera> out;
   if (o.scene == "default") {

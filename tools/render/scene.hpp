@@ -7,13 +7,13 @@
 
 namespace gsnav_render {
 
-/// What is drawn, and from where.
+/// The scene to render, and the cameras.
 struct Scene {
   OpenedScene opened;
-  std::vector<Camera> cameras;  ///< in the world
+  std::vector<Camera> cameras;  ///< In world coordinates.
 };
 
-/// Reads all that the options name, and prints what it is.
+/// Reads everything that the options name, and prints a description.
 Result<Scene> load_scene(const Options& o);
 
 }  // namespace gsnav_render

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// gsnav-scene: scenes and people that are made by code alone.
+// gsnav-scene: makes scenes and people by code alone.
 #include <cstdio>
 #include <string>
 
@@ -18,7 +18,7 @@ using gsnav::Errc;
 using gsnav::Result;
 using gsnav::Status;
 
-/// Whether the files of a scene can be written, asked before it is made.
+/// Checks, before the scene is made, that its files can be written.
 Status outputs_status(const Outputs& o) {
   if (!o.folder.empty()) {
     if (Status s = gsnav::make_output_folder(o.folder); !s) return s;

@@ -110,7 +110,7 @@ CLI::App* add_humanoid(CLI::App& app, HumanoidCommand& c) {
   return person;
 }
 
-/// Names the files in the folder that `default --out` asks for, if it does.
+/// Sets the names of the files in the folder of `default --out`, if it is used.
 void name_files_in_folder(Outputs& out) {
   const std::filesystem::path path(out.scene);
   std::error_code ignored;

@@ -10,15 +10,15 @@
 
 namespace gsnav_scene {
 
-/// What is written of a scene. Empty names are not written.
+/// Outputs of a scene. Empty names are not written.
 struct Outputs {
   std::string scene, mesh, cameras;
-  std::string folder;  ///< to make, for all of them
+  std::string folder;  ///< Folder to create for all of them.
 };
 
-/// A scene to make and to write.
+/// A scene to make and write.
 struct SceneCommand {
-  bool rooms = false;  ///< a floor plan of `plan`; else the embedded flat
+  bool rooms = false;  ///< Make a floor plan from `plan`. False: the embedded flat.
   gsnav::FloorPlanOptions plan;
   gsnav::SceneSampling sampling;
   gsnav::IndoorViewOptions views;
@@ -26,7 +26,7 @@ struct SceneCommand {
 };
 
 struct HumanoidCommand {
-  std::uint64_t seed = 0;  ///< 0: the demo's person
+  std::uint64_t seed = 0;  ///< 0: the person of the demo.
   int gaussians = 30000;
   std::string out;
 };
@@ -36,8 +36,7 @@ struct Options {
   std::optional<HumanoidCommand> humanoid;
 };
 
-/// Reads the command line; prints help, or what is wrong, and sets `exit_code` where nothing is left to
-/// do.
+/// Reads the command line. If there is nothing left to do, prints help or an error and sets `exit_code`.
 std::optional<Options> parse_options(int argc, char** argv, int& exit_code);
 
 }  // namespace gsnav_scene

@@ -17,8 +17,8 @@ bool read(std::string_view text, double& out) {
   return error == std::errc{} && end == text.data() + text.size() && gsnav::is_finite(out);
 }
 
-constexpr double kMostTurn = 10.0;    // radians in one message
-constexpr double kMostTime = 100000;  // seconds
+constexpr double kMostTurn = 10.0;    // Radians per message.
+constexpr double kMostTime = 100000;  // Seconds.
 
 }  // namespace
 

@@ -10,20 +10,21 @@
 
 namespace gsnav_viewer {
 
-/// What the page asks for. What is not mentioned in a message stays as it is, but for turns and
-/// commands, which are once.
+/// Requests of the page. Values that a message does not mention are kept, except turns and commands,
+/// which happen once.
 struct Controls {
-  double forward = 0.0, left = 0.0;  ///< share of full speed in [-1, 1], held until the next message
-  double turn = 0.0, tilt = 0.0;     ///< radians to the left and upwards, added up
+  double forward = 0.0, left = 0.0;  ///< Fraction of full speed in [-1, 1], until the next message.
+  double turn = 0.0, tilt = 0.0;     ///< Radians to the left and up, accumulated.
   bool paused = false, people = true, capsules = false, navmesh = false;
-  std::optional<double> time;       ///< seconds of the scene's clock to go to
-  bool stop = false, next = false;  ///< ends the episode as the agent's `stop` does; begins the next
-  // Of one message alone:
-  std::optional<std::uint64_t> seen;  ///< number of the newest frame that the page has
-  bool steers = false;                ///< it says more than that
-  bool walks = false;                 ///< it has forward or left
+  std::optional<double> time;       ///< Time on the scene's clock to go to, seconds.
+  bool stop = false, next = false;  ///< `stop` ends the episode like the agent's own stop. `next` starts
+                                    ///< the next one.
+  // Values of a single message:
+  std::optional<std::uint64_t> seen;  ///< Number of the newest frame that the page has.
+  bool steers = false;                ///< The message contains more than `seen`.
+  bool walks = false;                 ///< The message contains forward or left.
 
-  /// Takes what happens once.
+  /// Clears everything that happens once.
   void forget_commands() noexcept {
     turn = tilt = 0.0;
     time.reset();
@@ -31,9 +32,9 @@ struct Controls {
   }
 };
 
-/// Applies a message of `name=number` pairs joined by '&': forward, left, turn, tilt, time; paused,
-/// people, capsules, navmesh, stop and next are 0 or 1, seen is a whole number. Errors: invalid_argument
-/// (names the field), and nothing is changed.
+/// Applies a message of `name=number` pairs joined by '&'. forward, left, turn, tilt and time are
+/// numbers; paused, people, capsules, navmesh, stop and next are 0 or 1; seen is an integer.
+/// @return invalid_argument, with the field. Nothing is changed then.
 gsnav::Status apply(std::string_view message, Controls& controls);
 
 }  // namespace gsnav_viewer

@@ -24,7 +24,7 @@ bool is_visible(std::string_view s) {
   return std::all_of(s.begin(), s.end(), [](char c) { return c > ' ' && c < 127; });
 }
 
-/// A field's value may have anything but control characters.
+/// Returns true if the value of a field has no control characters.
 bool is_value(std::string_view s) {
   return std::all_of(s.begin(), s.end(), [](char c) {
     return c == '\t' || (static_cast<unsigned char>(c) >= ' ' && c != 127);
@@ -43,7 +43,7 @@ bool same_name(std::string_view a, std::string_view lower) {
   });
 }
 
-/// ":" and digits.
+/// Returns true for ":" followed by digits.
 bool is_port(std::string_view s) {
   return s.size() > 1 && s.size() < 7 && s.front() == ':' &&
          std::all_of(s.begin() + 1, s.end(), [](char c) { return c >= '0' && c <= '9'; });
@@ -54,7 +54,7 @@ std::string lower(std::string s) {
   return s;
 }
 
-/// Takes the next line off `text`; false where it has no end.
+/// Takes the next line from `text`. Returns false if the line has no end.
 bool take_line(std::string_view& text, std::string_view& line) {
   const std::size_t end = text.find(kEnd);
   if (end == std::string_view::npos) return false;
@@ -149,7 +149,7 @@ bool is_allowed_host(std::string_view host, bool loopback, std::span<const std::
 
 bool is_from_elsewhere(const Request& r) {
   if (!r.site.empty() && r.site != "same-origin" && r.site != "none") return true;
-  // https: behind a proxy that encrypts.
+  // The origin is https behind a proxy that encrypts.
   return !r.origin.empty() && r.origin != "http://" + r.host && r.origin != "https://" + r.host;
 }
 

@@ -21,7 +21,7 @@ namespace {
 using gsnav::Errc;
 using gsnav::Status;
 
-constexpr int kTick = 100;  // milliseconds between looks at whether the server stops
+constexpr int kTick = 100;  // Milliseconds between checks whether the server stops.
 
 const char* reason_of(int status) {
   switch (status) {
@@ -69,7 +69,7 @@ std::string head_of(const Reply& reply, bool keep_alive) {
   return h + "\r\n";
 }
 
-/// Waits until `events` can be done on a socket: 1 they can, 0 not yet, -1 never.
+/// Waits for `events` on a socket. Returns 1 if they are possible, 0 if not yet, -1 if never.
 int wait_for(int socket, short events) {
   pollfd p{socket, events, 0};
   const int n = poll(&p, 1, kTick);
@@ -136,8 +136,8 @@ void HttpServer::forget_finished() {
   }
 }
 
-/// Whether another connection may be had. Where there are too many, the one that was idle longest is
-/// dropped. One whose request has arrived is not idle, also where its thread has not read it yet.
+/// Returns true if another connection is possible. If there are too many, the one that was idle longest
+/// is dropped. A connection with a request waiting is not idle, even if its thread has not read it yet.
 bool HttpServer::make_room() {
   std::size_t kept = 0;
   Connection* idle = nullptr;
@@ -147,13 +147,14 @@ bool HttpServer::make_room() {
     ++kept;
     pollfd p{c.socket, POLLIN, 0};
     if (poll(&p, 1, 0) != 0) continue;
-    const Clock::rep t = c.idle_since;  // read after the poll: it is cleared before bytes are taken
+    const Clock::rep t = c.idle_since;  // Read after the poll, because it is cleared before bytes are
+                                        // taken.
     if (t != 0 && (idle == nullptr || t < since)) {
       idle = &c;
       since = t;
     }
   }
-  // Dropped ones take a moment to end.
+  // Dropped connections take a moment to end.
   if (connections_.size() >= 2 * options_.most_connections) return false;
   if (kept < options_.most_connections) return true;
   if (idle == nullptr) return false;
@@ -187,13 +188,13 @@ void HttpServer::accept_connections() {
         try {
           talk(c);
         } catch (const std::exception&) {
-          // Out of memory for one client: its connection ends, the others go on.
+          // Out of memory for one client. Its connection ends, the others continue.
         }
         shutdown(c.socket, SHUT_RDWR);
         c.over = true;
       });
     } catch (const std::exception&) {
-      // Out of memory, or no thread to be had: this client goes, the server stays.
+      // Out of memory or threads. This client is disconnected, the server continues.
       close(socket);
       if (!connections_.empty() && !connections_.back().thread.joinable()) connections_.pop_back();
     }
@@ -248,12 +249,12 @@ void HttpServer::talk(Connection& c) const {
     ParsedRequest r;
     if (!read_request(c, r)) return;
     c.idle_since = 0;
-    if (r.status == 408 && !first && c.unread.empty()) return;  // the client has nothing more to ask
+    if (r.status == 408 && !first && c.unread.empty()) return;  // The client has no further request.
     const Reply reply = r.status == 200 ? answer(r.request) : plain(r.status);
     more = r.status == 200 && r.request.keep_alive && !stopping_;
     if (!send_reply(c.socket, reply, r.request.method != "HEAD", more)) return;
   }
-  // What was not read would make the system take the answer back.
+  // Read the rest, because unread bytes would make the system discard the answer.
   shutdown(c.socket, SHUT_WR);
   std::array<char, 4096> rest{};
   for (int i = 0;
@@ -269,7 +270,7 @@ Reply HttpServer::answer(const Request& request) const {
         "The viewer does not know the host name of this address. Start it with --allow-host NAME.\n";
     return refused;
   }
-  // Pages of other sites may neither steer nor have anything drawn.
+  // Pages of other sites must not steer or request frames.
   if (request.method == "POST" && is_from_elsewhere(request)) return plain(403);
   Reply reply = handler_(request);
   if (reply.status != 200 && reply.body.empty()) reply = plain(reply.status);
@@ -277,7 +278,8 @@ Reply HttpServer::answer(const Request& request) const {
 }
 
 bool HttpServer::send(int socket, std::string_view bytes) const {
-  const auto deadline = Clock::now() + options_.patience;  // for all of it, however slowly it is read
+  const auto deadline = Clock::now() + options_.patience;  // For all bytes, however slowly they are
+                                                           // read.
   while (!bytes.empty() && !stopping_) {
     const ssize_t n = ::send(socket, bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (n > 0) {

@@ -15,7 +15,7 @@
 
 namespace gsnav_viewer {
 
-/// What a request is answered with.
+/// Answer to a request.
 struct Reply {
   int status = 200;
   std::string type = "text/plain; charset=utf-8";
@@ -23,29 +23,31 @@ struct Reply {
 };
 
 struct ServerOptions {
-  std::string address =
-      "127.0.0.1";  ///< IPv4 to listen at; at a loopback address hosts must be loopback's too
-  int port = 0;     ///< 0: any that is free
+  std::string address = "127.0.0.1";  ///< IPv4 address to listen on. On a loopback address, only
+                                      ///< loopback hosts are accepted.
+  int port = 0;                       ///< 0: any free port.
   std::vector<std::string>
-      allowed_hosts{};  ///< names that a Host field may have beside addresses and localhost
-  std::size_t most_connections = 16;  ///< more drop the one that was idle longest, or are answered 503
+      allowed_hosts{};  ///< Names that a Host field may have in addition to addresses and localhost.
+  std::size_t most_connections = 16;  ///< Beyond this, the connection that was idle longest is dropped,
+                                      ///< or the new one gets 503.
   std::chrono::milliseconds patience{
-      5000};  ///< for a whole request, a whole reply, and between requests
+      5000};  ///< Time for a whole request, for a whole reply, and between requests.
 };
 
-/// A small HTTP/1.1 server with a thread per connection, whose requests are answered in turn. It reads
-/// nothing from disk. (A library would have to be refused a full queue, drop idle connections and keep
-/// one deadline per reply; Debian 12's cpp-httplib does none of the three and needs OpenSSL and brotli.)
+/// A small HTTP/1.1 server with one thread per connection, which answers requests in order. It reads
+/// nothing from disk. (A library would have to limit its queue, drop idle connections and apply one
+/// deadline per reply. cpp-httplib of Debian 12 does none of these and needs OpenSSL and brotli.)
 class HttpServer {
  public:
   using Handler = std::function<Reply(const Request&)>;
 
-  /// Listens; connections wait until serve(). Errors: invalid_argument (the address); backend_failure
-  /// (the port is taken, with the system's words).
+  /// Starts listening. Connections wait until serve().
+  /// @return invalid_argument for the address; backend_failure, with the system's message, if the port
+  /// is taken.
   static gsnav::Result<std::unique_ptr<HttpServer>> bind(ServerOptions options);
-  /// Answers requests from now on, in threads of its own. Once.
+  /// Starts answering requests, in threads of the server. Call it once.
   void serve(Handler handler);
-  ~HttpServer();  ///< ends all connections
+  ~HttpServer();  ///< Ends all connections.
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
 
@@ -53,14 +55,14 @@ class HttpServer {
 
  private:
   using Clock = std::chrono::steady_clock;
-  /// Its socket is closed by the accepting thread alone, so that no number is shut down that has been
-  /// given anew.
+  /// Only the accepting thread closes the socket, so that no reused descriptor is shut down.
   struct Connection {
     int socket = -1;
-    std::atomic<Clock::rep> idle_since{0};  ///< waits for the first byte of a request; 0: busy
+    std::atomic<Clock::rep> idle_since{0};  ///< Time since which it waits for the first byte of a
+                                            ///< request. 0: busy.
     std::atomic<bool> over{false};
     bool dropped = false;
-    std::string unread;  ///< received, of the next request
+    std::string unread;  ///< Received bytes of the next request.
     std::thread thread;
   };
 
@@ -80,7 +82,7 @@ class HttpServer {
   bool loopback_ = true;
   int listener_ = -1;
   std::atomic<bool> stopping_{false};
-  std::list<Connection> connections_;  // of the accepting thread
+  std::list<Connection> connections_;  // Used by the accepting thread.
   std::thread thread_;
 };
 

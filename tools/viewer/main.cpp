@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// gsnav-viewer: walks a scene in the browser.
+// gsnav-viewer: shows a scene in the browser and lets the user walk through it.
 #include <atomic>
 #include <csignal>
 #include <cstdio>
@@ -18,39 +18,39 @@ namespace {
 
 using gsnav::Status;
 
-/// Paths are compared as they are: nothing else is served, whatever a path looks like.
+/// Paths are compared literally, and nothing else is served.
 Reply answer(Session& session, const Request& r) {
   if (r.path == "/") {
     if (r.method == "POST") return {405, "", ""};
     return {200, "text/html; charset=utf-8", std::string(page())};
   }
   if (r.path != "/frame") return {404, "", ""};
-  if (r.method != "POST") return {405, "", ""};  // what other sites' pictures and links ask for
+  if (r.method != "POST") return {405, "", ""};  // Pictures and links of other sites use GET.
   auto frame = session.frame(r.body);
   if (!frame) return {400, "text/plain; charset=utf-8", frame.message() + "\n"};
   return {200, "application/octet-stream", std::move(*frame)};
 }
 
-/// Waits for SIGINT and SIGTERM in a thread of its own, from its making to its end. Before a session is
-/// there, they end the process: nothing is half written, since files are made aside and renamed.
+/// Waits for SIGINT and SIGTERM in its own thread during its lifetime. Before there is a session, they
+/// end the process. Files are written aside and renamed, so none is left incomplete.
 class Signals {
  public:
   Signals() {
     sigemptyset(&signals_);
     sigaddset(&signals_, SIGINT);
     sigaddset(&signals_, SIGTERM);
-    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);  // threads inherit it
+    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);  // Threads inherit the mask.
     thread_ = std::thread([this] { wait(); });
   }
   ~Signals() {
     ended_ = true;
-    pthread_kill(thread_.native_handle(), SIGTERM);  // where it still waits
+    pthread_kill(thread_.native_handle(), SIGTERM);  // Ends the wait if it still waits.
     thread_.join();
   }
   Signals(const Signals&) = delete;
   Signals& operator=(const Signals&) = delete;
 
-  /// The session that the first signal stops from now on; null: none.
+  /// Sets the session that the first signal stops. Null: none.
   void stop(Session* session) {
     std::lock_guard lock(mutex_);
     session_ = session;
@@ -80,7 +80,7 @@ class Signals {
 
 Status run(const gsnav_eval::Options& o, const SessionOptions& how, const ServerOptions& where) {
   Signals signals;
-  // Before anything is loaded, so that a port that is taken shows at once.
+  // Before anything is loaded, so that a port in use is reported at once.
   auto server = HttpServer::bind(where);
   if (!server) return server.status();
   auto stage = gsnav_eval::prepare(o);
@@ -93,7 +93,7 @@ Status run(const gsnav_eval::Options& o, const SessionOptions& how, const Server
   std::printf("http://%s:%d/\n", where.address.c_str(), (*server)->port());
   std::fflush(stdout);
   const Status s = session.run();
-  session.stop();  // who waits for a frame
+  session.stop();  // Releases threads that wait for a frame.
   server->reset();
   signals.stop(nullptr);
   return s;

@@ -5,7 +5,7 @@
 
 namespace gsnav_viewer {
 
-/// The viewer's page: HTML that needs nothing but POST /frame.
+/// The viewer's page: HTML that only needs POST /frame.
 std::string_view page() noexcept;
 
 }  // namespace gsnav_viewer

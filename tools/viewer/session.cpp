@@ -23,16 +23,17 @@ using gsnav::Vec3d;
 using std::chrono::duration;
 using std::chrono::milliseconds;
 
-constexpr double kTurnedUp = 1.55;          // radians: as far as one looks up and down
-constexpr auto kHeld = milliseconds(1000);  // a key whose release got lost is let go after that
-constexpr auto kStill = milliseconds(250);  // between frames while nothing moves
+constexpr double kTurnedUp = 1.55;          // Radians. Limit of looking up and down.
+constexpr auto kHeld = milliseconds(1000);  // A key whose release was lost is released after this time.
+constexpr auto kStill = milliseconds(250);  // Interval between frames while nothing moves.
 constexpr auto kLinger =
-    milliseconds(100);  // the next frame is begun though nobody has asked for it yet
-constexpr auto kAnswer = milliseconds(500);  // a request for a frame waits no longer
-constexpr int kMostActions = 5;              // caught up with in one frame, where drawing is slow
-constexpr double kLeastIsland = 1.5;         // metres: as on maps
+    milliseconds(100);  // After this time the next frame is started even if it has not been requested.
+constexpr auto kAnswer = milliseconds(500);  // Longest wait of a request for a frame.
+constexpr int kMostActions = 5;              // Largest number of actions that one frame catches up with
+                                             // if rendering is slow.
+constexpr double kLeastIsland = 1.5;         // Metres, as on maps.
 
-/// Colours of depth, evenly from near to far, as CSS writes them.
+/// Depth colours, evenly spaced from near to far, in CSS notation.
 std::vector<std::string> depth_colors(const SessionOptions& how) {
   constexpr int kColors = 9;
   std::vector<float> depth;
@@ -66,7 +67,7 @@ Result<std::unique_ptr<Session>> Session::create(const gsnav_eval::Options& opti
                                                  gsnav_eval::Stage stage, const SessionOptions& how) {
   if (stage.episodes.empty()) return {Errc::invalid_argument, "no episode to begin with"};
   stage.config.task.control_period = 1.0 / how.rate;
-  stage.config.task.max_steps = 1000000000;  // who walks by hand is not cut off
+  stage.config.task.max_steps = 1000000000;  // A person who walks by hand has no step limit.
   auto world = gsnav::World::create(stage.scene->navmesh, stage.config.task,
                                     [scene = stage.scene](double t0, double t1, auto& out) {
                                       gsnav::append_bodies(*scene, t0, t1, out);
@@ -163,7 +164,7 @@ Status Session::draw_frames() {
     const Clock::time_point now = Clock::now();
     const double passed = duration<double>(now - before).count();
     before = now;
-    if (passed > 1.0) rate_ = 0.0;  // nobody looked
+    if (passed > 1.0) rate_ = 0.0;  // No frame was requested for a while.
     rate_ += (rate_ == 0.0 ? 1.0 : 0.1) * (1.0 / passed - rate_);
     if (Status s =
             advance(c, std::clamp(static_cast<int>(std::lround(passed * how_.rate)), 1, kMostActions));
@@ -190,7 +191,7 @@ Status Session::advance(const Controls& c, int actions) {
   if (c.next) {
     const double now = world_.time();
     if (Status s = begin_episode((episode_ + 1) % stage_.episodes.size()); !s) return s;
-    if (Status put = put_time(now); !put) return put;  // people walk on
+    if (Status put = put_time(now); !put) return put;  // People continue to walk.
   }
   if (c.time) {
     if (Status put = put_time(*c.time); !put) return put;
@@ -261,7 +262,7 @@ Status Session::draw_map(const Controls& c, const gsnav::CapsuleSet& bodies) {
   canvas.disc(f.x(goal), f.y(goal), 2.5, kGoal, 1.0f);
   canvas.ring(f.x(goal), f.y(goal), 6, 2, kGoal, 1.0f);
   const gsnav::AgentPose& agent = world_.agent();
-  // Where one looks: the edges of the picture, two metres far.
+  // Field of view: the edges of the picture up to a distance of 2 m.
   const double half = 0.5 * stage_.config.sensors.front().hfov * 3.14159265358979323846 / 180.0;
   const double x = f.x(agent.position), y = f.y(agent.position);
   gsnav::Vec2<double> view[3] = {{x, y}, {}, {}};
@@ -320,14 +321,14 @@ std::string Session::describe(const Controls& c, std::uint64_t number) const {
         {"psi", m.psi},
         {"psc", m.psc},
         {"clearance", world_.last_step().avatar_clearance}}}}
-      // File names are bytes: those that are no UTF-8 become U+FFFD.
+      // File names are bytes. Invalid UTF-8 becomes U+FFFD.
       .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 Result<std::string> Session::frame(std::string_view message) {
   std::unique_lock lock(mutex_);
   if (Status s = apply(message, controls_); !s) return s;
-  // A number that is not this process's is as good as none.
+  // A number from another process is ignored.
   const bool knows = controls_.seen && *controls_.seen <= begun_;
   const std::uint64_t seen = knows ? *controls_.seen : begun_;
   if (controls_.walks) last_message_ = Clock::now();

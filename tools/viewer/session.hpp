@@ -21,31 +21,33 @@ namespace gsnav_viewer {
 enum class Panel : std::size_t { color, depth, map };
 
 struct SessionOptions {
-  double rate = 20.0;  ///< frames a second at most; an action takes one frame's time
-  double speed = 1.2;  ///< metres a second at full speed
-  double depth_near = 0.3, depth_far = 7.0;  ///< range of depth colours, metres
+  double rate = 20.0;  ///< Largest number of frames per second. An action takes the time of one frame.
+  double speed = 1.2;  ///< Full speed, m/s.
+  double depth_near = 0.3, depth_far = 7.0;  ///< Range of the depth colours, metres.
   bool paused = false;
-  int quality = 85;  ///< of JPEG
+  int quality = 85;  ///< JPEG quality.
 };
 
-/// An agent that is steered through a scene by hand, and its pictures. One thread runs it; any number of
-/// others ask for frames and steer by that. Where no frame was asked for within kLinger nothing is drawn
-/// and no time passes.
+/// An agent that is steered through a scene by hand, and its pictures. One thread runs it. Other threads
+/// request frames and steer with these requests. If no frame is requested within kLinger, nothing is
+/// drawn and no time passes.
 class Session {
  public:
-  /// Errors: what World::create reports; invalid_argument (no episode).
+  /// Creates a session.
+  /// @return the errors of World::create; invalid_argument if there are no episodes.
   static gsnav::Result<std::unique_ptr<Session>> create(const gsnav_eval::Options& options,
                                                         gsnav_eval::Stage stage,
                                                         const SessionOptions& how);
 
-  /// Draws until stop(). Errors: what stepping and rendering report, exceptions among it.
+  /// Draws frames until stop().
+  /// @return errors of stepping and rendering, exceptions included.
   gsnav::Status run();
   void stop();
 
-  /// Applies a message of the page (controls.hpp), waits for a frame newer than its `seen`, half a
-  /// second at most, and returns the newest: a line of JSON, which has `frame` (its number, 0: none yet)
-  /// and `sizes` (bytes of the JPEG images of colour, depth and map), then these images. Without `seen`
-  /// the frame is one that was begun after the call.
+  /// Applies a message of the page (controls.hpp) and waits up to half a second for a frame newer than
+  /// its `seen`. Returns the newest frame: a line of JSON, followed by JPEG images of colour, depth and
+  /// map. The JSON has `frame` (its number; 0: none yet) and `sizes` (bytes of the images). Without
+  /// `seen`, the frame was started after the call.
   gsnav::Result<std::string> frame(std::string_view message);
 
  private:
@@ -71,12 +73,13 @@ class Session {
   gsnav::Renderer renderer_, without_people_;
   gsnav::Frames<float> frames_;
   std::vector<std::array<gsnav::Vec3d, 3>>
-      walkable_;  // triangles of the NavMesh's islands that are no table tops
+      walkable_;  // Triangles of the NavMesh's islands, except table tops.
   gsnav_tools::MapFrame map_frame_;
   gsnav_tools::Canvas ground_;
   std::vector<gsnav::Vec3d> way_, shortest_;
   std::size_t episode_ = 0;
-  double frame_seconds_ = 0.0, rate_ = 0.0;  // of the last frame; of the last ones
+  double frame_seconds_ = 0.0, rate_ = 0.0;  // Duration of the last frame, and mean rate of the last
+                                             // ones.
 
   mutable std::mutex mutex_;
   std::condition_variable news_;
@@ -84,9 +87,10 @@ class Session {
   Clock::time_point last_message_{}, last_wait_{};
   std::uint64_t begun_ = 0, published_ = 0;
   int waiting_ = 0;
-  bool changed_ = false;  // a message came since the last frame began, or a request that has seen none
-  std::array<std::string, 3> drawn_;                          // JPEG images of the frame at hand
-  std::string newest_ = "{\"frame\":0,\"sizes\":[0,0,0]}\n";  // the last frame, as frame() returns it
+  bool changed_ = false;  // A message arrived since the last frame was started, or a request that has
+                          // seen no frame.
+  std::array<std::string, 3> drawn_;                          // JPEG images of the current frame.
+  std::string newest_ = "{\"frame\":0,\"sizes\":[0,0,0]}\n";  // The last frame, as frame() returns it.
   bool stopped_ = false;
 };
 

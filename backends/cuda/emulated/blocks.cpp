@@ -14,15 +14,15 @@
 #include "gsnav_emulated_device.hpp"
 #include "settings.hpp"
 
-// Each thread of a block is a fiber that yields where it waits for others: at a barrier of the block or
-// at an operation of its warp. One thread of the host runs them all.
+// Each thread of a block is a fiber that yields where it waits: at a barrier of the block or at an
+// operation of its warp. One thread of the host runs all fibers.
 
 namespace gsnav::emulated {
 
 namespace {
 
 constexpr unsigned kMostThreads = 1024, kWarp = 32;
-/// Times that paused threads are woken while no other thread makes progress.
+/// How often paused threads are woken while no other thread makes progress.
 constexpr unsigned kMostInVain = 10000;
 
 struct Thread {
@@ -32,16 +32,16 @@ struct Thread {
   Gathered* gathered = nullptr;
   dim3 index;
   Fiber fiber;
-  std::vector<std::pair<void*, std::vector<char>>> copies;  ///< started, not yet waited for
+  std::vector<std::pair<void*, std::vector<char>>> copies;  ///< Started, but not yet waited for.
 };
 
-/// Sets of a warp's threads, one bit each.
+/// Sets of a warp's threads, one bit per thread.
 struct Warp {
   unsigned there = 0, ready = 0, at_warp = 0, at_block = 0, paused = 0, done = 0;
   std::array<Gathered, kWarp> gathered;
 };
 
-/// Number of the lowest set bit.
+/// Index of the lowest set bit.
 unsigned first_of(unsigned bits) { return static_cast<unsigned>(__builtin_ctz(bits)); }
 
 /// The function that every thread of a grid runs, and its name.
@@ -76,7 +76,7 @@ class Block {
   static void main();
   /// Puts all threads at the start of the kernel.
   void start(const Launch& launch);
-  /// Runs the threads of a warp that can run. False where none can.
+  /// Runs the threads of a warp that can run. Returns false if there are none.
   bool run_warp(unsigned index);
   void enter(unsigned index);
   void resume(unsigned index);
@@ -95,8 +95,9 @@ class Block {
   std::vector<Line> shared_;
   unsigned size_ = 0, current_ = 0, alive_ = 0, waiting_ = 0;
   int sum_ = 0, result_ = 0;
-  unsigned in_vain_ = 0;               ///< times that paused threads were woken since the last progress
-  const std::uint64_t seed_ = seed();  ///< of GSNAV_EMULATED_SEED
+  unsigned in_vain_ = 0;               ///< Number of times that paused threads were woken since the last
+                                       ///< progress.
+  const std::uint64_t seed_ = seed();  ///< GSNAV_EMULATED_SEED.
   Rng random_;
   Kernel kernel_;
   dim3 at_;
@@ -113,8 +114,8 @@ void Block::fail(const std::string& why) const {
   std::abort();
 }
 
-/// The main function of a fiber. A fiber has one thread number, and runs that thread of each block in
-/// turn.
+/// Main function of a fiber. A fiber has one thread index and runs that thread of one block after the
+/// other.
 void Block::main() {
   Block& b = block();
   Fiber::began();
@@ -143,7 +144,7 @@ void Block::leave() {
   Fiber& own = self().fiber;
   Warp& w = warp();
   if (seed_ != 0 || w.ready == 0) return Fiber::change(own, scheduler_);
-  // The next thread of the warp, without a way through the scheduler.
+  // Switch directly to the next thread of the warp, without the scheduler.
   const unsigned next = current_ / kWarp * kWarp + first_of(w.ready);
   w.ready &= w.ready - 1;
   if (next == current_) return;
@@ -253,7 +254,7 @@ void Block::start(const Launch& launch) {
 bool Block::run_warp(unsigned index) {
   Warp& w = warps_[index];
   bool any = false;
-  // Until all its threads wait. With a seed another warp may be chosen earlier.
+  // Run until all threads of the warp wait. With a seed, another warp may be chosen earlier.
   while (w.ready != 0 && (seed_ == 0 || random_.below(64) != 0)) {
     any = true;
     const unsigned turn = seed_ == 0 ? 0 : static_cast<unsigned>(random_.below(kWarp));
@@ -321,7 +322,7 @@ void run_grid(const Launch& launch, const char* name, void (*thread)(const void*
               const void* arguments) {
   const dim3& g = launch.grid;
   const std::uint64_t blocks = std::uint64_t{g.x} * g.y * g.z;
-  // A step that shares no divisor with the number of blocks visits each block once.
+  // A step that is coprime to the number of blocks visits each block once.
   std::uint64_t step = 1, at = 0;
   if (seed() != 0 && blocks > 2) {
     Rng rng(seed());

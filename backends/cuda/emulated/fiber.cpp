@@ -18,8 +18,8 @@
 
 namespace gsnav::emulated {
 
-// void gsnav_emulated_switch(void** from, void* to): saves the registers that a call preserves (System
-// V) on the stack, stores the stack pointer in *from and continues where `to` was left.
+// void gsnav_emulated_switch(void** from, void* to): saves the registers that a call preserves (System V
+// ABI) on the stack, stores the stack pointer in *from, and continues where `to` was left.
 extern "C" void gsnav_emulated_switch(void** from, void* to);
 asm(R"(
 .text
@@ -70,12 +70,12 @@ bool Fiber::start(void (*main)()) {
   const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
   void* const memory = mmap(nullptr, kStackBytes + page, PROT_READ | PROT_WRITE,
                             MAP_PRIVATE | MAP_ANONYMOUS | MAP_STACK, -1, 0);
-  // The lowest page is not accessible, so that a stack overflow faults.
+  // The lowest page is inaccessible, so that a stack overflow faults.
   if (memory == MAP_FAILED || mprotect(memory, page, PROT_NONE) != 0) return false;
   char* const stack = static_cast<char*>(memory) + page;
   stack_ = stack;
   bytes_ = kStackBytes;
-  // As if main() had been called: the unused return address lies 8 bytes below a multiple of 16.
+  // As after a call of main(): the unused return address lies 8 bytes below a multiple of 16.
   auto** top = reinterpret_cast<void**>(stack + kStackBytes) - 1;
   *top = nullptr;
   *--top = reinterpret_cast<void*>(main);

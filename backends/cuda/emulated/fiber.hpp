@@ -5,28 +5,30 @@
 
 namespace gsnav::emulated {
 
-/// A stack of its own on which a function runs in turns with others, all on one thread of the host.
+/// A function with its own stack that takes turns with others on one thread of the host.
 class Fiber {
  public:
   Fiber() = default;
-  /// The fiber of the calling thread: it uses the stack that the thread has.
+  /// Fiber of the calling thread. It uses the thread's own stack.
   static Fiber of_this_thread();
 
-  /// Makes the stack on which main() begins at the first change to this fiber; nothing where it has one.
-  /// False: no memory.
+  /// Allocates the stack on which main() begins at the first change to this fiber. Does nothing if there
+  /// is a stack.
+  /// @return false if there is no memory.
   bool start(void (*main)());
 
-  /// Each main() must call this first.
+  /// Must be called first in each main().
   static void began();
 
-  /// Leaves `from`, which runs, and goes on with `to`. Returns when something changes back to `from`.
+  /// Leaves the running fiber `from` and continues with `to`. Returns when another fiber changes back to
+  /// `from`.
   static void change(Fiber& from, Fiber& to);
 
  private:
-  void* sp_ = nullptr;           ///< of a fiber that does not run
-  const void* stack_ = nullptr;  ///< its lowest byte
+  void* sp_ = nullptr;           ///< Stack pointer while the fiber does not run.
+  const void* stack_ = nullptr;  ///< Lowest byte of the stack.
   std::size_t bytes_ = 0;
-  [[maybe_unused]] void* fake_stack_ = nullptr;  ///< AddressSanitizer's
+  [[maybe_unused]] void* fake_stack_ = nullptr;  ///< For AddressSanitizer.
 };
 
 }  // namespace gsnav::emulated

@@ -11,7 +11,7 @@
 #include "settings.hpp"
 #include "streams.hpp"
 
-// Memory of the emulated device, and pinned memory of the host: allocation and copies.
+// Memory of the emulated device and pinned memory of the host: allocation and copies.
 
 using gsnav::emulated::enqueue;
 using gsnav::emulated::failed;
@@ -32,7 +32,7 @@ class Memory {
     void* const memory =
         std::aligned_alloc(kAlign, (std::max<std::size_t>(bytes, 1) + kAlign - 1) / kAlign * kAlign);
     if (memory == nullptr) return failed(cudaErrorMemoryAllocation);
-    // Unwritten memory has no defined value: another one for every other seed.
+    // Unwritten memory has no defined value. Use different values for even and odd seeds.
     std::memset(memory, gsnav::emulated::seed() % 2 == 0 ? 0xcb : 0x3e, bytes);
     blocks_[memory] = bytes;
     used_ += bytes;
@@ -53,7 +53,7 @@ class Memory {
     return cudaSuccess;
   }
 
-  /// Whether [p, p + bytes) lies in one allocation.
+  /// Returns true if [p, p + bytes) lies in one allocation.
   bool holds(const void* p, std::size_t bytes) {
     const std::lock_guard lock(mutex_);
     auto after = blocks_.upper_bound(p);
@@ -76,9 +76,9 @@ class Memory {
   std::size_t most_, used_ = 0;
 };
 
-// Both outlive what static objects release.
+// Never destroyed, because static objects may release memory at exit.
 Memory& device() {
-  static auto* const memory = new Memory(std::size_t{6} << 30);  // as a small GPU has
+  static auto* const memory = new Memory(std::size_t{6} << 30);  // The size of a small GPU.
   return *memory;
 }
 Memory& pinned() {
@@ -120,7 +120,7 @@ cudaError_t cudaMemcpyAsync(void* to, const void* from, std::size_t bytes, cudaM
   }
   CUstream_st& s = stream_of(stream);
   const std::lock_guard lock(s.mutex);
-  // Pageable memory may change as soon as this returns.
+  // Pageable memory may change as soon as this returns, so copy it now.
   if (s.capture == nullptr && !from_device && !pinned().holds(from, bytes)) {
     const auto* const first = static_cast<const unsigned char*>(from);
     return enqueue(stream, [to, copy = std::vector<unsigned char>(first, first + bytes)] {

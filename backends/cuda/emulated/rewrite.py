@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Device code as C++: launches become calls, and shared memory of a launch's size a pointer. Lines stay
-where they are."""
+"""Rewrites device code as C++: launches become calls, and dynamic shared memory becomes a pointer. Line
+numbers are preserved."""
 import argparse
 import pathlib
 import re
@@ -13,7 +13,7 @@ REGISTER = re.compile(r'asm volatile\("" : "\+r"\((\w+)\)\);')
 
 
 def kernel_begin(text, end):
-    """Where the expression begins that names a kernel and ends at `end`: names, ::, and < > around arguments."""
+    """Start of the expression that names a kernel and ends at `end`: names, ::, and template arguments."""
     at = end
     while text[at - 1].isspace():
         at -= 1
@@ -29,7 +29,7 @@ def kernel_begin(text, end):
 
 
 def closing(text, at):
-    """Past the bracket that closes the one at `at`."""
+    """Position after the bracket that closes the one at `at`."""
     depth = 0
     while True:
         depth += {"(": 1, ")": -1}.get(text[at], 0)

@@ -10,7 +10,7 @@
 #include "settings.hpp"
 #include "streams.hpp"
 
-// The emulated device with its streams, events and graphs.
+// The emulated device with streams, events and graphs.
 
 using gsnav::emulated::enqueue;
 using gsnav::emulated::failed;
@@ -37,12 +37,12 @@ thread_local cudaError_t last_error = cudaSuccess;
 
 struct Device {
   std::mutex mutex;
-  /// Bytes of shared memory that a launch may ask for: the most that any kernel was allowed.
+  /// Bytes of shared memory that a launch may request: the maximum allowed for any kernel.
   std::size_t shared = kDefaultShared;
   std::vector<CUstream_st*> streams;
 };
 Device& device() {
-  static auto* const d = new Device;  // outlives what static objects release
+  static auto* const d = new Device;  // Never destroyed, because static objects may use it at exit.
   return *d;
 }
 

@@ -5,11 +5,11 @@
 
 namespace gsnav::emulated {
 
-/// GSNAV_EMULATED_SEED: which order threads and blocks run in. With 0, the default, as they are
-/// numbered, each as far as it gets.
+/// GSNAV_EMULATED_SEED: order in which threads and blocks run. 0, the default, runs them in numerical
+/// order, each as far as possible.
 std::uint64_t seed();
 
-/// GSNAV_EMULATED_PROCESSORS: multiprocessors that the device says it has, 1 to 1024; 4 unless told.
+/// GSNAV_EMULATED_PROCESSORS: number of multiprocessors that the device reports, 1 to 1024. Default: 4.
 std::uint64_t processors();
 
 }  // namespace gsnav::emulated

@@ -8,7 +8,7 @@
 
 #include "cuda_runtime.h"
 
-/// A queue of work. The thread that waits for a stream does its work.
+/// A queue of work. The thread that waits for a stream performs its work.
 struct CUstream_st {
   std::recursive_mutex mutex;
   std::deque<gsnav::emulated::Work> queue;
@@ -18,13 +18,13 @@ struct CUstream_st {
 
 namespace gsnav::emulated {
 
-/// Sets what cudaGetLastError returns, and returns it; nothing for cudaSuccess.
+/// Stores an error for cudaGetLastError and returns it. cudaSuccess is not stored.
 cudaError_t failed(cudaError_t e);
 
-/// The stream of a handle; null is the default stream.
+/// Stream of a handle. Null is the default stream.
 CUstream_st& stream_of(cudaStream_t stream);
 
-/// Does what was enqueued, up to the item of number `until`.
+/// Performs the enqueued work, up to item number `until`.
 void work_off(CUstream_st& s, std::uint64_t until = ~std::uint64_t{0});
 
 }  // namespace gsnav::emulated

@@ -11,25 +11,25 @@
 #include "gsnav/detail/frame/tiles.hpp"
 #include "search.cuh"
 
-// What the kernels of a batch read and write (docs/notes/cuda.md).
+// Data that the kernels of a batch read and write (docs/notes/cuda.md).
 
 namespace gsnav::cuda {
 
 inline constexpr std::uint32_t kNoSlot = 0xffffffffu;
 
-/// A set seen by a camera. Instances of a set are neighbours; those of a camera are listed by
-/// camera_instances, in order of first_rank.
+/// A set seen by a camera. Instances of one set are adjacent. camera_instances lists those of a camera
+/// in order of first_rank.
 struct BatchInstance {
   ViewedSet<float> args;
   std::uint32_t camera;
 };
 
-/// What projection reads of an instance for each of its rows where rules are plain
-/// (BatchArgs::plain_cameras): together what is read together, in loads of 16 bytes.
+/// Data of an instance that projection reads for each of its rows if the rules are plain
+/// (BatchArgs::plain_cameras). Grouped by use and loaded in units of 16 bytes.
 struct PlainCamera {
   struct alignas(16) Key {
     float offset[3], near_plane;
-    double scale;  ///< of depth_key; its row of the rotation and its offset are Mean's
+    double scale;  ///< Scale of depth_key. Its row of the rotation and its offset are in Mean.
   } key;
   struct alignas(16) Axes {
     float rotation[9], eps2d, log2_alpha_min, fx;
@@ -48,17 +48,18 @@ struct PlainCamera {
 static_assert(sizeof(PlainCamera) == 256);
 
 inline constexpr std::uint32_t kPartsPerChunk = kProjectChunk / kChunkPart;
-/// Of a set with so few instances a warp tests parts at once, a lane a part and an instance.
+/// With at most this number of instances, a warp tests several parts at once, one (part, instance) pair
+/// per lane.
 inline constexpr std::uint32_t kFewInstances = 32 / kPartsPerChunk;
 
-/// A set of the call. Of few instances a unit of culling has as many chunks as a warp has room for, seen
-/// by all of them; of more it is one chunk, seen by 32: first_unit + word * chunks + chunk.
+/// A set of the call. With few instances, a unit of culling has as many chunks as fit into a warp, for
+/// all instances. With more, it is one chunk for 32 instances, at first_unit + word * chunks + chunk.
 struct BatchSet {
   std::uint64_t first_unit;
   std::uint32_t first_instance, instances, chunks;
   __host__ __device__ bool has_few() const { return instances <= kFewInstances; }
   __host__ __device__ std::uint32_t words() const { return (instances + 31) / 32; }
-  /// Of a unit.
+  /// Number of chunks per unit.
   __host__ __device__ std::uint32_t unit_chunks() const {
     return has_few() ? kFewInstances / instances : 1;
   }
@@ -67,70 +68,71 @@ struct BatchSet {
   }
 };
 
-/// kChunkPart rows, from part * kChunkPart on, and those of 32 instances that may see any of them.
+/// kChunkPart rows from part * kChunkPart on, and a mask of the 32 instances that may see any of them.
 struct BatchItem {
   std::uint32_t first_instance, part, mask;
 };
 
-/// A survivor as blending reads it.
+/// A visible splat in the form that blending reads.
 struct alignas(16) SplatRecord {
-  std::uint32_t ref;  ///< x | y << 16 of the reference pixel
+  std::uint32_t ref;  ///< Reference pixel: x | y << 16.
   float a, k, b;
   float w1, w2, log2_opacity, r;
   float g, blue;
-  std::uint32_t x, y;  ///< bounds: first | end << 16
+  std::uint32_t x, y;  ///< Bounds: first | end << 16.
 };
 
-/// A survivor as binning reads it where lists are counted first: a TileWindow, without tiles where a
-/// warp of its own bins it. `camera` is kNoSlot where a slot was taken and not used.
+/// A visible splat in the form that binning reads if lists are counted first: a TileWindow, without
+/// tiles if a separate warp bins it. `camera` is kNoSlot for a slot that was reserved but not used.
 struct alignas(16) SplatEntry {
   std::uint32_t key, corner, tiles, camera;
 };
 
-/// A slot whose record is still to be computed, in double, from row `row` of an instance.
+/// A slot whose record must be computed in double, from row `row` of an instance.
 struct HardSplat {
   std::uint32_t slot, instance, row;
 };
 
-/// A splat of a tile's list.
+/// A splat in the list of a tile.
 struct Pair {
   std::uint32_t key, slot;
 };
 
-/// A survivor whose tiles are still to be found. `camera` is kNoSlot where its place was taken and not
-/// used.
+/// A visible splat whose tiles have not been found yet. `camera` is kNoSlot for a place that was
+/// reserved but not used.
 struct SplatKey {
   std::uint32_t slot, key, camera;
 };
 
-/// A pair beyond its list's room: number `number` of tile `tile`.
+/// A pair that did not fit in its list's space: number `number` of tile `tile`.
 struct alignas(16) BeyondPair {
   std::uint32_t tile, number;
   Pair pair;
 };
 
-/// A row of tiles of a splat of very many.
+/// One row of tiles of a very large splat.
 struct alignas(16) LargeRow {
   SplatKey splat;
   std::uint32_t row;
 };
 
-/// A part of a tile's list that is put in order by itself: pairs [begin, end), which are whole bins of
-/// depth from `bin` on.
+/// A part of a tile's list that is sorted separately: pairs [begin, end). It consists of whole depth
+/// bins, starting with `bin`.
 struct alignas(16) ListPart {
   std::uint32_t tile, bin, begin, end;
 };
-/// Of an entry of tile_order: the tile's list is in order already.
+/// Flag of an entry of tile_order: the tile's list is sorted.
 inline constexpr std::uint32_t kListInOrder = 0x80000000u;
-/// Pairs of a list that a block puts in order at a time.
+/// Number of pairs that a block sorts at a time.
 inline constexpr std::uint32_t kOrderBatch = policy::Order::kThreads * policy::Order::kItems;
 
-/// Where cameras are few, lists are kept in bins of depth, an octave's share each, so that many blocks
-/// can put one in order.
+/// Depth bins of lists, for calls with few cameras. A bin covers a fraction of an octave, so that many
+/// blocks can sort one list.
 struct DepthBins {
-  std::uint32_t base;  ///< the key that bin 0 begins at; nearer ones are in it too
-  int shift;           ///< a bin is 2^shift keys
-  int bits;            ///< 2^bits bins, or none where 0 (policy::Bin); the last has all that is farther
+  std::uint32_t base;  ///< First key of bin 0, which also contains nearer keys.
+  int shift;           ///< A bin covers 2^shift keys.
+  int bits;            ///< There are 2^bits bins (policy::Bin), or none if 0. The last bin contains all
+                       ///< farther keys.
   __host__ __device__ bool many() const { return bits != 0; }
   __device__ std::uint32_t count() const { return 1u << bits; }
   __device__ std::uint32_t of(std::uint32_t key) const {
@@ -139,8 +141,8 @@ struct DepthBins {
   bool operator==(const DepthBins&) const = default;
 };
 
-/// Counts go on where capacities end, so that they say what would have been needed. Each has a line of
-/// memory of its own: what adds to counters of one line is served one after the other.
+/// Counters on the device. They continue beyond capacities, so that they show what was needed. Each has
+/// its own memory line, because atomics on one line are serialized.
 struct BatchCounters {
   static constexpr std::size_t kLine = 256;
   alignas(kLine) unsigned long long slots;
@@ -149,68 +151,69 @@ struct BatchCounters {
   alignas(kLine) unsigned long long large;
   alignas(kLine) unsigned long long pairs;
   alignas(kLine) unsigned long long beyond;
-  alignas(kLine) unsigned long long placed;  ///< of those beyond
-  alignas(kLine) unsigned long long alt;     ///< of lists that may need places in pairs_alt, where lists
-                                             ///< have room
+  alignas(kLine) unsigned long long placed;  ///< Number of those beyond that have been placed.
+  alignas(kLine) unsigned long long alt;     ///< Number of places in pairs_alt that lists may need, if
+                                             ///< lists have reserved space.
   alignas(kLine) std::uint32_t items;
   alignas(kLine) std::uint32_t parts;
   alignas(kLine) std::uint32_t long_parts;
-  alignas(kLine) std::uint32_t
-      tiles_of_length[33];              ///< by leading zeros of a tile's count: long lists first
-  std::uint32_t ordered_of_length[33];  ///< of these in tile_order already
+  alignas(kLine) std::uint32_t tiles_of_length[33];  ///< By leading zeros of a tile's count, so that
+                                                     ///< long lists come first.
+  std::uint32_t ordered_of_length[33];               ///< Number of these that are in tile_order already.
 };
 
-/// By value to every kernel.
+/// Arguments of every kernel, passed by value.
 struct BatchArgs {
   const BatchSet* sets;
   const BatchInstance* instances;
-  /// One an instance where rules are plain: Response::ewa, Compat::none, SortOrder::z_depth, no mip
-  /// filter, no near_sigma, no set with axes, rotations of SH or origins; else null.
+  /// One per instance if the rules are plain, else null. Plain means Response::ewa, Compat::none,
+  /// SortOrder::z_depth, no mip filter, no near_sigma, and no set with axes, SH rotations or origins.
   const PlainCamera* plain_cameras;
-  const std::uint32_t* camera_first;  ///< [cameras + 1] into camera_instances
+  const std::uint32_t* camera_first;  ///< Shape [cameras + 1], index into camera_instances.
   const std::uint32_t* camera_instances;
   std::uint64_t units;
-  std::uint32_t set_count, cameras, tiles;  ///< tiles of all cameras
+  std::uint32_t set_count, cameras, tiles;  ///< `tiles` is the number of tiles of all cameras.
   TileGrid grid;
   float log2_alpha_min;
   bool elliptic;
-  bool color;      ///< colours are asked for
-  bool seen_rows;  ///< some instance knows of its rows which may be seen
+  bool color;      ///< Colours are requested.
+  bool seen_rows;  ///< For some instance it is known which rows may be seen.
   DepthBins depth_bins;
-  bool short_lists;  ///< most lists are short, and put in order by a warp each before they are drawn
+  bool short_lists;  ///< Most lists are short, and a warp sorts each before it is drawn.
 
   BatchItem* items;
   BatchCounters* counters;
   SplatRecord* records;
   SplatEntry* entries;
-  std::uint32_t* sources;     ///< per slot: first_rank of its instance + row as stored
-  SplatDepth<float>* depths;  ///< null: no image sums depths, and medians are few beside survivors
-  SplatPerspective<float>* perspectives;  ///< null: Response::ewa
+  std::uint32_t* sources;     ///< Per slot: first_rank of its instance plus the stored row.
+  SplatDepth<float>* depths;  ///< Null if no image sums depths and there are few median depths compared
+                              ///< with visible splats.
+  SplatPerspective<float>* perspectives;  ///< Null for Response::ewa.
   HardSplat* hard;
   SplatKey* several;
   LargeRow* large;
-  /// [tiles << depth_bins.bits]: how many pairs; where the next goes, once lists have their places;
-  /// where bins end, once all are there.
+  /// Shape [tiles << depth_bins.bits]. First the number of pairs; then, once lists have places, the
+  /// place of the next pair; finally the end of each bin.
   std::uint32_t* bins;
-  /// Pairs that each list has room for, tile by tile; the rest of longer ones lies behind all of them.
-  /// 0: lists are counted first, and follow one another.
+  /// Number of pairs reserved per list, tile by tile. The rest of longer lists is stored behind all of
+  /// them. 0: lists are counted first and follow each other.
   std::uint32_t list_room;
   std::uint32_t* tile_counts;
   std::uint32_t* tile_begins;
-  uint2* tile_shifts;  ///< to places of what is beyond the room; to those in pairs_alt. Null: lists are
-                       ///< counted first
-  /// The order that tiles are begun in: longest lists first, so that none is waited for. With
-  /// kListInOrder.
+  uint2* tile_shifts;  ///< Offsets to places of pairs beyond the reserved space, and to places in
+                       ///< pairs_alt. Null if lists are counted first.
+  /// Order in which tiles are started: longest lists first, so that the end of a launch need not wait
+  /// for one. With the flag kListInOrder.
   std::uint32_t* tile_order;
-  ListPart* parts;            ///< where there are many bins of depth
-  std::uint32_t* long_parts;  ///< those that a warp has not put in order
-  Pair* pairs;  ///< of a tile together: in no order, or in order once order_lists has been there
+  ListPart* parts;            ///< Used if there are many depth bins.
+  std::uint32_t* long_parts;  ///< Parts that were too long for a warp to sort.
+  Pair* pairs;                ///< Lists of all tiles. Unsorted, or sorted after order_lists.
   Pair* pairs_alt;
   BeyondPair* beyond;
   std::uint32_t slot_capacity, hard_capacity, several_capacity, large_capacity, part_capacity;
-  std::uint32_t pair_capacity;                  ///< where lists are counted first
-  std::uint32_t beyond_capacity, alt_capacity;  ///< where they have room
-  std::uint32_t slab;  ///< slots that a warp takes at a time: few cameras leave few to share them
+  std::uint32_t pair_capacity;                  ///< Used if lists are counted first.
+  std::uint32_t beyond_capacity, alt_capacity;  ///< Used if lists have reserved space.
+  std::uint32_t slab;  ///< Number of slots that a warp takes at a time, small if there are few cameras.
   bool operator==(const BatchArgs&) const = default;
 };
 
@@ -234,7 +237,7 @@ __device__ inline SplatBounds bounds_of(std::uint32_t x, std::uint32_t y) {
           static_cast<std::int32_t>(x >> 16), static_cast<std::int32_t>(y >> 16)};
 }
 
-/// The instance, among a camera's, that a source belongs to.
+/// The instance of a camera that a source belongs to.
 __device__ inline const BatchInstance& instance_of(const BatchArgs& a, std::uint32_t camera,
                                                    std::uint32_t source) {
   const std::uint32_t place = last_start(
@@ -243,20 +246,22 @@ __device__ inline const BatchInstance& instance_of(const BatchArgs& a, std::uint
   return a.instances[a.camera_instances[place]];
 }
 
-/// What decides between equal keys.
+/// Rank that decides between equal keys.
 __device__ inline std::uint32_t rank_of(const BatchArgs& a, std::uint32_t camera, std::uint32_t slot) {
   const std::uint32_t source = a.sources[slot];
   const ViewedSet<float>& args = instance_of(a, camera, source).args;
   return args.rank_of(source - args.first_rank);
 }
 
-// Launches, in the order of a frame. `blocks`: how many keep the device full.
+// Launches, in the order of a frame. The number of blocks keeps the device busy.
 void launch_culling(const BatchArgs& args, int multiprocessors, cudaStream_t stream);
 void launch_projection(const BatchArgs& args, int multiprocessors, cudaStream_t stream);
 void launch_binning(const BatchArgs& args, int multiprocessors, cudaStream_t stream);
-/// Of lists in bins, and of short ones.
+/// Sorts lists in bins and short lists.
 void launch_ordering(const BatchArgs& args, int multiprocessors, cudaStream_t stream);
-/// `raster`: rules, background and images; `rgb8` may stand beside its rgb.
+/// Blends.
+/// @param raster Rules, background and images.
+/// @param rgb8 8-bit image, or null. May be combined with raster.images.rgb.
 void launch_blending(const BatchArgs& args, const RasterArgs<float>& raster, std::uint8_t* rgb8,
                      cudaStream_t stream);
 

@@ -3,8 +3,9 @@
 
 #include "batch_lists.cuh"
 
-// Tile lists of a batch: of few cameras counted, placed and written; of many written at once, into the
-// room that each has, and most of them by projection. Their order is decided where they are read.
+// Tile lists of a batch. With few cameras they are counted, placed and then written. With many cameras
+// they are written at once, into reserved space, most of them by the projection. Lists are sorted when
+// they are read.
 
 namespace gsnav::cuda {
 
@@ -13,9 +14,9 @@ namespace {
 constexpr unsigned kThreads = policy::Bin::kThreads;
 constexpr std::uint32_t kPartLength = policy::Bin::kPartLength;
 
-/// Calls f(splat, tile, wanted), by all lanes together, for the tiles of the large splats: a lane finds
-/// those of a row. A warp's rows lie far apart in the queue: neighbours are mostly of one splat, and a
-/// warp that has all of the largest would be waited for.
+/// Calls f(splat, tile, wanted), by all lanes together, for the tiles of large splats. Each lane finds
+/// the tiles of one row. The rows of a warp are far apart in the queue: adjacent rows mostly belong to
+/// one splat, and a warp with all rows of the largest splat would delay the launch.
 template <class F>
 __device__ void for_each_tile_of_large(const BatchArgs& a, const F& f) {
   constexpr unsigned kAll = 0xffffffffu;
@@ -24,7 +25,7 @@ __device__ void for_each_tile_of_large(const BatchArgs& a, const F& f) {
   const std::uint32_t warps = gridDim.x * kThreads / 32;
   for (std::uint32_t i = (blockIdx.x * kThreads + threadIdx.x) / 32; i < n; i += 32 * warps) {
     SplatKey splat{};
-    std::uint32_t begin = 0, count = 0;  // `begin`: the first tile's number
+    std::uint32_t begin = 0, count = 0;  // `begin` is the index of the first tile.
     const std::uint32_t mine = i + threadIdx.x % 32 * warps;
     if (mine < n) {
       const LargeRow part = a.large[mine];
@@ -48,7 +49,7 @@ __device__ void for_each_tile_of_large(const BatchArgs& a, const F& f) {
   }
 }
 
-/// The same for the windows of a warp's lanes.
+/// Calls f(splat, tile, wanted), by all lanes together, for the tiles of the lanes' windows.
 template <class F>
 __device__ void for_each_tile_of_windows(const BatchArgs& a, const SplatKey& splat,
                                          const TileWindow& window, const F& f) {
@@ -63,7 +64,8 @@ __device__ void for_each_tile_of_windows(const BatchArgs& a, const SplatKey& spl
   });
 }
 
-/// The same for the splats of several tiles, which are found; known(splat, window) is told which.
+/// Calls f(splat, tile, wanted) for the tiles of splats that touch several tiles, and known(splat,
+/// window) for each such splat.
 template <class K, class F>
 __device__ void for_each_tile_of_several(const BatchArgs& a, const K& known, const F& f) {
   const std::uint32_t n = used(a.counters->several, a.several_capacity);
@@ -89,7 +91,7 @@ __device__ void for_each_tile_of_several(const BatchArgs& a, const K& known, con
   }
 }
 
-/// Counts the pairs of splats of several tiles.
+/// Counts the pairs of splats that touch several tiles.
 __global__ void __launch_bounds__(kThreads) count_kernel(const BatchArgs a) {
   const auto count = [&](const SplatKey& splat, std::uint32_t tile, bool wanted) {
     if (wanted) add_to_bin(a, tile, splat.key);
@@ -103,7 +105,7 @@ __global__ void __launch_bounds__(kThreads) count_kernel(const BatchArgs a) {
       count);
 }
 
-/// Writes the pairs of splats whose tiles projection has not found.
+/// Writes the pairs of splats whose tiles the projection has not found.
 __global__ void __launch_bounds__(kThreads) list_kernel(const BatchArgs a) {
   const auto list = [&](const SplatKey& splat, std::uint32_t tile, bool wanted) {
     WarpPairs pairs;
@@ -115,7 +117,7 @@ __global__ void __launch_bounds__(kThreads) list_kernel(const BatchArgs a) {
       a, [](const SplatKey&, const TileWindow&) {}, list);
 }
 
-/// Puts the block's share of the tiles into tile_order.
+/// Writes the block's tiles into tile_order.
 __device__ void order_tiles(const BatchArgs& a) {
   __shared__ std::uint32_t taken[33], places[33];
   for (std::uint32_t first = blockIdx.x * kThreads; first < a.tiles; first += gridDim.x * kThreads) {
@@ -137,7 +139,7 @@ __device__ void order_tiles(const BatchArgs& a) {
   }
 }
 
-/// Writes the pairs; and the order of the tiles.
+/// Writes the pairs and the order of the tiles.
 __global__ void __launch_bounds__(kThreads) emit_kernel(const BatchArgs a) {
   order_tiles(a);
   const auto emit = [&](const SplatKey& splat, std::uint32_t tile, bool wanted) {
@@ -161,10 +163,10 @@ __global__ void __launch_bounds__(kThreads) emit_kernel(const BatchArgs a) {
   }
 }
 
-/// Takes the place of a tile's list of `total` pairs, and remembers it. One lane calls it.
+/// Reserves and stores the place of a tile's list of `total` pairs. Called by one lane.
 __device__ std::uint32_t place_list(const BatchArgs& a, std::uint32_t tile, std::uint32_t total,
                                     unsigned long long base, std::uint32_t* of_length) {
-  // By the count that is left below, which is what order_tiles reads.
+  // Use the count that remains after truncation, because order_tiles reads it.
   const std::uint32_t begin = used(base, a.pair_capacity), kept = min(total, a.pair_capacity - begin);
   a.tile_begins[tile] = begin;
   a.tile_counts[tile] = kept;
@@ -172,7 +174,7 @@ __device__ std::uint32_t place_list(const BatchArgs& a, std::uint32_t tile, std:
   return begin;
 }
 
-/// What lists with room hold, and where: a thread a tile.
+/// Measures lists with reserved space and places their rest, one thread per tile.
 __device__ void measure_lists(const BatchArgs& a, std::uint32_t* of_length) {
   const bool whole = a.counters->beyond <= a.beyond_capacity;
   const std::uint32_t rooms = a.tiles * a.list_room, end = (a.tiles + 31) / 32 * 32;
@@ -187,7 +189,7 @@ __device__ void measure_lists(const BatchArgs& a, std::uint32_t* of_length) {
         rooms + static_cast<std::uint32_t>(take_places(&a.counters->placed, beyond));
     const unsigned long long alt = take_places(&a.counters->alt, apart);
     if (tile >= a.tiles) continue;
-    // What has no place is left out: the call will be repeated.
+    // Pairs without a place are dropped. The call will be repeated.
     if (!whole) count -= beyond;
     if (alt + apart > a.alt_capacity) count = min(count, kOrderBatch);
     a.tile_begins[tile] = begin;
@@ -197,18 +199,18 @@ __device__ void measure_lists(const BatchArgs& a, std::uint32_t* of_length) {
   }
 }
 
-/// Places of lists in bins, which follow one another in no particular order: a warp a tile. Also what
-/// order_kernel has to do.
+/// Places lists in bins, in no particular order, with one warp per tile. Also lists the work for
+/// order_kernel.
 __device__ void place_bins(const BatchArgs& a, std::uint32_t* of_length) {
   constexpr unsigned kAll = 0xffffffffu, kMost = (1u << policy::Bin::kMaxDepthBits) / 64;
   const unsigned lane = threadIdx.x % 32,
-                 mine = a.depth_bins.count() / 64;  // of a lane: pairs of bins, neighbours
+                 mine = a.depth_bins.count() / 64;  // Pairs of adjacent bins per lane.
   for (std::uint32_t tile = (blockIdx.x * kThreads + threadIdx.x) / 32; tile < a.tiles;
        tile += gridDim.x * kThreads / 32) {
     uint2* const bins =
         reinterpret_cast<uint2*>(a.bins + (std::size_t{tile} << a.depth_bins.bits)) + lane * mine;
     uint2 counts[kMost];
-    std::uint32_t sum = 0, last = 0;  // of all; in the last bin
+    std::uint32_t sum = 0, last = 0;  // Sum over all bins, and count of the last bin.
 #pragma unroll
     for (unsigned i = 0; i < kMost; ++i) {
       if (i < mine) counts[i] = bins[i];
@@ -234,8 +236,8 @@ __device__ void place_bins(const BatchArgs& a, std::uint32_t* of_length) {
     }
     begin = __shfl_sync(kAll, begin, 0);
     first_part = __shfl_sync(kAll, first_part, 0);
-    // A part begins with the first bin that begins at or after it; `before`: where the bin before
-    // begins.
+    // A part begins with the first bin that begins at or after it. `before` is the begin of the previous
+    // bin.
     const bool fits = first_part + parts <= a.part_capacity;
     const auto begin_bin = [&](std::uint32_t before, std::uint32_t at, std::uint32_t bin,
                                std::uint32_t last_part) {
@@ -288,7 +290,7 @@ __global__ void __launch_bounds__(kThreads) place_kernel(const BatchArgs a) {
   }
 }
 
-/// Puts pairs beyond the room of their lists into their places; and the order of the tiles.
+/// Copies pairs beyond reserved space to their places, and writes the order of the tiles.
 __global__ void __launch_bounds__(kThreads) beyond_kernel(const BatchArgs a) {
   order_tiles(a);
   if (a.counters->beyond > a.beyond_capacity) return;

@@ -6,7 +6,7 @@
 #include "batch_tile_order.cuh"
 #include "gsnav/backends/cuda.hpp"
 
-// Blending of a batch, and the median depths of the Gaussians that it found.
+// Blending of a batch, and depths of the median Gaussians that it found.
 
 namespace gsnav::cuda {
 
@@ -16,9 +16,9 @@ using Policy = policy::Blend;
 constexpr int kTile = policy::Batch::kTile;
 constexpr int kPixels = Policy::kPixels;
 constexpr int kThreads = kTile * kTile / kPixels;
-constexpr int kRowsApart = kBlock / kPixels;  ///< of a thread's pixels
+constexpr int kRowsApart = kBlock / kPixels;  ///< Distance in rows between a thread's pixels.
 constexpr std::uint32_t kChunk = Policy::kChunk;
-constexpr std::uint32_t kNothing = kChunk;  ///< a staged splat that covers no pixel
+constexpr std::uint32_t kNothing = kChunk;  ///< Index of a staged splat that covers no pixel.
 constexpr unsigned kAll = 0xffffffffu;
 static_assert(kThreads == policy::Order::kThreads && 4 * kBlock * kBlock == 32 * kPixels &&
               kOrderBatch % kChunk == 0);
@@ -27,10 +27,10 @@ static_assert((kChunk + 1) * sizeof(StagedSplat) <= kOrderLent && kOrderLent <= 
 
 struct BlendShared {
   alignas(16) OrderShared order;
-  std::uint16_t masks[kChunk];  ///< the blocks that each splat may reach: bit 4 * row + column
+  std::uint16_t masks[kChunk];  ///< Bits of the blocks that each splat may reach: bit 4 * row + column.
   union {
-    /// Of the quarter-warps: places of splats in `lent`, in bytes. A splat that covers nothing fills
-    /// them up.
+    /// One list per quarter-warp: byte offsets of splats in `lent`. Lists are padded with a splat that
+    /// covers nothing.
     alignas(8) std::uint16_t lists[kThreads / 8][kChunk + kListStep];
     std::uint16_t queues[kThreads / 32][kChunk / (kThreads / 32)];
   };
@@ -40,8 +40,9 @@ struct BlendShared {
   }
 };
 
-/// Puts the records of n splats, of which slot_of(i) is the i-th, into shared memory, and what they may
-/// reach. `far`: of the tile's meshes.
+/// Stages the records of n splats in shared memory, with the blocks that they may reach.
+/// @param slot_of Returns the slot of splat i.
+/// @param far Largest depth of the tile's meshes.
 template <bool Mesh, class F>
 __device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t n, int tile_x, int tile_y,
                       float far, const F& slot_of) {
@@ -60,7 +61,7 @@ __device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t n, int t
       wide = a.elliptic && !hidden && blocks.wide();
       if (!wide) s.masks[i] = static_cast<std::uint16_t>(hidden ? 0 : blocks.of_bounds());
     }
-    // So that no lane waits for another's ellipse.
+    // Collect ellipses in a queue, so that lanes do not wait for each other.
     const unsigned votes = __ballot_sync(kAll, wide);
     if (wide)
       queue[queued + static_cast<std::uint32_t>(__popc(votes & ((1u << lane) - 1)))] =
@@ -78,8 +79,10 @@ __device__ void stage(BlendShared& s, const BatchArgs& a, std::uint32_t n, int t
   __syncthreads();
 }
 
-/// Lists those of the n staged splats that reach each quarter of the warp, and returns the length of the
-/// longest list; the others are filled up. `bit`: of the first quarter's block; `open`: a bit a quarter.
+/// Makes a list for each quarter of the warp: those of the n staged splats that reach it. Returns the
+/// length of the longest list; the others are padded to it.
+/// @param bit Bit of the first quarter's block.
+/// @param open One bit per quarter.
 __device__ std::uint32_t list_blocks(BlendShared& s, std::uint32_t n, unsigned bit, unsigned open) {
   const unsigned lane = threadIdx.x % 32, below = (1u << lane) - 1;
   std::uint16_t(*const lists)[kChunk + kListStep] = s.lists + threadIdx.x / 32 * 4;
@@ -111,8 +114,8 @@ __device__ std::uint32_t list_blocks(BlendShared& s, std::uint32_t n, unsigned b
   return end;
 }
 
-/// A block a tile, a thread two pixels of a column, a quarter of a warp a block of 4 x 4 of them. For
-/// DepthMode::median the slot of the median Gaussian is left in the image.
+/// Blends one tile per block, two pixels of a column per thread and a block of 4 x 4 pixels per
+/// quarter-warp. For DepthMode::median it writes the slot of the median Gaussian to the image.
 template <bool Color, DepthMode D, Exp2 M, Form F, bool Mesh>
 __global__ void __launch_bounds__(kThreads, Mesh ? Policy::kResidentWithMesh : Policy::kResident)
     blend_kernel(const __grid_constant__ BlendArgs b) {
@@ -128,7 +131,7 @@ __global__ void __launch_bounds__(kThreads, Mesh ? Policy::kResidentWithMesh : P
   // A warp has 2 x 2 blocks of the tile's 4 x 4.
   const unsigned lane = threadIdx.x % 32, warp = threadIdx.x / 32, quarter = lane / 8, at = lane % 8;
   const unsigned column = warp % 2 * 2 + quarter % 2, row = warp / 2 * 2 + quarter / 2;
-  const unsigned bit = warp / 2 * 8 + warp % 2 * 2;  // of the first quarter's block
+  const unsigned bit = warp / 2 * 8 + warp % 2 * 2;  // Bit of the first quarter's block.
   const int x = tile_x + static_cast<int>(column * kBlock + at % kBlock);
   const int y = tile_y + static_cast<int>(row * kBlock + at / kBlock);
   BlendRules<float> rules = b.raster.rules;
@@ -194,7 +197,7 @@ __global__ void __launch_bounds__(kThreads, Mesh ? Policy::kResidentWithMesh : P
   }
 }
 
-/// Out of line: few need it, and all would pay for its registers.
+/// Not inlined: it is rarely needed and would raise the register count of all threads.
 __device__ __noinline__ void depth_record64(const ViewedSet<float>& args, const ViewedRow& row,
                                             const RowKey<float>& key, SplatDepth<float>& depth) {
   Splat splat;
@@ -202,7 +205,7 @@ __device__ __noinline__ void depth_record64(const ViewedSet<float>& args, const 
   depth = splat.depth;
 }
 
-/// What the depth of a slot's Gaussian is made of.
+/// Depth record of a slot's Gaussian.
 __device__ SplatDepth<float> depth_record(const BatchArgs& a, std::uint32_t camera, std::uint32_t slot) {
   const std::uint32_t source = a.sources[slot];
   const ViewedSet<float>& args = instance_of(a, camera, source).args;
@@ -219,8 +222,9 @@ __device__ SplatDepth<float> depth_record(const BatchArgs& a, std::uint32_t came
 constexpr unsigned kDepthColumns = policy::MedianDepth::kColumns,
                    kDepthRows = policy::MedianDepth::kRows, kDepthThreads = kDepthColumns * kDepthRows;
 
-/// A thread a pixel of camera blockIdx.z, a warp 8 x 4 of them: slots become depths, of records where
-/// these are. Else neighbours have Gaussians in common, and each is projected once a warp.
+/// Replaces slots by depths, with one pixel of camera blockIdx.z per thread and 8 x 4 pixels per warp.
+/// Uses the depth records if they exist. Otherwise each Gaussian is projected once per warp, because
+/// neighbouring pixels often share one.
 __global__ void __launch_bounds__(kDepthThreads, policy::MedianDepth::kResident)
     depth_kernel(const BatchArgs a, float* images) {
   const unsigned lane = threadIdx.x % 32, warp = threadIdx.x / 32;
@@ -238,7 +242,7 @@ __global__ void __launch_bounds__(kDepthThreads, policy::MedianDepth::kResident)
     return;
   }
   const int first =
-      __ffs(static_cast<int>(__match_any_sync(kAll, slot))) - 1;  // of the lanes with that Gaussian
+      __ffs(static_cast<int>(__match_any_sync(kAll, slot))) - 1;  // First lane with the same Gaussian.
   SplatDepth<float> depth{};
   if (slot != kNoSlot && static_cast<int>(lane) == first) depth = depth_record(a, blockIdx.z, slot);
   constexpr int kWords = sizeof depth / sizeof(float);

@@ -7,23 +7,24 @@
 #include "gsnav/backends/cuda.hpp"
 #include "gsnav/detail/frame/composite.hpp"
 
-// What the kernels share that blend tiles.
+// Code shared by the kernels that blend tiles.
 
 namespace gsnav::cuda {
 
-inline constexpr int kBlock = 4;  ///< pixels a side of what has a list of its own
+inline constexpr int kBlock = 4;  ///< Width in pixels of a block that has its own list.
 
-/// What is summed while blending; of a median the slot is remembered and looked up afterwards.
+/// Depth that is summed during blending. For a median, only the slot is stored and its depth is looked
+/// up afterwards.
 template <DepthMode D>
 inline constexpr DepthMode kBlendedDepth = D == DepthMode::any ? D : DepthMode::none;
 
-/// A splat of a list, in shared memory.
+/// A splat of a list in shared memory.
 struct StagedSplat {
   float4 geometry[2];
-  SplatColor<float> color;  ///< pad: the slot's bits
+  SplatColor<float> color;  ///< `pad` stores the bits of the slot.
 };
 
-/// The staged form of a record, and of what covers no pixel.
+/// Staged form of a record, and of a splat that covers no pixel.
 __device__ inline StagedSplat staged(const SplatRecord& r, std::uint32_t slot) {
   const SplatGeometry<float> g = geometry_of(r);
   return {{{g.ref_x, g.ref_y, g.a, g.k}, {g.b, g.w1, g.w2, g.log2_opacity}},
@@ -31,7 +32,7 @@ __device__ inline StagedSplat staged(const SplatRecord& r, std::uint32_t slot) {
 }
 __device__ inline StagedSplat staged_nothing() {
   StagedSplat nothing{};
-  nothing.geometry[1].w = -1e30f;  // log2 of the opacity
+  nothing.geometry[1].w = -1e30f;  // log2 of the opacity.
   return nothing;
 }
 __device__ inline SplatGeometry<float> geometry_of(const StagedSplat& s) {
@@ -39,10 +40,10 @@ __device__ inline SplatGeometry<float> geometry_of(const StagedSplat& s) {
   return {g0.x, g0.y, g0.z, g0.w, g1.x, g1.y, g1.z, g1.w};
 }
 
-/// The blocks of the tile at (x, y) that a footprint may reach.
+/// Blocks of the tile at (x, y) that a footprint may reach.
 struct ReachedBlocks {
-  int x, y;            ///< of the tile
-  int x0, x1, y0, y1;  ///< pixels of the bounds in it, inclusive
+  int x, y;            ///< Position of the tile.
+  int x0, x1, y0, y1;  ///< Pixel bounds in the tile, inclusive.
   __device__ ReachedBlocks(const SplatBounds& b, int tile_x, int tile_y, int side = policy::Batch::kTile)
       : x(tile_x),
         y(tile_y),
@@ -55,11 +56,11 @@ struct ReachedBlocks {
   }
   __device__ int first_row() const { return (y0 - y) / kBlock; }
   __device__ int last_row() const { return (y1 - y) / kBlock; }
-  /// More than one row and column: the ellipse may leave out some of them.
+  /// True for more than one row and column. The ellipse may then exclude blocks.
   __device__ bool many() const {
     return first_row() != last_row() && (x0 - x) / kBlock != (x1 - x) / kBlock;
   }
-  /// More than 2 x 2: it leaves out enough to be worth its time.
+  /// True for more than 2 x 2 blocks. The ellipse then excludes enough to be worth testing.
   __device__ bool wide() const {
     const int rows = last_row() - first_row(), columns = (x1 - x) / kBlock - (x0 - x) / kBlock;
     return rows + columns > 2 && rows > 0 && columns > 0;
@@ -87,13 +88,13 @@ struct ReachedBlocks {
 
 struct BlendArgs {
   BatchArgs batch;
-  RasterArgs<float> raster;  ///< images.rgb is not written: it says that colour is asked for
+  RasterArgs<float> raster;  ///< images.rgb is not written. It only shows that colour is requested.
   float* rgb;
   std::uint8_t* rgb8;
 };
 
-/// Writes a pixel, once its mesh has taken what Gaussians left of it. Without meshes the slot of the
-/// median Gaussian is left in the image.
+/// Writes a pixel, after its mesh has taken the remaining transmittance. Without meshes, it writes the
+/// slot of the median Gaussian.
 template <bool Color, DepthMode D, bool Mesh>
 __device__ void write(const BlendArgs& b, std::size_t pixel,
                       const BlendState<float, kBlendedDepth<D>>& blended, std::uint32_t median, float px,
@@ -122,11 +123,11 @@ __device__ void write(const BlendArgs& b, std::size_t pixel,
   });
 }
 
-/// What RasterArgs decide at run time and the inner loop must not.
+/// Variants that RasterArgs selects at run time and that the inner loop must know at compile time.
 enum class Form { plain, exclusive_stop, perspective };
 
-/// Blends a splat into K pixels of a column, where `mesh` has the depths of their meshes. `median`: see
-/// median_of.
+/// Blends a splat into K pixels of a column. `mesh` has the depths of their meshes. See median_of for
+/// `median`.
 template <bool Color, DepthMode D, Exp2 M, Form F, bool Mesh, int K>
 __device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>& rules,
                                     const StagedSplat& from, float px, const float (&py)[K],
@@ -136,13 +137,13 @@ __device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>&
   const SplatGeometry<float> geometry = geometry_of(from);
   const SplatColor<float> color = from.color;
   const std::uint32_t slot =
-      __float_as_uint(color.pad);  // 0 for the splat that covers nothing: any will do
+      __float_as_uint(color.pad);  // 0 for the splat that covers nothing. Any slot would do.
   const SplatDepth<float>* const depth = kBlendedDepth<D> == DepthMode::any ? a.depths + slot : nullptr;
   constexpr bool kAlongRays = F == Form::perspective;
   const SplatPerspective<float>* const perspective = kAlongRays ? a.perspectives + slot : nullptr;
   for (int k = 0; k < K; ++k) {
     const float exponent = splat_exponent(kAlongRays, geometry, perspective, px, py[k]);
-    // Decided once: a third of the loop were comparisons and selections.
+    // Decide once. Separate comparisons and selections took a third of the loop.
     bool drawn = in_footprint(rules, exponent) && state[k].open(rules);
     float alpha = alpha_in_footprint<M>(rules, exponent);
     if constexpr (Mesh) {
@@ -158,9 +159,9 @@ __device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>&
   }
 }
 
-inline constexpr std::uint32_t kListStep = 4;  ///< lists are read by so many
+inline constexpr std::uint32_t kListStep = 4;  ///< Number of list entries read at a time.
 
-/// Calls blend(place) for the kListStep places from `list` on, which is aligned to them, in order.
+/// Calls blend(place) for kListStep entries of `list`, in order. `list` must be aligned to them.
 template <class F>
 __device__ inline void blend_listed(const std::uint16_t* list, const F& blend) {
   static_assert(kListStep * sizeof *list == sizeof(uint2));
@@ -171,16 +172,16 @@ __device__ inline void blend_listed(const std::uint16_t* list, const F& blend) {
   blend(places.y >> 16);
 }
 
-/// The slot of the median Gaussian, of the last that blend_staged met while more than half of the light
-/// was left.
+/// Slot of the median Gaussian: the last one that blend_staged met while the transmittance was above
+/// 1/2.
 template <class State>
 __device__ inline std::uint32_t median_of(const State& state, std::uint32_t last) {
-  // An exclusive stop negates it and blends nothing.
+  // With an exclusive stop, the transmittance is negated and nothing more is blended.
   return falls_through(1.0f, abs(state.transmittance), kMedianLevel<float>) ? last : kNoSlot;
 }
 
-/// Depths of the meshes at a thread's pixels, and the farthest of all pixels of the block: what a whole
-/// tile hides is left out of its lists. All threads of the block call it.
+/// Loads the depths of the meshes at a thread's pixels and returns the largest over the block. Splats
+/// behind it are left out of the tile's lists. All threads of the block must call it.
 template <int K>
 __device__ inline float load_mesh(const BlendArgs& b, const std::size_t (&pixel)[K],
                                   const bool (&inside)[K], float (&mesh)[K]) {
@@ -190,19 +191,20 @@ __device__ inline float load_mesh(const BlendArgs& b, const std::size_t (&pixel)
   for (int k = 0; k < K; ++k) {
     mesh[k] = inside[k] ? b.raster.mesh.depth[pixel[k]] : 0.0f;
     if (inside[k])
-      atomicMax(&far, __float_as_uint(has_mesh(mesh[k]) ? mesh[k]
-                                                        : INFINITY));  // in order, as none is negative
+      atomicMax(&far, __float_as_uint(has_mesh(mesh[k]) ? mesh[k] : INFINITY));  // Unsigned order equals
+                                                                                 // float order, because
+                                                                                 // no depth is negative.
   }
   __syncthreads();
   return __uint_as_float(far);
 }
 
-/// Calls launch.operator()<Color, DepthMode, Exp2, Form, Mesh>() with what the call asks for.
+/// Calls launch.operator()<Color, DepthMode, Exp2, Form, Mesh>() for the variant of the call.
 template <class L>
 void dispatch_blending(const BlendArgs& b, const L& launch) {
   if (!b.raster.mesh.empty()) {
     dispatch_composite(b.raster, [&]<bool C, DepthMode D, bool General>() {
-      // check_batch refuses what is more general.
+      // check_batch rejects more general cases.
       if constexpr (!General) launch.template operator()<C, D, Exp2::degree5, Form::plain, true>();
     });
     return;
@@ -218,7 +220,7 @@ void dispatch_blending(const BlendArgs& b, const L& launch) {
   });
 }
 
-/// Of lists that are in order: a block a small tile.
+/// Blends sorted lists, one small tile per block.
 void launch_blending_small(const BlendArgs& b, cudaStream_t stream);
 
 }  // namespace gsnav::cuda

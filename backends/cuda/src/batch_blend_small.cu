@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "batch_blend.cuh"
 
-// Few cameras: lists, which are in order already, are blended by a block a small tile, since a call
-// lasts as long as its longest list.
+// Blending for few cameras. Lists are already sorted. One block blends a small tile, because a call
+// takes as long as its longest list.
 
 namespace gsnav::cuda {
 
@@ -10,28 +10,29 @@ namespace {
 
 using Policy = policy::BlendSmall;
 constexpr int kTile = policy::Batch::kSmallTile;
-constexpr int kThreads = Policy::kThreads, kWarps = kThreads / 32;  ///< of half a block
+constexpr int kThreads = Policy::kThreads, kWarps = kThreads / 32;  ///< Per half block.
 constexpr std::uint32_t kOfThread = Policy::kOfThread;
-constexpr std::uint32_t kChunk = kOfThread * kThreads;  ///< splats that are staged at a time
-constexpr std::uint32_t kOfWarp = kChunk / kWarps;      ///< of these a warp's, neighbours
+constexpr std::uint32_t kChunk = kOfThread * kThreads;  ///< Splats staged at a time.
+constexpr std::uint32_t kOfWarp = kChunk / kWarps;      ///< Splats of these per warp, adjacent.
 constexpr unsigned kAll = 0xffffffffu;
 static_assert(kTile == 2 * kBlock && kWarps == 4);
 
-/// A chunk of a list as it is drawn.
+/// A chunk of a list in the form that is drawn.
 struct DrawnChunk {
-  StagedSplat splats[kChunk + 1];  ///< the last covers no pixel
-  /// Of the warps that draw, a part by each that stages: places of splats, in bytes.
+  StagedSplat splats[kChunk + 1];  ///< The last covers no pixel.
+  /// Indexed [drawing warp][staging warp]: byte offsets of splats.
   alignas(8) std::uint16_t lists[kWarps][kWarps][kOfWarp + kListStep];
   std::uint32_t lengths[kWarps][kWarps];
 };
 
 struct SmallShared {
-  DrawnChunk chunks[2];  ///< one is drawn while the next is staged
-  bool open[2][kWarps];  ///< whether any pixel of the block is: one is written while the other is read
+  DrawnChunk chunks[2];  ///< One is drawn while the next is staged.
+  bool open[2][kWarps];  ///< True if a pixel of the block is open. One copy is written while the other
+                         ///< is read.
 };
 
-/// What the second half of a block does: records are asked for while the splats before them are staged,
-/// and their slots before that.
+/// Work of the second half of a block. Records are requested while the previous splats are staged, and
+/// their slots one step earlier.
 class Stager {
  public:
   __device__ Stager(const BatchArgs& a, std::uint32_t begin, std::uint32_t end)
@@ -41,8 +42,8 @@ class Stager {
     ask_for_slots(a, begin + kChunk);
   }
 
-  /// Splats [first, first + kChunk), in order: all chunks are asked for. Only blocks that are `open` get
-  /// a list. `far`: of the tile's meshes.
+  /// Stages splats [first, first + kChunk). Chunks must be requested in order. Only blocks that are
+  /// `open` get a list. `far` is the largest depth of the tile's meshes.
   template <bool Mesh>
   __device__ void stage(DrawnChunk& to, const bool (&open)[kWarps], const BatchArgs& a,
                         std::uint32_t first, int tile_x, int tile_y, float far) {
@@ -90,11 +91,11 @@ class Stager {
   }
 
  private:
-  /// The bit of a block in a mask of ReachedBlocks.
+  /// Bit of a block in a mask of ReachedBlocks.
   __device__ static constexpr unsigned bit_of(unsigned block) {
     return 1u << (block / 2 * 4 + block % 2);
   }
-  /// The thread's splat `j` in a chunk.
+  /// Index of the thread's splat `j` in a chunk.
   __device__ std::uint32_t place_of(std::uint32_t j) const {
     return thread_ / 32 * kOfWarp + j * 32 + thread_ % 32;
   }
@@ -117,9 +118,9 @@ class Stager {
   SplatRecord record_[kOfThread];
 };
 
-/// A block a tile, of two halves: a warp of the first draws a block of 4 x 4 pixels, which are its first
-/// half's; the second stages what is drawn next. For DepthMode::median the slot of the median Gaussian
-/// is left in the image.
+/// Blends one tile per block. Each warp of the first half draws a block of 4 x 4 pixels with half of its
+/// lanes. The second half stages the next splats. For DepthMode::median it writes the slot of the median
+/// Gaussian to the image.
 template <bool Color, DepthMode D, Exp2 M, Form F, bool Mesh>
 __global__ void __launch_bounds__(2 * kThreads, Policy::kResident)
     blend_small_kernel(const __grid_constant__ BlendArgs b) {

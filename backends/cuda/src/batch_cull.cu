@@ -2,7 +2,7 @@
 #include "batch_lists.cuh"
 #include "search.cuh"
 
-// Culling of a batch: which parts of chunks which instances may see.
+// Culling of a batch: finds the parts of chunks that may be visible to each instance.
 
 namespace gsnav::cuda {
 
@@ -11,7 +11,8 @@ namespace {
 constexpr unsigned kThreads = policy::Cull::kThreads, kWarps = kThreads / 32;
 constexpr unsigned kAll = 0xffffffffu;
 
-/// Whether part `part` of the chunk may have visible Gaussians: by bounds of its own, or by the chunk's.
+/// Whether part `part` of the chunk may have visible Gaussians, by the bounds of the part, or by those
+/// of the chunk if parts have none.
 __device__ bool part_is_candidate(const ViewedSet<float>& args, std::size_t chunk, unsigned part) {
   const GaussianRows& gs = args.gaussians;
   const std::size_t at = chunk * kPartsPerChunk + part;
@@ -24,8 +25,10 @@ __device__ bool part_is_candidate(const ViewedSet<float>& args, std::size_t chun
                         gs.part_bounds.empty() ? gs.chunk_bounds[chunk] : gs.part_bounds[at]);
 }
 
-/// Parts, a bit each, of a chunk that the lane's instance may see (`seen`): all of them, or where the
-/// chunk is at the edge of its view those that the lanes find together, four for each such instance.
+/// Mask of the parts of a chunk that the lane's instance may see, one bit per part; 0 unless `seen`,
+/// which says whether it may see the chunk. If the chunk lies wholly in view or its parts have no
+/// bounds, the mask has all parts with rows that may be seen. If it is at the edge of the view, the
+/// lanes of the warp test its parts together, with kPartsPerChunk lanes for each such instance.
 __device__ unsigned parts_in_view(const BatchInstance* instances, std::size_t chunk, bool seen) {
   const unsigned lane = threadIdx.x % 32;
   const GaussianRows& gs = instances[0].args.gaussians;
@@ -56,12 +59,13 @@ __device__ unsigned parts_in_view(const BatchInstance* instances, std::size_t ch
   return parts;
 }
 
-/// Chunk c of those that are drawn: the same for all instances of a set.
+/// Id of chunk c among the drawn chunks, which are the same for all instances of a set.
 __device__ std::uint32_t chunk_of(const BatchInstance& instance, std::uint32_t c) {
   return static_cast<std::uint32_t>(instance.args.selection.chunk_id(c));
 }
 
-/// A warp a unit: the lanes are instances, or where these are few parts and instances.
+/// One warp per unit. The lanes are the instances of the unit; in a set with few instances, they are
+/// pairs of a part and an instance.
 __global__ void __launch_bounds__(kThreads) cull_kernel(const BatchArgs a) {
   const unsigned lane = threadIdx.x % 32;
   const std::uint64_t stride = std::uint64_t{gridDim.x} * kWarps;

@@ -6,7 +6,7 @@
 
 #include "batch_state.cuh"
 
-// What a batch can draw, and how many cameras at once.
+// Limits of a batch: supported frames, and cameras per call.
 
 namespace gsnav {
 
@@ -33,8 +33,7 @@ Status supports_meshes(const RenderConfig& config, const MeshFrame& meshes) {
   return {};
 }
 
-/// Checks the sets that one camera lists, and the list of what it sees of each. The sets themselves
-/// are already validated.
+/// Checks the sets that a camera lists and its visibility bits for them. The sets are already validated.
 Status check_lists(std::span<const GaussianSet> sets, const BatchCamera& camera) {
   for (const std::uint32_t s : camera.sets) {
     if (s < sets.size()) continue;
@@ -107,13 +106,13 @@ Status CudaBatchRenderer::supports(const RenderConfig& config, std::span<const G
 
 std::size_t CudaBatchRenderer::State::measured_capacity(std::size_t cameras) const {
   if (taken.cameras == 0) return cameras;
-  // An eighth more, as capacities grow.
+  // Add an eighth, as capacities grow.
   const auto of_each = [this](std::uint64_t n) { return (n + n / 8) / taken.cameras + 1; };
   std::uint64_t most = kMostPlaces / of_each(std::max(taken.slots, taken.pairs));
   constexpr std::uint64_t kSlotBytes = sizeof(cuda::SplatRecord) + sizeof(cuda::SplatEntry) +
                                        sizeof(SplatDepth<float>) + sizeof(std::uint32_t);
   constexpr std::uint64_t kPairBytes =
-      3 * sizeof(cuda::Pair);  // a room of twice the mean, and once more
+      3 * sizeof(cuda::Pair);  // Space for twice the mean, and once more.
   const std::uint64_t bytes = of_each(taken.slots * kSlotBytes + taken.pairs * kPairBytes);
   if (bytes * cameras > stats.scratch_bytes) {
     std::size_t free = 0, all = 0;

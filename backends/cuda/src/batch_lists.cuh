@@ -3,14 +3,14 @@
 
 #include "batch_tiles.cuh"
 
-// Pairs as they are found, into lists that have room for so many each: nothing is found twice. What
-// comes beyond the room is queued, and so are splats of very many tiles, row by row.
+// Writes pairs as they are found into lists with reserved space, so that nothing is found twice. Pairs
+// beyond the space are queued, and so are very large splats, row by row.
 
 namespace gsnav::cuda {
 
-/// Pairs of one tile for each lane that wants one: their numbers in their lists are asked for, and used
-/// later. Lanes often share a list, and one may be in great demand: one atomic operation a list. All
-/// lanes of the warp call both together.
+/// Adds pairs to tile lists, one per lane that wants one. Numbers in the lists are requested first and
+/// used later. Lanes often share a list, so there is one atomic operation per distinct list. All lanes
+/// of the warp must call both functions together.
 class WarpPairs {
  public:
   __device__ void ask(const BatchArgs& a, bool wanted, std::uint32_t tile) {
@@ -34,8 +34,8 @@ class WarpPairs {
  private:
   static constexpr unsigned kAll = 0xffffffffu;
 
-  /// Of the lanes `late`. Rare, and not to weigh on what is not: nor may it be given the address of a
-  /// kernel's arguments.
+  /// Queues the pairs of the lanes `late`. Not inlined, because it is rare and must not slow down the
+  /// common case. It must not take the address of a kernel's arguments.
   static __device__ __noinline__ void queue(unsigned long long* counter, BeyondPair* to,
                                             std::uint32_t capacity, unsigned late, BeyondPair pair) {
     const unsigned lane = threadIdx.x % 32;
@@ -50,15 +50,15 @@ class WarpPairs {
   std::uint32_t number_ = 0, before_ = 0;
 };
 
-/// Whether a splat lies in more than 2 x 2 tiles.
+/// Returns true if a splat lies in more than 2 x 2 tiles.
 __device__ inline bool is_wide(const BatchArgs& a, const SplatBounds& b) {
   return a.grid.tiles_of(b).exceeds(2);
 }
 
-/// The pairs of the lanes' splats that are not wide: of all tiles that bounds reach.
+/// Adds the pairs of the lanes' splats that are not wide, for all tiles that their bounds reach.
 class NearPairs {
  public:
-  /// Nobody waits for what is asked until `put`.
+  /// Requests the places. The result is not needed before put().
   __device__ void ask(const BatchArgs& a, std::uint32_t camera, bool wanted, const SplatBounds& b) {
     const TileRange<int> tiles = a.grid.tiles_of(b);
     columns_ = static_cast<std::uint32_t>(a.grid.columns);
@@ -82,7 +82,7 @@ class NearPairs {
   WarpPairs pairs_[4];
 };
 
-/// The rows of tiles of a splat that binning takes row by row.
+/// Rows of tiles of a splat that binning processes row by row.
 struct LargeRows {
   std::uint32_t first, count;
 };
@@ -98,8 +98,8 @@ __device__ inline void queue_large_row(const BatchArgs& a, unsigned long long pl
   if (place < a.large_capacity) a.large[place] = {splat, row};
 }
 
-/// Queues the rows of the lanes that have some; all lanes call both, `ask` first, so that nobody waits
-/// for the counter until `put`.
+/// Queues the rows of the lanes that have some. All lanes must call ask(), then put(), so that the
+/// counter is not needed before put().
 class LargeQueue {
  public:
   __device__ void ask(const BatchArgs& a, const LargeRows& rows) {
@@ -126,8 +126,8 @@ class LargeQueue {
 
  private:
   bool any_ = false;
-  std::uint32_t begin_ = 0;      ///< of the lane's, among the warp's
-  unsigned long long base_ = 0;  ///< of lane 31: where the warp's begin
+  std::uint32_t begin_ = 0;      ///< Position of the lane's rows among those of the warp.
+  unsigned long long base_ = 0;  ///< In lane 31: position of the warp's rows.
 };
 
 }  // namespace gsnav::cuda

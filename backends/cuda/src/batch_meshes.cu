@@ -5,9 +5,9 @@
 #include "batch_state.cuh"
 #include "gsnav/backends/cuda/device.cuh"
 
-// The meshes of a batch: a layer of depth and colour for each camera, over which Gaussians are blended.
-// The host says what instances each camera may see; how many triangles that makes stays on the device,
-// as counts of splats do.
+// Meshes of a batch: a layer of depth and colour per camera, over which Gaussians are blended. The host
+// knows which instances each camera may see. The number of triangles that this makes stays on the
+// device, like counts of splats.
 
 namespace gsnav {
 
@@ -21,7 +21,7 @@ std::uint32_t chunks_of(std::size_t n) {
 
 }  // namespace
 
-/// Lists what each camera sees, in waves of cameras. `most_triangles`: of one wave, at most.
+/// Lists what each camera sees, in waves of cameras. `most_triangles` is the largest number of a wave.
 Status CudaBatchRenderer::State::list_meshes(std::span<const BatchCamera> cameras,
                                              std::uint64_t& most_triangles) {
   const std::size_t pixels =
@@ -74,7 +74,7 @@ Status CudaBatchRenderer::State::list_meshes(std::span<const BatchCamera> camera
   return {};
 }
 
-/// Copies the lists, cameras and lights into the call's pinned memory.
+/// Copies lists, cameras and lights into the call's pinned memory.
 void CudaBatchRenderer::State::write_mesh_inputs(std::span<const BatchCamera> cameras) {
   cuda::Flight& flight = flights[calls % cuda::policy::Batch::kInFlight];
   cuda::Layout layout;
@@ -118,8 +118,8 @@ Status CudaBatchRenderer::State::place_meshes(std::span<const BatchCamera> camer
   meshes.depth.resize_discard(args.cameras * pixels);
   meshes.color.resize_discard(color ? args.cameras * 3 * pixels : 0);
   raster.mesh = {meshes.depth.data(), color ? meshes.color.data() : nullptr, {}};
-  raster.exp2_method = Exp2::degree5;  // as frames with meshes have it
-  if (triangle_capacity == 0) {        // a guess, as that of slots
+  raster.exp2_method = Exp2::degree5;  // The same as in other frames with meshes.
+  if (triangle_capacity == 0) {        // An estimate, as for slots.
     triangle_capacity = static_cast<std::uint32_t>(
         std::clamp<std::uint64_t>(most_triangles / 2, Policy::kLeastTriangles, Policy::kMostTriangles));
   }

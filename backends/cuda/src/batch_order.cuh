@@ -6,17 +6,20 @@
 
 #include "batch_args.cuh"
 
-// The order of a tile's list, found as far as it is read (docs/notes/cuda.md). All threads of a block
-// call every function together; before a call they are done with what they were lent.
+// Sorting of a tile's list, as far as it is read (docs/notes/cuda.md). All threads of a block must call
+// every function together. Before a call they must have finished using memory lent to them.
 
 namespace gsnav::cuda {
 
 inline constexpr int kOrderThreads = policy::Order::kThreads, kOrderItems = policy::Order::kItems;
 inline constexpr int kOrderBinBits = policy::Order::kBinBits, kOrderBins = 1 << kOrderBinBits;
-inline constexpr int kOrderLevels = 2 * ((32 + kOrderBinBits - 1) / kOrderBinBits);  ///< of key and rank
+inline constexpr int kOrderLevels = 2 * ((32 + kOrderBinBits - 1) / kOrderBinBits);  ///< Levels for the
+                                                                                     ///< key and the
+                                                                                     ///< rank.
 inline constexpr std::size_t kOrderLent = 12800;
 
-/// A batch is scattered into so many buckets by key; what shares one is put in order afterwards.
+/// A batch is scattered into this number of buckets by key. Splats that share a bucket are ordered
+/// afterwards.
 inline constexpr int kBucketBits = policy::Order::kBucketBits, kBuckets = 1 << kBucketBits;
 inline constexpr int kThreadBuckets = kBuckets / kOrderThreads;
 
@@ -36,12 +39,12 @@ struct OrderShared {
   };
   union {
     Sorting sorting;
-    unsigned char lent[kOrderLent];  ///< the caller's between calls
+    unsigned char lent[kOrderLent];  ///< Memory for the caller between calls.
   };
-  std::uint32_t slots[kOrderBatch];                    ///< the batch, in order
-  std::uint32_t begins[kOrderLevels][kOrderBins + 1];  ///< of bins, into the pairs
-  std::uint32_t bases[kOrderLevels];                   ///< the smallest key of the level
-  int shifts[kOrderLevels];  ///< a bin is 2^shift keys; kByRank where keys are equal
+  std::uint32_t slots[kOrderBatch];                    ///< The sorted batch.
+  std::uint32_t begins[kOrderLevels][kOrderBins + 1];  ///< Begins of bins, as indices of pairs.
+  std::uint32_t bases[kOrderLevels];                   ///< Smallest key of the level.
+  int shifts[kOrderLevels];  ///< A bin covers 2^shift keys. kByRank if all keys are equal.
   std::uint32_t next_bin[kOrderLevels];
   std::uint32_t cursors[kOrderBins];
   std::uint32_t low, high;
@@ -51,8 +54,8 @@ inline constexpr int kByRank = -1;
 
 namespace ordering {
 
-/// The smallest and largest of the block's values, left in s.low and s.high, which all threads are done
-/// with.
+/// Computes the smallest and largest of the block's values in s.low and s.high. No thread may still be
+/// reading these.
 __device__ inline void block_range(OrderShared& s, std::uint32_t low, std::uint32_t high) {
   if (threadIdx.x == 0) {
     s.low = 0xffffffffu;
@@ -72,7 +75,7 @@ __device__ inline void block_range(OrderShared& s, std::uint32_t low, std::uint3
 
 __device__ inline int bits_for(std::uint32_t range) { return 32 - __clz(static_cast<int>(range)); }
 
-/// Sorts a batch in which many keys are equal, by (key, rank).
+/// Sorts a batch with many equal keys by (key, rank).
 __device__ __noinline__ inline void sort_by_rank(OrderShared& s, const BatchArgs& a,
                                                  std::uint32_t camera, std::uint32_t n) {
   constexpr int kItems = kOrderItems;
@@ -82,7 +85,7 @@ __device__ __noinline__ inline void sort_by_rank(OrderShared& s, const BatchArgs
     rank[j] = index[j] < n ? rank_of(a, camera, s.slots[index[j]]) : 0xffffffffu;
   }
   OrderSort(s.sorting.sort).Sort(rank, index, 0, 32);
-  // What is no pair comes last: both sorts are stable.
+  // Entries beyond the pairs come last. Both sorts are stable.
   for (int j = 0; j < kItems; ++j) key[j] = index[j] < n ? s.sorting.keys[index[j]] : 0xffffffffu;
   __syncthreads();
   OrderSort(s.sorting.sort).Sort(key, index, 0, 32);
@@ -93,7 +96,7 @@ __device__ __noinline__ inline void sort_by_rank(OrderShared& s, const BatchArgs
   __syncthreads();
 }
 
-/// Where the splat at `at` belongs among those of its bucket, [begin, end), by (key, rank).
+/// Position of the splat at `at` among those of its bucket [begin, end), by (key, rank).
 __device__ inline std::uint32_t place_in_bucket(const OrderShared& s, const BatchArgs& a,
                                                 std::uint32_t camera, std::uint32_t begin,
                                                 std::uint32_t end, std::uint32_t at) {
@@ -110,7 +113,8 @@ __device__ inline std::uint32_t place_in_bucket(const OrderShared& s, const Batc
   return begin + before;
 }
 
-/// Pairs by places, those from `rest` on `rest_shift` further and those before it `shift`, modulo 2^32.
+/// Array of pairs with offset indices: `shift` is added to indices below `rest`, `rest_shift` to the
+/// others, modulo 2^32.
 struct PairsAt {
   Pair* pairs;
   std::uint32_t shift, rest, rest_shift;
@@ -119,8 +123,8 @@ struct PairsAt {
   }
 };
 
-/// Sorts the n pairs from `begin_pair` on into s.slots. All keys lie in [low, high]; low > high: not
-/// known.
+/// Sorts n pairs, from `begin_pair` on, into s.slots. All keys lie in [low, high]. low > high means that
+/// the range is unknown.
 __device__ __noinline__ inline void sort_batch(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
                                                const PairsAt pairs, std::uint32_t begin_pair,
                                                std::uint32_t n, std::uint32_t low, std::uint32_t high) {
@@ -192,8 +196,8 @@ __device__ __noinline__ inline void sort_batch(OrderShared& s, const BatchArgs& 
   __syncthreads();
 }
 
-/// Calls f(pair) for each of [begin, end), many fetched at a time: a long list is one block's work, and
-/// waits for memory.
+/// Calls f(pair) for each pair in [begin, end). Several pairs are fetched at a time, because one block
+/// processes a long list and would wait for memory.
 template <class F>
 __device__ inline void for_each_pair(const PairsAt& pairs, std::uint32_t begin, std::uint32_t end,
                                      const F& f) {

@@ -3,8 +3,8 @@
 
 #include "batch_tile_order.cuh"
 
-// Few cameras: parts of lists are put in order by themselves, by a warp each, or by a block where they
-// are long. Large images: so are whole lists, where they are short.
+// Sorting for few cameras: parts of lists are sorted separately, by a warp each, or by a block if they
+// are long. For large images, short lists are sorted as a whole.
 
 namespace gsnav::cuda {
 
@@ -14,7 +14,7 @@ using Policy = policy::Order;
 constexpr unsigned kThreads = Policy::kThreads, kWarps = kThreads / 32;
 constexpr unsigned kAll = 0xffffffffu;
 
-/// Puts the first of two before the second, or the other way round.
+/// Swaps two values if they are not in the requested order.
 __device__ inline void put_in_order(std::uint64_t& first, std::uint64_t& second, bool up) {
   const bool swap = (second < first) == up;
   const std::uint64_t was = first;
@@ -22,9 +22,9 @@ __device__ inline void put_in_order(std::uint64_t& first, std::uint64_t& second,
   second = swap ? was : second;
 }
 
-/// Puts the K * 32 values of a warp in ascending order, K neighbours a lane: a bitonic sort (Batcher,
-/// Sorting networks and their applications, 1968). All lanes call it. What is between lanes is a loop:
-/// unrolled it is longer than what instructions are cached in.
+/// Sorts the K * 32 values of a warp in ascending order, with K adjacent values per lane: a bitonic sort
+/// (Batcher, Sorting networks and their applications, 1968). All lanes must call it. The steps between
+/// lanes are a loop, because the unrolled code would exceed the instruction cache.
 template <int K>
 __device__ void sort_in_warp(std::uint64_t (&v)[K]) {
   const unsigned lane = threadIdx.x % 32;
@@ -57,8 +57,8 @@ __device__ void sort_in_warp(std::uint64_t (&v)[K]) {
   }
 }
 
-/// Puts neighbours of equal keys in the order of their ranks. Depths that are equal by chance are two;
-/// false, and all is left as it is, where they are many.
+/// Sorts adjacent values with equal keys by rank. Usually at most two depths are equal by chance. If
+/// there are many, it returns false and leaves the values in place.
 template <int K>
 __device__ bool order_equals(const BatchArgs& a, std::uint32_t camera, std::uint64_t (&v)[K],
                              std::uint32_t n) {
@@ -110,7 +110,7 @@ __device__ bool order_equals(const BatchArgs& a, std::uint32_t camera, std::uint
   return false;
 }
 
-/// Puts a part of at most K * 32 pairs in order, or returns false.
+/// Sorts a part of at most K * 32 pairs. Returns false if it cannot.
 template <int K>
 __device__ bool order_part(const BatchArgs& a, const ListPart& part, std::uint32_t camera) {
   static_assert(K > 1, "the first and last of a lane are two");
@@ -120,7 +120,7 @@ __device__ bool order_part(const BatchArgs& a, const ListPart& part, std::uint32
 #pragma unroll
   for (unsigned k = 0; k < K; ++k) {
     const std::uint32_t i = 32 * k + lane;
-    v[k] = ~std::uint64_t{0};  // comes last
+    v[k] = ~std::uint64_t{0};  // Comes last.
     if (i < n) {
       const Pair pair = a.pairs[part.begin + i];
       v[k] = std::uint64_t{pair.key} << 32 | pair.slot;
@@ -136,10 +136,11 @@ __device__ bool order_part(const BatchArgs& a, const ListPart& part, std::uint32
   return true;
 }
 
-/// Whether all parts are there; else the call will be repeated.
+/// Returns true if all parts are complete. If not, the call will be repeated.
 __device__ bool is_whole(const BatchArgs& a) { return a.counters->pairs <= a.pair_capacity; }
 
-/// A warp a part; what is too long for one, or has many equal keys, is left for order_long_kernel.
+/// Sorts one part per warp. Parts that are too long, or have many equal keys, are left to
+/// order_long_kernel.
 __global__ void __launch_bounds__(kThreads) order_kernel(const BatchArgs a) {
   if (!is_whole(a)) return;
   const std::uint32_t count = a.counters->parts;
@@ -163,7 +164,7 @@ __global__ void __launch_bounds__(kThreads) order_long_kernel(const BatchArgs a)
     TileOrder order(part, part.tile / tiles);
     std::uint32_t at = part.begin;
     while (const std::uint32_t n = order.next(s, a)) {
-      // In place: the block has read all of what it overwrites.
+      // In place: the block has read everything that it overwrites.
       for (std::uint32_t i = threadIdx.x; i < n; i += kThreads) a.pairs[at + i].slot = s.slots[i];
       at += n;
     }
@@ -171,7 +172,7 @@ __global__ void __launch_bounds__(kThreads) order_long_kernel(const BatchArgs a)
   }
 }
 
-/// A warp a list; what is too long for one, or has many equal keys, is left to be put in order as it is
+/// Sorts one list per warp. Lists that are too long, or have many equal keys, are sorted when they are
 /// drawn.
 __global__ void __launch_bounds__(kThreads) order_lists_kernel(const BatchArgs a) {
   const std::uint32_t tiles = static_cast<std::uint32_t>(a.grid.count());

@@ -6,7 +6,7 @@
 
 #include "batch_state.cuh"
 
-// What the host computes for a batch.
+// Host side of a batch.
 
 namespace gsnav {
 
@@ -15,9 +15,11 @@ namespace {
 using cuda::BatchInstance;
 using cuda::BatchSet;
 
-/// Whether a call takes as long as its longest list, so that lists are to be short. `tiles`: of 16
-/// pixels; `gaussians`: of all cameras. In larger images splats are larger too, and small tiles share
-/// too many; of more Gaussians lists are longer.
+/// Returns true if a call takes as long as its longest list, so that lists should be short. In larger
+/// images splats are larger too, and too many small tiles share a splat. With more Gaussians, lists are
+/// longer.
+/// @param tiles Number of tiles of 16 pixels.
+/// @param gaussians Number of Gaussians of all cameras.
 bool is_of_few(std::uint64_t cameras, std::uint64_t tiles, std::uint64_t gaussians,
                int multiprocessors) {
   using Policy = cuda::policy::Batch;
@@ -27,15 +29,15 @@ bool is_of_few(std::uint64_t cameras, std::uint64_t tiles, std::uint64_t gaussia
          cameras * tiles <= each * static_cast<std::uint64_t>(multiprocessors);
 }
 
-/// Whether lists of an image of so many tiles are short, for the most part: what takes a block long is
-/// then not to draw one but to put it in order.
+/// Returns true if most lists of an image with this number of tiles are short. A block then spends more
+/// time on sorting a list than on drawing it.
 bool has_short_lists(std::uint64_t tiles, int multiprocessors) {
   return tiles > cuda::policy::Batch::kShortListTiles * static_cast<std::uint64_t>(multiprocessors);
 }
 
-/// Eight octaves from the nearest near plane on, or from policy::Bin::kNear, as finely as counters in
-/// the GPU's cache allow. An agent's near plane is a centimetre off: octaves up to its body's radius
-/// would be spent on nothing, and all that lies beyond 2.5 m would share the last bin.
+/// Depth bins: eight octaves from the smallest near plane or from policy::Bin::kNear, as fine as
+/// counters in the GPU's cache allow. An agent's near plane is 1 cm away. Octaves from there to the
+/// radius of its body would be wasted, and everything beyond 2.5 m would share the last bin.
 cuda::DepthBins depth_bins_of(std::span<const BatchCamera> cameras, int key_bits, std::uint32_t tiles) {
   using Policy = cuda::policy::Bin;
   int bits = Policy::kMinDepthBits;
@@ -43,8 +45,8 @@ cuda::DepthBins depth_bins_of(std::span<const BatchCamera> cameras, int key_bits
   double near_plane = cameras[0].camera.near_plane;
   for (const BatchCamera& c : cameras) near_plane = std::min<double>(near_plane, c.camera.near_plane);
   const KeyCode code = KeyCode::of(key_bits, static_cast<float>(near_plane));
-  // Bits of positive floats are in their order; of keys in fewer bits so are the codes, which begin at
-  // the near plane.
+  // Bit patterns of positive floats are in the same order as the floats. So are the codes of keys with
+  // fewer bits, which begin at the near plane.
   const float first = std::max(static_cast<float>(near_plane), Policy::kNear);
   const std::uint32_t base = code.base == 0 ? bits_of(first) : code(first);
   return {base, std::max(0, 23 - code.shift + Policy::kOctaves - bits), bits};
@@ -84,7 +86,7 @@ cuda::PlainCamera plain_camera(const BatchInstance& instance, const Vec3d& offse
   return p;
 }
 
-/// Whether projection may read PlainCamera (BatchArgs::plain_cameras).
+/// Returns true if projection may read PlainCamera (BatchArgs::plain_cameras).
 bool has_plain_rules(const RenderConfig& config, std::span<const GaussianSet> sets,
                      std::span<const BatchCamera> cameras) {
   return config.response == Response::ewa && config.compat == Compat::none &&
@@ -99,8 +101,8 @@ bool has_plain_rules(const RenderConfig& config, std::span<const GaussianSet> se
 
 }  // namespace
 
-/// Of lists of the prepared call that hold so many pairs together: twice the mean. Few lists are much
-/// longer, but have much of the pairs.
+/// Space per list if the lists of the prepared call hold this number of pairs in total: twice the mean.
+/// A few lists are much longer, but they contain a large part of the pairs.
 std::uint32_t CudaBatchRenderer::State::room_for(std::uint64_t pairs) const {
   constexpr std::uint64_t kPairs = cuda::policy::Capacity::kRoomStep;
   const std::uint64_t tiles = args.tiles;
@@ -109,7 +111,8 @@ std::uint32_t CudaBatchRenderer::State::room_for(std::uint64_t pairs) const {
                               std::numeric_limits<std::uint32_t>::max()));
 }
 
-/// Fills `seen`, `set_begins` and `cursors`: who sees what. Returns how many origins that takes.
+/// Fills `seen`, `set_begins` and `cursors` with the sets that each camera sees. Returns the number of
+/// origins.
 std::size_t CudaBatchRenderer::State::list_seen(std::span<const GaussianSet> sets,
                                                 std::span<const BatchCamera> cameras) {
   seen.clear();
@@ -132,7 +135,7 @@ std::size_t CudaBatchRenderer::State::list_seen(std::span<const GaussianSet> set
   return origins;
 }
 
-/// Reserves one pinned block and as much on the device for the inputs of a call.
+/// Reserves one pinned block, and the same size on the device, for the inputs of a call.
 cuda::InputPlaces CudaBatchRenderer::State::reserve_inputs(std::size_t sets, std::size_t cameras,
                                                            std::size_t origins, bool plain_rules) {
   cuda::Layout layout;
@@ -153,7 +156,7 @@ cuda::InputPlaces CudaBatchRenderer::State::reserve_inputs(std::size_t sets, std
   return at;
 }
 
-/// Writes the instances, neighbours where they are of one set, and the list of each camera.
+/// Writes the instances, adjacent if they belong to one set, and the list of each camera.
 void CudaBatchRenderer::State::fill_instances(std::span<const GaussianSet> sets,
                                               std::span<const BatchCamera> cameras,
                                               const cuda::InputPlaces& at, bool plain_rules) {
@@ -186,7 +189,7 @@ void CudaBatchRenderer::State::fill_instances(std::span<const GaussianSet> sets,
   for (std::size_t c = 0; c < cameras.size(); ++c) first[c + 1] += first[c];
 }
 
-/// Writes the units of culling. False where counts of 32 bits do not hold the items.
+/// Writes the units of culling. Returns false if 32-bit counts cannot hold the items.
 bool CudaBatchRenderer::State::plan_units(std::span<const GaussianSet> sets,
                                           const cuda::InputPlaces& at) {
   auto* const units = at.on_host<BatchSet>(at.sets);
@@ -205,7 +208,7 @@ bool CudaBatchRenderer::State::plan_units(std::span<const GaussianSet> sets,
   return item_capacity <= cuda::kMostItems;
 }
 
-/// Chooses tiles and lists. Returns whether the call is one of few cameras.
+/// Chooses tiles and lists. Returns true if the call has few cameras.
 bool CudaBatchRenderer::State::plan_tiles(std::span<const BatchCamera> cameras,
                                           std::uint64_t gaussians) {
   const int width = cameras[0].camera.width, height = cameras[0].camera.height;
@@ -236,8 +239,8 @@ void CudaBatchRenderer::State::set_raster(const BatchImages& images) {
   rgb8 = images.rgb8;
 }
 
-/// Guesses the capacities that no call has measured yet: the first call of a kind that overflows one
-/// makes it grow and is drawn again. Calls of few cameras and of many use different arrays.
+/// Estimates the capacities that no call has measured yet. A call that exceeds one makes it grow and is
+/// drawn again. Calls with few cameras and calls with many use different arrays.
 void CudaBatchRenderer::State::guess_capacities(std::uint64_t gaussians, bool few) {
   using Policy = cuda::policy::Capacity;
   const std::uint32_t slots = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(
@@ -250,7 +253,7 @@ void CudaBatchRenderer::State::guess_capacities(std::uint64_t gaussians, bool fe
   guess(large_capacity, slots / Policy::kSlotsPerLarge);
   guess(several_capacity, slots / (few ? Policy::kSlotsPerSeveralOfFew : Policy::kSlotsPerSeveral));
   if (few) {
-    // Those that are drawn, and what as many warps as a multiprocessor can have may leave of their
+    // Visible Gaussians, plus the slots that the warps of all multiprocessors may leave unused in their
     // slabs.
     entry_capacity =
         gaussians + std::uint64_t{64} * static_cast<std::uint64_t>(multiprocessors) * args.slab;
@@ -265,7 +268,7 @@ void CudaBatchRenderer::State::guess_capacities(std::uint64_t gaussians, bool fe
   }
 }
 
-/// Everything of a call that the host computes, into one pinned block and on to the device.
+/// Computes all inputs of a call, in one pinned block that is copied to the device.
 Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
                                          std::span<const BatchCamera> cameras,
                                          const BatchImages& images) {

@@ -2,7 +2,7 @@
 #include "batch_lists.cuh"
 #include "batch_rows.cuh"
 
-// Projection of a batch: what CPU backends do one camera at a time, by the same formulas.
+// Projection of a batch, by the same formulas as CPU backends use for one camera.
 
 namespace gsnav::cuda {
 
@@ -12,13 +12,13 @@ using Policy = policy::Project;
 constexpr unsigned kWarpsPerPart = kChunkPart / 32;
 constexpr unsigned kAll = 0xffffffffu;
 
-/// A bit for each of the 32 rows from `first` on: 1 where a set of `size` rows has that row.
+/// Mask of the 32 rows from `first` on: 1 if a set of `size` rows has that row.
 __device__ unsigned rows_there(std::size_t size, std::size_t first) {
   if (first >= size) return 0u;
   return size - first >= 32 ? kAll : (1u << (size - first)) - 1u;
 }
 
-/// `Room`: lists are not counted first.
+/// Writes the record of a splat. `Room`: lists have reserved space and are not counted first.
 template <bool Plain, bool Room>
 __device__ void write_record(const BatchArgs& a, const SplatKey& of, std::uint32_t source,
                              const Splat& s, const SplatColor<float>& c) {
@@ -50,19 +50,21 @@ __device__ void write_record(const BatchArgs& a, const SplatKey& of, std::uint32
   if (a.perspectives != nullptr) a.perspectives[of.slot] = s.perspective;
 }
 
-/// What a camera makes of a row.
+/// Result of projecting a row for one camera.
 struct CameraSplat {
   bool drawn = false;
-  bool hard = false;  ///< float does not hold its geometry: project_hard_kernel draws it
+  bool hard = false;  ///< Float32 is not precise enough for it. project_hard_kernel draws it.
   std::uint32_t code = 0, camera = 0;
   RowKey<float> key;
   Splat splat;
 };
 
-/// What a warp does: it reads 32 Gaussians, half of an item, once, and projects them for each camera of
-/// the mask, or where some of the cameras see some of the rows only (`SomeRows`) those of all cameras
-/// side by side. `Plain`: records of neither depth nor perspective are asked for. `PlainRules`: there
-/// are plain_cameras. `Room`: lists are not counted first. All lanes call every function together.
+/// Work of a warp: it reads 32 Gaussians (half of an item) once and projects them for each camera of the
+/// mask. If cameras see only some of the rows (`SomeRows`), the rows of all cameras are processed side
+/// by side. All lanes must call every function together.
+/// @tparam PlainRules There are plain_cameras.
+/// @tparam Plain Records of depth and perspective are not needed.
+/// @tparam Room Lists have reserved space and are not counted first.
 template <bool PlainRules, bool Plain, bool SomeRows, bool Room>
 class WarpProjection {
  public:
@@ -78,7 +80,7 @@ class WarpProjection {
     first_ = item.part * kChunkPart + half % kWarpsPerPart * 32;
     const unsigned lane = threadIdx.x % 32;
     const unsigned existing = rows_there(gaussians_->size(), first_);
-    unsigned seen = 0;  // rows, of the lane's instance
+    unsigned seen = 0;  // Rows of the lane's instance.
     if constexpr (SomeRows) {
       if ((item.mask >> lane & 1u) != 0) seen = existing & seen_rows_of(lane);
       if (!__any_sync(kAll, seen != 0)) return;
@@ -87,7 +89,7 @@ class WarpProjection {
     if constexpr (SomeRows) {
       share_in_warp(static_cast<std::uint32_t>(__popc(seen)), [&](unsigned owner, std::uint32_t n) {
         const unsigned from = owner % 32, of_owner = __shfl_sync(kAll, seen, from);
-        // What has nothing left goes with the first instance.
+        // Lanes without work use the first instance, so that they can join the warp-wide calls.
         draw(owner < 32, first_instance_ + (owner < 32 ? from : 0u),
              owner < 32 ? nth_bit<32>(of_owner, n) : 0u);
       });
@@ -100,7 +102,7 @@ class WarpProjection {
     if (!has_sh_) wait_for_sh();
   }
 
-  /// Marks places that were taken and not used.
+  /// Marks places that were reserved but not used.
   __device__ void mark_rest() const {
     if constexpr (!Room) {
       slots_.rest([&](std::uint64_t slot) {
@@ -119,19 +121,19 @@ class WarpProjection {
         .word(first_ % kProjectChunk / 32);
   }
 
-  /// Reads the rows, and asks for their SH coefficients.
+  /// Reads the rows and requests their SH coefficients.
   __device__ void read(std::uint32_t part, bool any) {
     const LaneRow read = read_row<PlainRules>(gaussians_->shape, first_ + threadIdx.x % 32);
-    // Instances of a set are drawn to one degree.
+    // All instances of a set are drawn with one degree.
     degree_ =
         gaussians_->color.degree_of(part * kChunkPart, a_.instances[first_instance_].args.sh_degree);
     has_sh_ = !a_.color || degree_ == 0 || !any;
-    __syncwarp();  // all lanes are done with the rows before
+    __syncwarp();  // Wait until no lane uses the previous rows.
     if (!has_sh_) ask_for_sh(gaussians_->color, gaussians_->size(), degree_, first_, rows_);
     keep_row(read, rows_);
   }
 
-  /// Row first_ + at for an instance, of lanes that `exist`.
+  /// Projects row first_ + at for an instance and lists it. `exists` is false for lanes without a row.
   __device__ void draw(bool exists, std::uint32_t index, unsigned at) {
     const std::uint32_t row = static_cast<std::uint32_t>(first_ + at);
     CameraSplat seen;
@@ -146,7 +148,7 @@ class WarpProjection {
 
   /// Projects row first_ + at for an instance.
   __device__ void see(bool exists, std::uint32_t index, unsigned at, CameraSplat& out) const {
-    // Of what lies beyond the near plane.
+    // For rows beyond the near plane.
     const auto project_row = [&](const ProjectionCamera<float>& camera, const auto& from,
                                  const auto& camera64) {
       const SeenRow<float> seen_row(camera, from, out.key);
@@ -184,12 +186,11 @@ class WarpProjection {
   __device__ void queue_hard(const HardSplat& splat) const {
     const unsigned long long place = atomicAdd(&a_.counters->hard, 1ull);
     if (!Room && splat.slot != kNoSlot)
-      a_.entries[splat.slot] = {0, 0, 0, kNoSlot};  // until it has a record
+      a_.entries[splat.slot] = {0, 0, 0, kNoSlot};  // Until it has a record.
     if (place < a_.hard_capacity) a_.hard[place] = splat;
   }
 
-  /// Writes the record of a splat that is drawn, and its pairs; or queues it where another kernel finds
-  /// its tiles.
+  /// Writes the record and the pairs of a visible splat, or queues it for a kernel that finds its tiles.
   __device__ void list(const CameraSplat& seen, std::uint32_t slot, std::uint32_t index, unsigned at) {
     const SplatKey of{slot, seen.code, seen.camera};
     const SplatBounds& bounds = seen.splat.bounds;
@@ -236,12 +237,12 @@ class WarpProjection {
   const BatchArgs& a_;
   WarpRows& rows_;
   WarpSlab slots_, several_;
-  // Of the present item.
+  // State of the current item.
   const GaussianRows* gaussians_ = nullptr;
   std::uint32_t first_instance_ = 0;
-  std::size_t first_ = 0;  ///< row of lane 0
+  std::size_t first_ = 0;  ///< Row of lane 0.
   int degree_ = 0;
-  bool has_sh_ = false;  ///< coefficients are there, or nobody wants them
+  bool has_sh_ = false;  ///< The coefficients have arrived, or are not needed.
 };
 
 template <bool PlainRules, bool Plain, bool SomeRows, bool Room>

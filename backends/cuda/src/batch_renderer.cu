@@ -13,7 +13,7 @@ std::uint32_t grown(unsigned long long needed) {
       needed + needed / 8 + 1024, std::numeric_limits<std::uint32_t>::max() - 1));
 }
 
-/// Of BatchCounters, on whole lines of memory.
+/// Words of BatchCounters, rounded up to memory lines.
 constexpr std::size_t kCounterWords =
     (sizeof(cuda::BatchCounters) + 255) / 256 * 256 / sizeof(std::uint32_t);
 
@@ -21,7 +21,7 @@ std::size_t bin_words(const cuda::BatchArgs& args) {
   return std::size_t{args.tiles} << args.depth_bins.bits;
 }
 
-/// Counters of the call and of the bins.
+/// Words of the counters of a call and its bins.
 std::size_t zeroed_words(const cuda::BatchArgs& args) { return kCounterWords + bin_words(args); }
 
 }  // namespace
@@ -31,7 +31,7 @@ void CudaBatchRenderer::State::size_scratch() {
     array.resize_exactly(n);
     return array.data();
   };
-  // Of sizes that calls give, and not capacities, which have room already.
+  // For sizes that calls determine. Capacities have spare room already.
   const auto with_room = [](auto& array, std::size_t n) {
     array.resize_discard(n);
     return array.data();
@@ -49,7 +49,7 @@ void CudaBatchRenderer::State::size_scratch() {
   args.hard = exactly(hard, hard_capacity);
   args.several = exactly(several, several_capacity);
   args.large = exactly(large, large_capacity);
-  // Counters of both kinds together, so that one operation clears them.
+  // Both kinds of counters are in one block, so that one operation clears them.
   with_room(zeroed, zeroed_words(args));
   args.counters = reinterpret_cast<cuda::BatchCounters*>(zeroed.data());
   args.bins = zeroed.data() + kCounterWords;
@@ -64,8 +64,8 @@ void CudaBatchRenderer::State::size_scratch() {
       pairs, counted ? pair_capacity : std::size_t{args.tiles} * args.list_room + beyond_capacity);
   args.pairs_alt = exactly(pairs_alt, counted ? pair_capacity : alt_capacity);
   args.beyond = exactly(beyond, counted ? 0 : beyond_capacity);
-  // Where pixels are many beside survivors, a record each is less than projecting median Gaussians once
-  // more.
+  // If there are many pixels compared with visible splats, storing a depth record per splat costs less
+  // than projecting the median Gaussians again.
   const DepthMode mode = raster.depth_mode();
   const std::size_t pixels = args.cameras * static_cast<std::size_t>(args.grid.width) *
                              static_cast<std::size_t>(args.grid.height);
@@ -97,7 +97,7 @@ void CudaBatchRenderer::State::size_scratch() {
 
 void CudaBatchRenderer::State::fit_room(const cuda::BatchCounters& n) {
   if (args.list_room == 0) return;
-  // Not for little: arrays would move and launches be recorded again.
+  // Ignore small differences, because arrays would move and launches would be recorded again.
   const std::uint32_t wanted = room_for(n.pairs);
   if (n.beyond > n.pairs / cuda::policy::Capacity::kPairsPerBeyond && wanted > list_room + list_room / 8)
     list_room = wanted;
@@ -118,7 +118,7 @@ void CudaBatchRenderer::State::enqueue(const cuda::Flight& flight) {
 cudaGraphExec_t CudaBatchRenderer::State::record(const cuda::Flight& flight) {
   const cudaStream_t stream = backend.stream();
   if (cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal) != cudaSuccess) {
-    cudaGetLastError();  // the legacy default stream, for one
+    cudaGetLastError();  // For example, the legacy default stream.
     return nullptr;
   }
   enqueue(flight);
@@ -150,7 +150,7 @@ Status CudaBatchRenderer::State::launch() {
   stats.replayed = flight.recorded != nullptr;
   cudaError_t e = cudaSuccess;
   if (flight.has_meshes)
-    enqueue_layers(flight);  // beside the graph: what is in view makes other launches
+    enqueue_layers(flight);  // Outside the graph, because the meshes in view determine the launches.
   if (stats.replayed) {
     e = cudaGraphLaunch(flight.recorded, backend.stream());
   } else {
@@ -191,7 +191,7 @@ bool CudaBatchRenderer::State::fit_capacities(const cuda::Flight& flight) {
   const cuda::BatchCounters& n = *flight.counters;
   const cuda::BatchArgs& was = flight.key.args;
   bool had = true;
-  // Another call may have grown it since.
+  // A later call may have grown it already.
   const auto fit = [&](std::uint32_t& capacity, std::uint32_t then, unsigned long long count) {
     if (count <= then) return;
     if (count > capacity) capacity = grown(count);
@@ -225,7 +225,7 @@ Status CudaBatchRenderer::finish() {
     const cuda::BatchCounters& n = *flight.counters;
     const cuda::MeshCounters of_meshes =
         flight.has_meshes ? *flight.mesh_counters : cuda::MeshCounters{};
-    // Places of pairs have 32 bits, and lists have room for one pair at least.
+    // Places of pairs have 32 bits, and each list has space for at least one pair.
     const unsigned long long places = n.pairs + grown(n.beyond) + flight.key.args.tiles;
     if (std::max({n.slots, places, of_meshes.most}) >= std::numeric_limits<std::uint32_t>::max()) {
       s.finished = s.calls;
@@ -242,12 +242,12 @@ Status CudaBatchRenderer::finish() {
     s.stats.parts_read = n.items;
     s.stats.meshes = {flight.mesh_triangles, of_meshes.not_finite, of_meshes.drawn, 0};
     if (had_room || !last || !s.prepared) {
-      lost = lost || !had_room;  // what another call has overwritten
+      lost = lost || !had_room;  // Another call has overwritten its images.
       ++s.finished;
       continue;
     }
     ++s.stats.reruns;
-    --s.calls;  // made again, unless that fails
+    --s.calls;  // The launch is repeated, unless it fails.
     if (Status again = s.launch(); !again) return again;
     ++s.calls;
   }

@@ -5,28 +5,28 @@
 
 #include "batch_splat.cuh"
 
-// The rows of a warp of projection: read once, and kept for all cameras of an item.
+// Rows of a projection warp, read once and kept for all cameras of an item.
 
 namespace gsnav::cuda {
 
-/// 32 Gaussians as a warp keeps them for all cameras of an item, a lane each.
+/// 32 Gaussians, one per lane, kept for all cameras of an item.
 struct alignas(16) WarpRows {
   float mean[3][32], quat[4][32], scales[3][32], opacity[32];
-  /// [32][rest], floats or halves as they are stored: from memory a warp would read 32 lines a
-  /// coefficient.
+  /// Shape [32][rest], float or half as stored. Reading them from memory directly would touch 32 lines
+  /// per coefficient.
   union {
     float sh[32 * 3 * (sh_coefficient_count(kMaxShDegree) - 1)];
     std::uint16_t sh_half[32 * 3 * (sh_coefficient_count(kMaxShDegree) - 1)];
   };
 };
 
-/// What a lane reads of its row.
+/// Data that a lane reads of its row.
 struct LaneRow {
   float mean[3], quat[4], scales[3], opacity;
 };
 
-/// Of row `row`, or the first where there is none. Nothing is stored in between, nor decided: behind
-/// either, reads would be waited for one after the other.
+/// Reads row `row`, or row 0 if it does not exist. There are no stores or branches in between, because
+/// loads would then wait for each other.
 template <bool PlainRules>
 __device__ inline LaneRow read_row(const ShapeRows& rows, std::size_t row) {
   const std::size_t at = row < rows.size ? row : 0;
@@ -49,7 +49,7 @@ __device__ inline void keep_row(const LaneRow& r, WarpRows& to) {
   __syncwarp();
 }
 
-/// Copies n values, a whole number of words, behind what the warp does next.
+/// Starts an asynchronous copy of n values, which must be a whole number of words.
 template <class T>
 __device__ inline void copy_async(T* to, const T* from, unsigned n) {
   constexpr unsigned kWord = 4 / sizeof(T);
@@ -62,7 +62,7 @@ __device__ inline void copy_async(T* to, const T* from, unsigned n) {
   }
 }
 
-/// ask_for_sh for the bands up to `degree` of each row, of which no others are read.
+/// Variant of ask_for_sh that reads only the bands up to `degree` of each row.
 __device__ __noinline__ inline void ask_for_bands(const ColorRows& sh, std::size_t size, int degree,
                                                   std::size_t first, WarpRows& to) {
   const unsigned rows = static_cast<unsigned>(size - first < 32 ? size - first : 32),
@@ -71,7 +71,7 @@ __device__ __noinline__ inline void ask_for_bands(const ColorRows& sh, std::size
   const unsigned rest = static_cast<unsigned>(sh.rest());
   const std::size_t begin = rest * first;
   for (unsigned row = 0; row < rows; ++row) {
-    if (lane >= kept) continue;  // at most 24 of degree 2
+    if (lane >= kept) continue;  // Degree 2 has 24 values.
     const std::size_t from = begin + rest * row + lane;
     if (sh.shN_half.empty()) {
       __pipeline_memcpy_async(to.sh + kept * row + lane, sh.shN.data + from, sizeof(float));
@@ -82,8 +82,8 @@ __device__ __noinline__ inline void ask_for_bands(const ColorRows& sh, std::size
   __pipeline_commit();
 }
 
-/// Asks for the coefficients of rows `first` (lane 0) on, up to `degree` >= 1; they are there after
-/// wait_for_sh.
+/// Requests the coefficients up to `degree` >= 1 of 32 rows, from `first` (lane 0) on. They are
+/// available after wait_for_sh().
 __device__ inline void ask_for_sh(const ColorRows& sh, std::size_t size, int degree, std::size_t first,
                                   WarpRows& to) {
   if (degree < sh.degree) return ask_for_bands(sh, size, degree, first, to);
@@ -104,12 +104,12 @@ __device__ inline void wait_for_sh() {
   __syncwarp();
 }
 
-/// Colour of row first + at after wait_for_sh; `degree` as it was asked for.
+/// Colour of row first + at. Call after wait_for_sh(), with the requested `degree`.
 template <bool PlainRules>
 __device__ inline SplatColor<float> row_color(const ColorRows& sh, int degree, std::size_t first,
                                               unsigned at, const WarpRows& rows,
                                               const Vec3<float>& delta) {
-  ColorRows v;  // of the warp's rows
+  ColorRows v;  // Rows of the warp.
   v.degree = degree;
   v.sh0 = {sh.sh0.data + 3 * first, 3 * 32};
   if (sh.shN_half.empty()) {
@@ -124,7 +124,7 @@ __device__ inline SplatColor<float> row_color(const ColorRows& sh, int degree, s
   return gaussian_color<float>(v, degree, at, delta);
 }
 
-/// Row `at` of a warp's, as row_key and SeenRow read it.
+/// Row `at` of the warp, in the form that row_key and SeenRow read.
 struct KeptRow {
   const WarpRows& rows;
   unsigned at;
@@ -139,7 +139,7 @@ struct KeptRow {
   __device__ float opacity() const { return rows.opacity[at]; }
 };
 
-/// The same for a camera of plain rules.
+/// Row of the warp for a camera with plain rules.
 struct PlainRow : KeptRow {
   const PlainCamera& camera;
 
@@ -155,7 +155,7 @@ struct PlainRow : KeptRow {
   __device__ static Mat3<float> factor() { return {}; }
 };
 
-/// The same for any camera: what the warp does not keep is read where the set has it.
+/// Row of the warp for any camera. Values that the warp does not keep are read from the set.
 struct InstanceRow : KeptRow {
   ViewedRow of_set;
 

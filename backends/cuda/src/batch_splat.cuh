@@ -3,13 +3,13 @@
 
 #include "batch_args.cuh"
 
-// Cameras of plain rules as projection reads them: in parts, each when it is needed.
+// Cameras with plain rules in the parts that projection reads, each when it is needed.
 
 namespace gsnav::cuda {
 
 using Splat = gsnav::Splat<float>;
 
-/// What row_key reads of the double camera.
+/// Part of the double camera that row_key reads.
 __device__ inline ProjectionCamera<double> key_camera_of(const PlainCamera& p) {
   ProjectionCamera<double> c;
   c.rotation.row[2] = {p.mean.rotation[6], p.mean.rotation[7], p.mean.rotation[8]};
@@ -17,7 +17,7 @@ __device__ inline ProjectionCamera<double> key_camera_of(const PlainCamera& p) {
   return c;
 }
 
-/// The float camera that `p` packs, but for its key.
+/// The float camera that `p` packs, without its key.
 __device__ inline ProjectionCamera<float> camera_of(const BatchArgs& a, const PlainCamera::Axes& p) {
   ProjectionCamera<float> c;
   for (int i = 0; i < 9; ++i) c.rotation.row[i / 3][i % 3] = p.rotation[i];

@@ -10,7 +10,7 @@
 #include "gsnav/core/buffer.hpp"
 #include "mesh.cuh"
 
-// What a CudaBatchRenderer keeps between calls.
+// State that a CudaBatchRenderer keeps between calls.
 
 namespace gsnav {
 
@@ -23,18 +23,18 @@ inline void need(cudaError_t e, const char* what) {
   }
 }
 
-/// What the launches of a call depend on besides the contents of its inputs.
+/// Everything that the launches of a call depend on, except the contents of its inputs.
 struct LaunchKey {
   BatchArgs args;
   FrameImages<float> images;
   std::uint8_t* rgb8 = nullptr;
   const float *mesh_depth = nullptr, *mesh_color = nullptr;
-  const unsigned char* inputs = nullptr;  ///< pinned
+  const unsigned char* inputs = nullptr;  ///< Pinned memory.
   std::size_t input_bytes = 0;
   bool operator==(const LaunchKey&) const = default;
 };
 
-/// Arrays laid one after the other into one block, so that one copy takes them to the device.
+/// Arrays placed one after the other in one block, so that one copy transfers them.
 class Layout {
  public:
   template <class T>
@@ -66,17 +66,17 @@ struct PinnedBlock {
   }
 };
 
-/// Pinned memory of one call under way: what is copied to the device, and the counts that come back; and
-/// its launches recorded, to be replayed while their key stays the same.
+/// Pinned memory of a call in progress: inputs for the device and counters that come back. Also its
+/// recorded launches, which are replayed while the key does not change.
 struct Flight {
   PinnedBlock inputs, mesh_inputs;
   BatchCounters* counters = nullptr;
   MeshCounters* mesh_counters = nullptr;
   bool has_meshes = false;
-  std::uint64_t mesh_triangles = 0;  ///< of all instances
+  std::uint64_t mesh_triangles = 0;  ///< Sum over all instances.
   std::uint32_t triangle_capacity = 0;
   cudaEvent_t done = nullptr;
-  LaunchKey key{};  ///< of the last call
+  LaunchKey key{};  ///< Key of the last call.
   cudaGraphExec_t recorded = nullptr;
 
   void forget_recorded() noexcept {
@@ -85,14 +85,15 @@ struct Flight {
   }
 };
 
-/// What of a batch's meshes one MeshWave has.
+/// Sizes of a MeshWave of a batch.
 struct MeshWaveSize {
-  std::uint32_t first_camera, first_placement, first_begin;  ///< the last: in chunk_begins
+  std::uint32_t first_camera, first_placement, first_begin;  ///< `first_begin` is an index into
+                                                             ///< chunk_begins.
   std::uint32_t cameras, placements, vertex_chunks, triangle_chunks;
   std::size_t vertices;
 };
 
-/// What meshes are drawn with; empty while there are none.
+/// Arrays for drawing meshes. Empty while there are none.
 struct BatchMeshes {
   template <class T>
   using Array = Buffer<T, CudaBackend>;
@@ -116,25 +117,27 @@ struct BatchMeshes {
   }
 
   Array<unsigned char> inputs;
-  Array<MeshVertex> vertices;  // from here on: of a wave
+  Array<MeshVertex> vertices;  // From here on, arrays of one wave.
   Array<std::uint32_t> counts;
   Array<std::uint64_t> offsets, camera_begins;
   Array<MeshTriangle<float>> triangles;
   Array<PixelWord> pixels;
   Array<unsigned long long> large;
   Array<MeshCounters> counters;
-  Array<float> depth, color;  ///< [C][H][W] and [C][H][W][3]
+  Array<float> depth, color;  ///< Shapes [cameras][height][width] and [cameras][height][width][3].
 
-  // Of the present call.
+  // State of the current call.
   std::vector<MeshWaveSize> waves;
   std::vector<MeshPlacement> placements;
   std::vector<MeshPlace> places;
-  std::vector<std::uint32_t> chunk_begins;  // each wave's cameras', from 0, and one more
+  std::vector<std::uint32_t> chunk_begins;  // For each wave, the begins of its cameras from 0, and one
+                                            // past the last.
   std::size_t at_placements = 0, at_places = 0, at_cameras = 0, at_lights = 0, at_chunk_begins = 0,
               input_bytes = 0;
 };
 
-// Of one call: grids of launches; places of items, of which a warp of projection has half.
+// Limits of one call, from the size of launch grids and from item indices, of which a projection warp
+// has half.
 inline constexpr std::size_t kMostCameras = 65535, kMostTiles = 0x7fffffff, kMostItems = 0x7fffffff;
 
 /// Calls f with the index of each set that a camera sees, in order.
@@ -145,7 +148,7 @@ void for_each_set(const BatchCamera& camera, std::size_t sets, const F& f) {
   for (std::uint32_t s = 0; s < sets; ++s) f(s);
 }
 
-/// Where the inputs of a call lie: bytes from the begin of a block, in pinned memory and on the device.
+/// Offsets of a call's inputs in bytes from the begin of a block, in pinned memory and on the device.
 struct InputPlaces {
   std::size_t sets = 0, instances = 0, plain = 0, first = 0, list = 0, offsets = 0;
   unsigned char* host = nullptr;
@@ -161,7 +164,8 @@ struct InputPlaces {
   }
 };
 
-/// Names the camera, set or field that cannot be, or ok.
+/// Checks the inputs of a call.
+/// @return an error with the camera, set or field.
 Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                    const RenderConfig& config);
 
@@ -219,7 +223,7 @@ struct CudaBatchRenderer::State {
 
   Status prepare(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                  const BatchImages& images);
-  // The steps of prepare().
+  // Steps of prepare().
   std::size_t list_seen(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras);
   cuda::InputPlaces reserve_inputs(std::size_t sets, std::size_t cameras, std::size_t origins,
                                    bool plain_rules);
@@ -229,34 +233,35 @@ struct CudaBatchRenderer::State {
   bool plan_tiles(std::span<const BatchCamera> cameras, std::uint64_t gaussians);
   void set_raster(const BatchImages& images);
   void guess_capacities(std::uint64_t gaussians, bool few);
-  /// What meshes the prepared cameras see, into the same call's pinned memory.
+  /// Writes the meshes that the prepared cameras see into the call's pinned memory.
   Status place_meshes(std::span<const BatchCamera> cameras);
-  // The steps of place_meshes().
+  // Steps of place_meshes().
   Status list_meshes(std::span<const BatchCamera> cameras, std::uint64_t& most_triangles);
   void write_mesh_inputs(std::span<const BatchCamera> cameras);
   std::uint32_t room_for(std::uint64_t pairs) const;
-  /// How many of `cameras` cameras one call can draw: limited by counts of 32 bits and by the device's
-  /// free memory, if each camera needs as much as the cameras of the last call did on average.
+  /// Number of cameras that one call can draw. It is limited by 32-bit counts and by the free device
+  /// memory, assuming that each camera needs the mean of the last call.
   std::size_t measured_capacity(std::size_t cameras) const;
-  /// What lists of the next call have room for, by what those of the last needed.
+  /// Adapts the space of lists to the needs of the last call.
   void fit_room(const cuda::BatchCounters& n);
   void size_scratch();
   void size_layers();
-  /// Draws them, into a layer for each camera.
+  /// Draws the meshes into a layer per camera.
   void enqueue_layers(const cuda::Flight& flight);
-  /// Of the call that has been prepared.
+  /// Launches the prepared call.
   Status launch();
-  /// To what a call needed. Whether it had as much.
+  /// Adapts capacities to the needs of a call. Returns true if they were sufficient.
   bool fit_capacities(const cuda::Flight& flight);
   void enqueue(const cuda::Flight& flight);
-  /// The launches as a graph, or null where the stream cannot be recorded.
+  /// Records the launches as a graph. Returns null if the stream cannot be recorded.
   cudaGraphExec_t record(const cuda::Flight& flight);
 
   CudaBackend& backend;
   RenderConfig config;
   int multiprocessors = 0;
   std::array<cuda::Flight, cuda::policy::Batch::kInFlight> flights;
-  std::size_t calls = 0, finished = 0;  ///< calls made; calls whose counts have been looked at
+  std::size_t calls = 0, finished = 0;  ///< Number of calls made, and number of calls whose counters
+                                        ///< have been read.
   Array<unsigned char> inputs;
   Array<cuda::BatchItem> items;
   Array<cuda::SplatRecord> records;
@@ -276,27 +281,27 @@ struct CudaBatchRenderer::State {
   RasterArgs<float> raster;
   std::uint8_t* rgb8 = nullptr;
   std::size_t input_bytes = 0;
-  std::uint64_t item_capacity = 0;   ///< of the call
-  std::uint64_t entry_capacity = 0;  ///< slots that the call may take, at most
+  std::uint64_t item_capacity = 0;   ///< Number of items of the call.
+  std::uint64_t entry_capacity = 0;  ///< Largest number of slots that the call may take.
   bool recordable = true;
-  bool prepared = false;  ///< `args`, `raster` and `meshes` are those of the last call made
+  bool prepared = false;  ///< True if `args`, `raster` and `meshes` belong to the last call.
   std::uint32_t slot_capacity = 0, hard_capacity = 0, several_capacity = 0, large_capacity = 0,
                 pair_capacity = 0, beyond_capacity = 0, alt_capacity = 0;
   std::uint32_t list_room = 0,
-                room_tiles =
-                    0;  ///< of lists that are not counted first; the tiles that it was chosen for
-  std::uint32_t triangle_capacity = 0;  ///< of meshes, a wave
+                room_tiles = 0;  ///< Space of lists that are not counted first, and the number of tiles
+                                 ///< for which it was chosen.
+  std::uint32_t triangle_capacity = 0;  ///< Mesh triangles per wave.
   BatchStats stats;
   struct {
     std::uint64_t cameras = 0, slots = 0, pairs = 0;
-  } taken;  ///< by the last call whose counts have been looked at
+  } taken;  ///< Counts of the last call whose counters have been read.
 
   // Reused by every call.
   struct Seen {
     std::uint32_t set, camera, first_rank;
-    View<const std::uint32_t> bits;  ///< Selection::seen
+    View<const std::uint32_t> bits;  ///< Selection::seen.
   };
-  std::vector<Seen> seen;  ///< camera by camera
+  std::vector<Seen> seen;  ///< Ordered by camera.
   std::vector<std::uint32_t> set_begins, cursors;
 };
 

@@ -5,7 +5,7 @@
 
 namespace gsnav::cuda {
 
-/// Reads a tile's list front to back, up to kOrderBatch splats at a time.
+/// Reads a tile's list from front to back, up to kOrderBatch splats at a time.
 class TileOrder {
  public:
   __device__ TileOrder(const BatchArgs& a, std::uint32_t tile, std::uint32_t camera)
@@ -13,7 +13,7 @@ class TileOrder {
   __device__ TileOrder(const ListPart& part, std::uint32_t camera)
       : tile_(part.tile), camera_(camera), begin_(part.begin), end_(part.end), bin_(part.bin) {}
 
-  /// Leaves the next splats in s.slots and returns how many; 0: no more.
+  /// Stores the next splats in s.slots and returns their number. 0 at the end.
   __device__ __noinline__ std::uint32_t next(OrderShared& s, const BatchArgs& a) {
     if (level_ >= 0) {
       const std::uint32_t n = next_of_bin(s, a);
@@ -36,8 +36,8 @@ class TileOrder {
  private:
   static constexpr int kNone = -1;
 
-  /// Bins of depth that are read together: pairs up to `end`, of keys in [low, high]; low > high: not
-  /// known.
+  /// Depth bins that are read together: pairs up to `end`, with keys in [low, high]. low > high means
+  /// that the range is unknown.
   struct Bins {
     std::uint32_t end, next, low, high;
   };
@@ -46,7 +46,7 @@ class TileOrder {
     return a.bins + (std::size_t{tile_} << a.depth_bins.bits);
   }
 
-  /// As many bins as a batch holds, but one at least. Every warp finds out by itself.
+  /// Takes as many bins as fit into a batch, but at least one. Every warp computes this itself.
   __device__ Bins take(const BatchArgs& a) const {
     constexpr std::uint32_t kNoBin = 0xffffffffu;
     const DepthBins& bins = a.depth_bins;
@@ -59,7 +59,7 @@ class TileOrder {
       const bool fits = mine != kNoBin && mine - begin_ <= kOrderBatch;
       const int fitting = __popc(__ballot_sync(0xffffffffu, fits));
       if (fitting > 0) end = __shfl_sync(0xffffffffu, mine, fitting - 1);
-      if (fitting < 32 && end == begin_) {  // the next by itself is longer
+      if (fitting < 32 && end == begin_) {  // The next bin alone exceeds a batch.
         end = __shfl_sync(0xffffffffu, mine, fitting);
         bin += static_cast<std::uint32_t>(fitting) + 1;
         break;
@@ -71,7 +71,7 @@ class TileOrder {
     return {end, bin, bins.base + (bin_ << bins.shift), bins.base + (bin << bins.shift) - 1};
   }
 
-  /// Of a bin that is longer than a batch.
+  /// Continues with a bin that exceeds a batch.
   __device__ std::uint32_t next_of_bin(OrderShared& s, const BatchArgs& a) {
     while (level_ >= 0) {
       const std::uint32_t* begins = s.begins[level_];
@@ -111,14 +111,14 @@ class TileOrder {
     if (a.list_room == 0) return {a.pairs, 0, kNowhere, 0};
     return {a.pairs, 0, (tile_ + 1) * a.list_room, a.tile_shifts[tile_].x};
   }
-  /// What the bins of every other level are written to.
+  /// Array that the bins of every other level are written to.
   __device__ ordering::PairsAt bins_of_list(const BatchArgs& a) const {
     return {a.pairs_alt, a.list_room != 0 ? a.tile_shifts[tile_].y : 0, kNowhere, 0};
   }
 
   std::uint32_t tile_, camera_, begin_, end_;
-  std::uint32_t bin_ = 0;  ///< the next of depth
-  int level_ = kNone;      ///< of the bin that is being read
+  std::uint32_t bin_ = 0;  ///< Next depth bin.
+  int level_ = kNone;      ///< Level of the bin that is being read.
 };
 
 }  // namespace gsnav::cuda

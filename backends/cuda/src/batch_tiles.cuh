@@ -3,47 +3,48 @@
 
 #include "batch_args.cuh"
 
-// The tiles of a splat: found and counted once, and remembered until its pairs are written.
+// Tiles of a splat. They are found and counted once, and kept until the splat's pairs are written.
 
 namespace gsnav::cuda {
 
-/// The tiles that a splat may touch, where they lie in a window of 4 x 4.
+/// Tiles that a splat may touch, if they lie in a window of 4 x 4 tiles.
 struct TileWindow {
-  static constexpr int kSide = 4;  ///< a splat that needs more gets a warp
-  std::uint32_t corner;            ///< column | row << 16
-  std::uint32_t tiles;             ///< bit kSide * row + column
+  static constexpr int kSide = 4;  ///< A larger splat is processed by a warp.
+  std::uint32_t corner;            ///< Column | row << 16.
+  std::uint32_t tiles;             ///< Bit kSide * row + column.
   __device__ std::uint32_t column() const { return corner & 0xffffu; }
   __device__ std::uint32_t row() const { return corner >> 16; }
 };
 
-/// The counter of a tile's pairs of that key.
+/// Index of the counter for pairs of a tile with this key.
 __device__ inline std::uint32_t bin_of(const BatchArgs& a, std::uint32_t tile, std::uint32_t key) {
   return (tile << a.depth_bins.bits) + a.depth_bins.of(key);
 }
 
-/// Counts a pair of lists in bins, and returns its place there once these have theirs.
+/// Counts a pair of a list in bins. Once the bins have places, it returns the place of the pair.
 __device__ inline std::uint32_t add_to_bin(const BatchArgs& a, std::uint32_t tile, std::uint32_t key) {
   return atomicAdd(a.bins + bin_of(a, tile, key), 1u);
 }
 
-/// The first tile of a camera.
+/// First tile of a camera.
 __device__ inline std::uint32_t first_tile(const BatchArgs& a, std::uint32_t camera) {
   return camera * static_cast<std::uint32_t>(a.grid.count());
 }
 
-/// Of bounds; with the one tile where they lie in one, else without: still to be found.
+/// Window of a splat's bounds. If they lie in one tile, it contains that tile; otherwise its tiles still
+/// have to be found.
 __device__ inline TileWindow window_of(const BatchArgs& a, const SplatBounds& b) {
   const TileRange<int> tiles = a.grid.tiles_of(b);
   return {static_cast<std::uint32_t>(tiles.x0) | static_cast<std::uint32_t>(tiles.y0) << 16,
           tiles.single() ? 1u : 0u};
 }
 
-/// Whether bounds reach beyond a window.
+/// Returns true if the bounds exceed a window.
 __device__ inline bool is_large(const BatchArgs& a, const SplatBounds& b) {
   return a.grid.tiles_of(b).exceeds(TileWindow::kSide);
 }
 
-/// The window's tile of bit `bit`, among those of all cameras.
+/// Index, among the tiles of all cameras, of a window's tile with bit `bit`.
 __device__ inline std::uint32_t tile_of(const BatchArgs& a, std::uint32_t camera,
                                         const TileWindow& window, std::uint32_t bit) {
   const std::uint32_t columns = static_cast<std::uint32_t>(a.grid.columns);
@@ -51,7 +52,7 @@ __device__ inline std::uint32_t tile_of(const BatchArgs& a, std::uint32_t camera
          bit % TileWindow::kSide;
 }
 
-/// The sum of `value` over the lanes up to this one. All lanes of the warp call it.
+/// Sum of `value` over the lanes up to this one. All lanes of the warp must call it.
 template <class T>
 __device__ inline T sum_to_lane(T value) {
   for (unsigned step = 1; step < 32; step *= 2) {
@@ -61,8 +62,8 @@ __device__ inline T sum_to_lane(T value) {
   return value;
 }
 
-/// A warp's share of a counter: the place of each lane that takes `count`, one after the other. All
-/// lanes call it.
+/// Reserves `count` consecutive places of a counter per lane, with one atomic operation per warp. All
+/// lanes must call it.
 __device__ inline unsigned long long take_places(unsigned long long* counter, std::uint32_t count) {
   const unsigned long long end = sum_to_lane(static_cast<unsigned long long>(count));
   unsigned long long base = 0;
@@ -70,17 +71,18 @@ __device__ inline unsigned long long take_places(unsigned long long* counter, st
   return __shfl_sync(0xffffffffu, base, 31) + end - count;
 }
 
-/// Calls f(owner, i) for i in [0, count) of each lane `owner`, all of the warp's calls shared evenly by
-/// its lanes. All lanes call it; f is called together, with owner 32 by lanes that have nothing left.
+/// Calls f(owner, i) for i in [0, count) of each lane `owner`, with all calls of the warp divided evenly
+/// among its lanes. All lanes must call it. f is called by all lanes together; lanes without work get
+/// owner 32.
 template <class F>
 __device__ inline void share_in_warp(std::uint32_t count, const F& f) {
   constexpr unsigned kAll = 0xffffffffu;
   const unsigned lane = threadIdx.x % 32;
-  const std::uint32_t end = sum_to_lane(count);  // of the lane's calls among the warp's
+  const std::uint32_t end = sum_to_lane(count);  // End of the lane's calls among those of the warp.
   const std::uint32_t total = __shfl_sync(kAll, end, 31);
   for (std::uint32_t first = 0; first < total; first += 32) {
     const std::uint32_t at = first + lane;
-    unsigned owner = 0;  // the first lane whose end is beyond `at`
+    unsigned owner = 0;  // First lane whose end is beyond `at`.
     for (unsigned step = 16; step > 0; step /= 2) {
       if (__shfl_sync(kAll, end, owner + step - 1) <= at) owner += step;
     }
@@ -89,7 +91,7 @@ __device__ inline void share_in_warp(std::uint32_t count, const F& f) {
   }
 }
 
-/// The place of the bit that has n set bits below it, among the kBits lowest.
+/// Index of the set bit that has n set bits below it, among the lowest kBits.
 template <std::uint32_t kBits>
 __device__ inline std::uint32_t nth_bit(std::uint32_t bits, std::uint32_t n) {
   std::uint32_t place = 0;
@@ -105,14 +107,13 @@ __device__ inline std::uint32_t nth_bit(std::uint32_t bits, std::uint32_t n) {
   return place;
 }
 
-/// Places that a warp takes from a counter by the slab; those that it has not used are left to the
-/// caller.
+/// Places that a warp takes from a counter one slab at a time. The caller must handle unused ones.
 class WarpSlab {
  public:
   __device__ WarpSlab(unsigned long long* counter, std::uint32_t slab)
       : counter_(counter), slab_(slab) {}
 
-  /// The place of each lane that wants one. All lanes call it.
+  /// Place of each lane that wants one. All lanes must call it.
   __device__ std::uint64_t take(bool wanted) {
     const unsigned lane = threadIdx.x % 32, votes = __ballot_sync(0xffffffffu, wanted);
     const std::uint32_t count = static_cast<std::uint32_t>(__popc(votes));
@@ -132,7 +133,7 @@ class WarpSlab {
     return at;
   }
 
-  /// Calls f(place) for each place taken and not used.
+  /// Calls f(place) for each place that was reserved but not used.
   template <class F>
   __device__ void rest(const F& f) const {
     for (std::uint32_t i = threadIdx.x % 32; i < left_; i += 32) f(next_ + i);

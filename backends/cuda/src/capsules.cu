@@ -2,7 +2,7 @@
 #include "gsnav/backends/cuda/device.cuh"
 #include "gsnav/detail/sweep/first_impacts.hpp"
 
-// Capsules by the library's own kernels, a thread a pair or a leg.
+// Capsule kernels of the library, with one pair or leg per thread.
 
 namespace gsnav {
 

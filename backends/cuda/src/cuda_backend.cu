@@ -53,7 +53,7 @@ CudaBackend::CudaBackend(int device, CUstream_st* stream) : stream_(stream), dev
     need(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "cudaStreamCreate");
     owns_stream_ = true;
   }
-  // What a frame frees is kept for the next one.
+  // Keep freed memory for the next frame.
   cudaMemPool_t pool;
   need(cudaDeviceGetDefaultMemPool(&pool, device), "cudaDeviceGetDefaultMemPool");
   std::uint64_t keep = ~std::uint64_t{0};
@@ -85,7 +85,7 @@ std::string CudaBackend::device_name() const {
 void* CudaBackend::allocate(std::size_t bytes, std::size_t) {
   void* p = nullptr;
   if (!usable() || cudaMallocAsync(&p, bytes, stream_) != cudaSuccess) {
-    cudaGetLastError();  // out of memory is the caller's to report
+    cudaGetLastError();  // The caller reports that memory is exhausted.
     return nullptr;
   }
   return p;

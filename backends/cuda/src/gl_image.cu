@@ -13,7 +13,7 @@ namespace gsnav {
 
 namespace {
 
-/// Texels of a texture, its first row the image's last.
+/// Converts an image to texels. The first row of a texture is the last one of the image.
 __global__ void rgba_of_rgb(const std::uint8_t* rgb, uchar4* to, int width, int height) {
   const int x = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x),
             y = static_cast<int>(blockIdx.y);
@@ -54,8 +54,8 @@ struct GlImage::State {
     return {(static_cast<unsigned>(width) + kThreads - 1) / kThreads, static_cast<unsigned>(height), 1};
   }
 
-  /// Calls f(array) while the texture is mapped: commands of OpenGL before are done first, those after
-  /// wait.
+  /// Calls f(array) while the texture is mapped. Earlier OpenGL commands are finished first, and later
+  /// ones wait.
   template <class F>
   Status mapped(const F& f) {
     const cudaStream_t stream = backend->stream();
@@ -68,7 +68,7 @@ struct GlImage::State {
     if (status.ok() && e != cudaSuccess) status = failed("giving the texture back", e);
     return status;
   }
-  /// From `texels`, of as many bytes each.
+  /// Copies `texels` to the texture, with this number of bytes each.
   Status fill(std::size_t bytes) {
     return mapped([&](cudaArray_t array) -> Status {
       const std::size_t line = static_cast<std::size_t>(width) * bytes;
@@ -83,9 +83,9 @@ struct GlImage::State {
   }
 
   CudaBackend* backend;
-  Buffer<std::uint32_t, CudaBackend> texels;  // of 4 bytes, whatever they are
+  Buffer<std::uint32_t, CudaBackend> texels;  // Elements of 4 bytes of either format.
   int width, height;
-  bool depth = false;  ///< GL_R32F
+  bool depth = false;  ///< True for GL_R32F.
   cudaGraphicsResource_t resource = nullptr;
 };
 

@@ -6,8 +6,8 @@
 #include "gsnav/backends/cuda/device.cuh"
 #include "mesh_work.cuh"
 
-// Meshes on the device (docs/reference/composition.md): a thread a vertex, a triangle or a pixel. There
-// are no tile lists: an atomic maximum of PixelWord finds the triangle that a pixel shows.
+// Meshes on the device (docs/reference/composition.md), with one vertex, triangle or pixel per thread.
+// There are no tile lists: an atomic maximum of PixelWord finds the triangle that a pixel shows.
 
 namespace gsnav {
 
@@ -15,7 +15,7 @@ namespace cuda {
 
 namespace {
 
-constexpr unsigned kThreads = kMeshChunk;  ///< of a block that takes a chunk
+constexpr unsigned kThreads = kMeshChunk;  ///< Threads of a block that processes a chunk.
 using Policy = policy::Mesh;
 constexpr unsigned kScanThreads = Policy::kScanThreads, kDrawThreads = Policy::kDrawThreads;
 constexpr int kSmallBox = Policy::kSmallBox, kUnit = Policy::kUnit;
@@ -51,7 +51,7 @@ __global__ void __launch_bounds__(kThreads)
   work.note(args, bad);
 }
 
-/// Exclusive sums of [begin, end) by one block; returns the sum of all.
+/// Computes exclusive sums of [begin, end) with one block. Returns the total.
 template <class From>
 __device__ std::uint64_t scan_by_block(const From* from, std::size_t begin, std::size_t end,
                                        std::uint64_t* to) {
@@ -69,13 +69,13 @@ __device__ std::uint64_t scan_by_block(const From* from, std::size_t begin, std:
   return before;
 }
 
-/// One block.
+/// Launched with one block.
 __global__ void __launch_bounds__(kScanThreads) scan_triangles_kernel(const MeshSetupArgs<float> args) {
   const std::uint64_t sum = scan_by_block(args.counts.data, 0, args.counts.size, args.offsets.data);
   if (threadIdx.x == 0) args.offsets[args.counts.size] = sum;
 }
 
-/// A block a camera: where its chunks' triangles begin among its own, and how many these are.
+/// Computes the begins of triangle chunks and the number of triangles, one camera per block.
 __global__ void __launch_bounds__(kScanThreads)
     scan_cameras_kernel(const MeshSetupArgs<float> args, const MeshWave wave) {
   const std::uint64_t sum = scan_by_block(args.counts.data, wave.chunk_begins[blockIdx.x],
@@ -83,7 +83,7 @@ __global__ void __launch_bounds__(kScanThreads)
   if (threadIdx.x == 0) wave.camera_begins[blockIdx.x] = sum;
 }
 
-/// One block: from how many triangles a camera has to where they begin.
+/// Converts numbers of triangles per camera to begins. Launched with one block.
 __global__ void __launch_bounds__(kScanThreads) begin_cameras_kernel(const MeshWave wave) {
   const std::uint64_t sum = scan_by_block(wave.camera_begins, 0, wave.camera_count, wave.camera_begins);
   if (threadIdx.x != 0) return;
@@ -117,7 +117,7 @@ __global__ void __launch_bounds__(kThreads)
   });
 }
 
-/// Shows a triangle at a pixel of its box, if it is inside, and nearer than what is shown there.
+/// Shows a triangle at a pixel of its box if it covers the pixel and is nearer than the one shown.
 __device__ void show(const MeshRasterArgs<float>& args, const MeshTriangle<float>& t, std::uint32_t id,
                      int x, int y, PixelWord* pixels) {
   const float inverse_z = mesh_inverse_z(t, x, y);
@@ -129,7 +129,7 @@ __device__ void show(const MeshRasterArgs<float>& args, const MeshTriangle<float
   if (*at < word) atomicMax(at, word);
 }
 
-/// Pixels of the camera that a triangle is seen by.
+/// Pixels of the camera that sees a triangle.
 template <class Work>
 __device__ PixelWord* pixels_of(const MeshRasterArgs<float>& args, const Work& work,
                                 const MeshTriangle<float>& t, PixelWord* pixels) {
@@ -138,8 +138,8 @@ __device__ PixelWord* pixels_of(const MeshRasterArgs<float>& args, const Work& w
                       static_cast<std::size_t>(grid.height);
 }
 
-/// Draws a small triangle, or lists it. `count`: of squares, and of large triangles from bit kUnitBits
-/// on.
+/// Draws a small triangle, or adds it to the list of large ones. `count` holds the number of squares,
+/// and from bit kUnitBits on the number of large triangles.
 template <class Work>
 __device__ void draw_small(const MeshRasterArgs<float>& args, const Work& work, std::uint32_t id,
                            PixelWord* all, LargeTriangle* large, unsigned long long* count) {
@@ -164,7 +164,7 @@ __device__ void draw_small(const MeshRasterArgs<float>& args, const Work& work, 
   }
 }
 
-/// A thread a triangle, of the Policy::kMostLarge from `begin` on.
+/// Draws one triangle per thread, up to Policy::kMostLarge from `begin` on.
 template <class Work>
 __global__ void __launch_bounds__(kDrawThreads)
     draw_small_kernel(const MeshRasterArgs<float> args, const Work work, std::uint64_t begin,
@@ -178,7 +178,7 @@ __global__ void __launch_bounds__(kDrawThreads)
   }
 }
 
-/// A warp a square of a large triangle: a column a lane.
+/// Draws one square of a large triangle per warp, one column per lane.
 template <class Work>
 __global__ void __launch_bounds__(kDrawThreads)
     draw_large_kernel(const MeshRasterArgs<float> args, const Work work, PixelWord* all,
@@ -205,7 +205,7 @@ __global__ void __launch_bounds__(kDrawThreads)
   }
 }
 
-/// A block a tile: depths, triangles and the tile's farthest from the words of its pixels.
+/// Converts words of pixels to depths and triangles, and finds the largest depth of a tile per block.
 __global__ void __launch_bounds__(1024)
     resolve_kernel(const MeshRasterArgs<float> args, const PixelWord* pixels) {
   __shared__ unsigned far;
@@ -222,13 +222,13 @@ __global__ void __launch_bounds__(1024)
     const float depth = depth_of(word);
     args.depth[pixel] = depth;
     args.visible[pixel] = triangle_of(word);
-    atomicMax(&far, __float_as_uint(depth));  // in order, as none is negative
+    atomicMax(&far, __float_as_uint(depth));  // ordered like floats: none is negative
   }
   __syncthreads();
   if (t == 0) args.tile_far[blockIdx.x] = __uint_as_float(far);
 }
 
-/// A thread a pixel of one of the cameras: its depth, and its colour where that is asked for.
+/// Writes the depth of a pixel and, if requested, its colour, with one pixel of one camera per thread.
 __global__ void __launch_bounds__(kDrawThreads)
     finish_pixels_kernel(MeshShadeArgs<float> shade, const MeshWave wave, std::size_t pixels) {
   const std::size_t pixel = std::size_t{blockIdx.x} * blockDim.x + threadIdx.x,
@@ -247,7 +247,7 @@ __global__ void __launch_bounds__(kDrawThreads)
   shade_mesh_pixel(shade, pixel, triangle_of(word), depth);
 }
 
-/// Draws up to `count` triangles. `blocks`: of a launch, at most; `queue`: large_bytes(count).
+/// Draws up to `count` triangles, with at most `blocks` blocks. `queue` has large_bytes(count) bytes.
 template <class Work>
 void draw_triangles(const MeshRasterArgs<float>& args, const Work& work, std::uint64_t count,
                     unsigned blocks, PixelWord* pixels, unsigned long long* queue, cudaStream_t stream) {

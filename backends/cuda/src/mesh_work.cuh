@@ -4,11 +4,11 @@
 #include "mesh.cuh"
 #include "search.cuh"
 
-// Whose triangles the mesh kernels draw: those of one camera, or of several.
+// Work of the mesh kernels: triangles of one camera, or of several.
 
 namespace gsnav::cuda {
 
-/// The work of one camera: lists of chunks, and counts that the host has been told.
+/// Work of one camera. Lists of chunks come from the host, which is told the counts.
 struct OneCamera {
   std::uint32_t triangles = 0;
   __device__ MeshChunk vertex_chunk(const MeshSetupArgs<float>& args) const {
@@ -31,7 +31,7 @@ struct OneCamera {
   __device__ std::size_t camera_of(std::uint32_t) const { return 0; }
 };
 
-/// That of several: a chunk's placement is searched for, and counts stay here.
+/// Work of several cameras. The placement of a chunk is searched for, and counts stay on the device.
 struct ManyCameras {
   MeshWave wave;
   __device__ MeshChunk chunk(std::uint32_t MeshPlace::*first) const {
@@ -66,7 +66,7 @@ struct ManyCameras {
   }
 };
 
-/// `args` as the camera of a placement has them.
+/// `args` with the camera of a placement.
 template <class Work>
 __device__ MeshSetupArgs<float> seen_by(const MeshSetupArgs<float>& args, const Work& work,
                                         std::uint32_t placement) {

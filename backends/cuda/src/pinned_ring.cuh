@@ -10,9 +10,8 @@
 
 namespace gsnav::cuda {
 
-/// Pinned blocks that small copies to the device go through, in turn: a copy from pageable memory may
-/// wait for all that the stream has to do. Only a block that is asked for again before its copy is done
-/// is waited for.
+/// Ring of pinned blocks for small copies to the device. A copy from pageable memory could wait for all
+/// work of the stream. Here a copy only waits if its block is still in use.
 class PinnedRing {
  public:
   static constexpr std::size_t kMaxBytes = policy::Upload::kMaxBytes;
@@ -27,7 +26,7 @@ class PinnedRing {
     }
   }
 
-  /// Copies `bytes` <= kMaxBytes; `from` may change when it returns.
+  /// Copies `bytes` <= kMaxBytes. `from` may change when it returns.
   cudaError_t send(void* to, const void* from, std::size_t bytes, cudaStream_t stream) {
     Block& b = blocks_[next_];
     next_ = (next_ + 1) % kBlocks;

@@ -3,8 +3,8 @@
 
 namespace gsnav::cuda {
 
-/// Binary search: the last i of [low, high) for which starts(i) holds, where starts(low) is taken to
-/// hold and no i holds after one that does not. Not for empty ranges.
+/// Binary search: the last i of [low, high) for which starts(i) is true. starts(low) is assumed to be
+/// true, and starts must not become true again after it is false. The range must not be empty.
 template <class I, class F>
 __device__ inline I last_start(I low, I high, const F& starts) {
   while (high - low > 1) {

@@ -7,7 +7,7 @@
 #include "gsnav/backends/cuda/policy.hpp"
 #include "search.cuh"
 
-// Skinning of many avatars by one launch, or two where some have four influences and some eight.
+// Skinning of many avatars by one launch, or by two if some have four influences and some eight.
 
 namespace gsnav {
 
@@ -19,7 +19,7 @@ template <int K>
 constexpr unsigned kBlocks = K == kInfluences4 ? Policy::kResident4 : Policy::kResident8;
 static_assert(sizeof(Affine3<float>) == 3 * sizeof(float4));
 
-/// An avatar, and the first of the pieces of kThreads Gaussians that it is cut into.
+/// An avatar, and the first of its pieces of kThreads Gaussians.
 struct SkinJob {
   const float* means[3];
   const float* quats[4];
@@ -28,23 +28,23 @@ struct SkinJob {
   const Affine3<float>* joints;
   float* means_out[3];
   float* quats_out[4];
-  float* rotations_out[4];  ///< null: not asked for
+  float* rotations_out[4];  ///< Null if not requested.
   std::uint32_t size, first_piece, joint_count;
-  bool aligned;  ///< indices and weights of a Gaussian, so that one load has them
+  bool aligned;  ///< Indices and weights of a Gaussian are aligned, so that one load reads them.
 
   __host__ __device__ bool writes_rotations() const { return rotations_out[0] != nullptr; }
 };
 
-/// By value to the kernel.
+/// Passed to the kernel by value.
 struct SkinLaunch {
-  const SkinJob* table;  ///< null: `few` has them
+  const SkinJob* table;  ///< Null if the jobs are in `few`.
   std::uint32_t count, pieces;
-  unsigned copies;  ///< of each joint in shared memory
+  unsigned copies;  ///< Copies of each joint in shared memory.
   SkinJob few[Policy::kFewJobs];
 };
 static_assert(sizeof(SkinLaunch) <= 4096 - 64);
 
-/// K numbers from `from`, by one load where it is aligned.
+/// Reads K numbers, with one load if `from` is aligned.
 template <int K>
 __device__ void read_numbers(std::uint16_t (&to)[K], const std::uint16_t* from, bool aligned) {
   if (!aligned) {
@@ -75,13 +75,13 @@ __device__ SkinRow<K> read_row(const SkinJob& job, std::uint32_t i) {
   return row;
 }
 
-/// jobs[index], looked up again: twenty addresses would take forty registers if they were kept.
+/// jobs[index], loaded again. Keeping its twenty addresses would take forty registers.
 __device__ inline const SkinJob& afresh(const SkinJob* jobs, std::uint32_t index) {
   asm volatile("" : "+r"(index));
   return jobs[index];
 }
 
-/// Gaussians [begin, end) of jobs[index].
+/// Skins Gaussians [begin, end) of jobs[index].
 template <int K, class JointAt>
 __device__ void skin_rows(const SkinJob* jobs, std::uint32_t index, std::uint32_t begin,
                           std::uint32_t end, const JointAt& joint_at) {
@@ -92,13 +92,13 @@ __device__ void skin_rows(const SkinJob* jobs, std::uint32_t index, std::uint32_
   }
 }
 
-/// A block an even share of all pieces, whose avatars' joints it keeps in shared memory where they fit.
-/// `Few`: the jobs came with the launch.
+/// Skins an even share of all pieces per block. Joints of an avatar are kept in shared memory if they
+/// fit. `Few`: the jobs were passed with the launch.
 template <int K, bool Few>
 __global__ void __launch_bounds__(kThreads, kBlocks<K>)
     skin_kernel(const __grid_constant__ SkinLaunch launch) {
   extern __shared__ float4 memory[];
-  __shared__ SkinJob kept;  // of a table's
+  __shared__ SkinJob kept;  // Current entry of the table.
   const SkinJob* const jobs = Few ? launch.few : launch.table;
   const auto share = [&](unsigned block) {
     return static_cast<std::uint32_t>(std::uint64_t{launch.pieces} * block / gridDim.x);
@@ -116,7 +116,7 @@ __global__ void __launch_bounds__(kThreads, kBlocks<K>)
     piece = last;
     const unsigned copies = launch.copies;
     const bool fits = job.joint_count * sizeof(Affine3<float>) <= Policy::kMaxShared / copies;
-    __syncthreads();  // all are done with the avatar before
+    __syncthreads();  // Wait until all threads have finished the previous avatar.
     if (!Few && threadIdx.x == 0) kept = job;
     if (fits) {
       constexpr unsigned kWords = sizeof(Affine3<float>) / sizeof(float);
@@ -136,8 +136,8 @@ __global__ void __launch_bounds__(kThreads, kBlocks<K>)
       rows([&](std::uint16_t j) -> const Affine3<float>& { return (Few ? job : kept).joints[j]; });
       continue;
     }
-    // Eight lanes are served at a time, by 16 bytes. Each has a copy of its own, and with it banks:
-    // whatever joints lanes have, none waits for another.
+    // Shared memory serves eight lanes at a time with 16 bytes each. Every lane has its own copy of the
+    // joints, in its own banks, so lanes never wait for each other, whichever joints they need.
     const float4* const own = memory + 3 * (threadIdx.x % copies);
     rows([&](std::uint16_t j) {
       const float4* const quads = own + j * (3 * copies);
@@ -152,7 +152,7 @@ __global__ void __launch_bounds__(kThreads, kBlocks<K>)
   }
 }
 
-/// The arrays of an avatar as the kernel takes them.
+/// Arrays of an avatar in the form that the kernel takes.
 SkinJob job_of(const SkinningArgs<float>& args, std::uint32_t first_piece) {
   SkinJob job{};
   for (int k = 0; k < 3; ++k) {
@@ -194,7 +194,7 @@ void CudaBackend::run(stage::SkinAll, std::span<const SkinningArgs<float>> avata
   for (const int influences : {kInfluences4, kInfluences8}) {
     if (!usable()) return;
     SkinLaunch launch{};
-    std::size_t most = 0;  // joints in shared memory
+    std::size_t most = 0;  // Joints in shared memory.
     jobs.clear();
     for (const SkinningArgs<float>& args : avatars) {
       if (args.size() == 0 || args.influences != influences) continue;

@@ -13,15 +13,15 @@
 #include "gsnav/detail/eval/oracle_project.hpp"
 #include "gsnav/detail/eval/oracle_ray.hpp"
 
-// Images of Gaussians in float64, judged by nothing but their definition: no tiles, no float, no
-// approximation. What the errors of every renderer here are measured against; made for tests and
-// reports, not for speed.
+// Reference renderer: float64 images of Gaussians straight from the definition, without tiles or
+// approximations. The errors of all renderers are measured against it. For tests and reports; it is
+// slow.
 
 namespace gsnav::eval {
 
 namespace detail {
 
-/// Checks the inputs and calls f(scene) with the scene of the config's kind.
+/// Checks the inputs and calls f(scene) with the scene type of `config.kind`.
 template <Backend B, class F>
 Status with_oracle_scene(B& backend, std::span<const GaussianSet> sets, const Camera& camera,
                          const OracleConfig& config, const F& f) {
@@ -44,15 +44,19 @@ Status with_oracle_scene(B& backend, std::span<const GaussianSet> sets, const Ca
 
 }  // namespace detail
 
-/// The float64 image of sets of Gaussians, as one sorted list, from one camera. The backend, whose
-/// memory is the host's, only shares out the work: rows in parallel, the same bits for any number of
-/// threads. Memory, above the images: at most 350 bytes a visible Gaussian (a drawn one for `boxed` =
-/// false), 64 MiB of row lists, and for OracleOrder::per_ray 24 MiB a thread (more only where one pixel
-/// is under a million Gaussians). Errors: invalid_argument or unsupported, naming the field.
+/// Renders the float64 reference image of sets of Gaussians. All sets are blended in one depth order.
 ///
-///     gsnav::OpenMPBackend backend;
-///     auto truth = gsnav::eval::oracle_render(backend, {{cloud.set()}}, camera).value();  // truth.rgb,
-///     ...
+/// @code
+/// gsnav::OpenMPBackend backend;
+/// auto truth = gsnav::eval::oracle_render(backend, {{cloud.set()}}, camera).value();
+/// // truth.rgb, ...
+/// @endcode
+///
+/// The backend must be a host backend. It distributes rows over threads; the result is bit-identical for
+/// any number of threads. Memory on top of the images: at most 350 bytes per visible Gaussian (with
+/// `boxed` = false, per drawn Gaussian) and 64 MiB of row lists. OracleOrder::per_ray adds 24 MiB per
+/// thread, or more if over a million Gaussians cover one pixel.
+/// @return invalid_argument or unsupported, with the field at fault.
 template <Backend B>
 requires is_host_backend<B> Result<OracleFrames> oracle_render(B& backend,
                                                                std::span<const GaussianSet> sets,
@@ -70,6 +74,7 @@ requires is_host_backend<B> Result<OracleFrames> oracle_render(B& backend,
   if (Status s = backend.synchronize(); !s) return s;
   return frames;
 }
+/// Renders the float64 reference image of one set of Gaussians.
 template <Backend B>
 requires is_host_backend<B> Result<OracleFrames> oracle_render(B& backend, const GaussianSet& set,
                                                                const Camera& camera,

@@ -21,251 +21,289 @@ namespace gsnav {
 
 /// Index of a polygon of a NavMesh.
 using PolyId = std::uint32_t;
+/// The id of no polygon.
 inline constexpr PolyId kNoPoly = 0xffffffffu;
-/// The island of no polygon.
+/// Island number of a point or polygon that lies on no island.
 inline constexpr std::size_t kNoIsland = static_cast<std::size_t>(-1);
 
-/// A point on the surface of a NavMesh: world position (metres, Y up) and the polygon it lies on.
-/// Kept from one step to the next, the polygon saves the search for it.
+/// Point on the surface of a NavMesh. Passing it from one step to the next saves the search for its
+/// polygon.
 struct NavPoint {
-  Vec3d position{};
-  PolyId poly = kNoPoly;
+  Vec3d position{};       ///< World position, metres, Y up.
+  PolyId poly = kNoPoly;  ///< Polygon that the position lies on.
 };
 
-/// How far a point may lie from the surface to be snapped to it: half extents of a box, metres. The
-/// defaults are Habitat's, and generous: two metres beside the mesh or four above it still snap.
+/// How far from the surface a point may lie and still be snapped to it. The defaults are those of
+/// Habitat-Sim and are generous: a point 2 m outside the mesh or 4 m above it still snaps.
 struct SnapOptions {
-  Vec3d half_extents{2.0, 4.0, 2.0};
-  std::optional<std::size_t> island{};  ///< only to this island, where one is named
+  Vec3d half_extents{2.0, 4.0, 2.0};    ///< Half extents of the search box around the point, metres.
+  std::optional<std::size_t> island{};  ///< Snap to this island only. Empty: any island.
 };
 
-/// Triangles by index, metres, Y up; counter-clockwise seen from above can be walked on.
+/// Indexed triangle mesh, world coordinates in metres, Y up. A triangle whose vertices are
+/// counter-clockwise seen from above can be walked on.
 struct NavMeshTriangles {
-  std::vector<Vec3d> vertices;
-  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< three of `vertices` each
+  std::vector<Vec3d> vertices;                          ///< Positions, metres.
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< Indices into `vertices`.
 };
 
-/// What a NavMesh is built from: the stage, or an object that stands in it.
+/// Input of a NavMesh: the static scene, or an object in it.
 struct NavMeshPart {
-  std::span<const Vec3d> vertices;                          ///< its own coordinates
-  std::span<const std::array<std::uint32_t, 3>> triangles;  ///< three of its own vertices each
+  std::span<const Vec3d> vertices;                          ///< Positions in the part's own frame,
+                                                            ///< metres.
+  std::span<const std::array<std::uint32_t, 3>> triangles;  ///< Indices into `vertices`.
+  /// Transform from the part's frame to the world.
   Similarity world_from_part{};
-  /// An object that never moves. It is part of the mesh only where
-  /// NavMeshSettings::include_static_objects says so.
+  /// True for an object that never moves. Such a part is used only if
+  /// NavMeshSettings::include_static_objects is set.
   bool static_object = false;
 };
 
-/// The parts that `settings` include as triangles of one world, in the order given. Errors:
-/// invalid_argument naming the part, and its placement, or its triangle that names a vertex it does not
-/// have.
+/// Merges the parts that `settings` includes into one mesh in world coordinates, in the given order.
+/// @return invalid_argument, with the index of the part, if its transform is not finite or a triangle
+/// has an index out of range.
 Result<NavMeshTriangles> gather_parts(const NavMeshSettings& settings,
                                       std::span<const NavMeshPart> parts);
 
-/// The nearest edge of the mesh.
+/// Nearest point on a boundary edge of the mesh.
 struct ObstacleHit {
-  double distance = 0.0;  ///< on the ground plane, metres
-  Vec3d position{};       ///< nearest point of the edge
-  Vec3d normal{};  ///< of the edge (at a corner: that which faces p more), on the ground plane, into the
-                   ///< mesh
+  double distance = 0.0;  ///< Distance on the ground plane, metres.
+  Vec3d position{};       ///< Nearest point of the edge, metres.
+  Vec3d normal{};         ///< Unit normal of the edge on the ground plane. It points into the mesh. At a
+                          ///< corner, the normal of the edge that faces the query point more.
 };
 
-/// How a top-down map is laid out.
+/// Grid layout of a top-down map.
 enum class TopDownLayout : std::uint8_t {
-  centres,  ///< enough cells to hold the bounds; a cell is what lies at its centre
-  /// As Habitat's get_topdown_view: no cell for what is left of a row or column at its end, and a cell
-  /// is what lies at its corner of least x and z, or within a centimetre of it on the ground plane.
+  centres,  ///< The grid covers the bounds. A cell is tested at its centre.
+  /// Habitat-Sim's get_topdown_view. Partial cells at the end of a row or column are dropped. A cell is
+  /// tested at its corner with the least x and z, with a tolerance of 1 cm on the ground plane.
   habitat,
 };
 
-/// The walkable surface near one height, seen from above.
+/// Grid of the walkable surface near one height, seen from above.
 struct TopDownMap {
-  Vec3d low{};  ///< world corner of cell (0, 0)
-  double metres_per_cell = 0.0;
-  double at = 0.5;  ///< where in a cell the surface was looked up, in cells from its corner: 0.5 at the
-                    ///< centre, or 0
-  std::size_t columns = 0, rows = 0;  ///< along x and z
+  Vec3d low{};                   ///< World position of the corner of cell (0, 0), metres.
+  double metres_per_cell = 0.0;  ///< Cell size, metres.
+  double at = 0.5;  ///< Position in a cell where the surface is looked up, as a fraction of the cell:
+                    ///< 0.5 (centre) or 0 (corner).
+  /// Number of cells along x (`columns`) and z (`rows`).
+  std::size_t columns = 0, rows = 0;
   std::vector<std::int32_t>
-      islands;  ///< columns * row + column: island, or -1 where nothing is walkable
+      islands;  ///< Shape [rows][columns]. Island number of each cell, or -1 if it is not walkable.
 
+  /// Returns true if the cell is walkable. @pre column < columns and row < rows.
   bool walkable(std::size_t column, std::size_t row) const noexcept {
     return islands[columns * row + column] >= 0;
   }
 };
 
-/// A path along the surface from start to goal: the corners it turns at, between them points wherever a
-/// straight line would leave the surface by more than a centimetre, and its length on the surface,
-/// metres.
+/// Path along the surface from start to goal.
 struct NavPath {
-  std::vector<Vec3d> points;
-  double length = 0.0;
+  std::vector<Vec3d> points;  ///< Start, corners and goal, metres. Wherever the straight line between
+                              ///< two corners would leave the surface by more than 1 cm, intermediate
+                              ///< points are added.
+  double length = 0.0;        ///< Length on the surface, metres.
 };
 
-/// A distance that is known to an error: `length` is at most `relative_error` times `at_least` above it,
-/// and the shortest path lies between it and 2 length - at_least, metres. Both infinite where there is
-/// no path.
+/// Distance with an error bound: the true distance lies between `at_least` and `2 length - at_least`,
+/// and `length - at_least <= relative_error * at_least`. Both values are infinite if there is no path.
 struct BoundedDistance {
-  double length = 0.0;
-  double at_least = 0.0;  ///< no path is shorter
+  double length = 0.0;    ///< Estimate: the middle of the two bounds, metres.
+  double at_least = 0.0;  ///< Lower bound of the distance, metres. No path is shorter.
 };
+/// Accuracy of a distance query.
 struct DistanceOptions {
-  double relative_error = 1e-3;  ///< 0 (exact) to 0.1
+  double relative_error = 1e-3;  ///< Largest relative error, 0 (exact) to 0.1.
 };
 
-/// Whether there is a path, and why not where there is none.
+/// Result of a reachability query.
 enum class PathStatus : std::uint8_t {
+  /// A path exists.
   reachable,
-  not_finite,      ///< a coordinate is NaN or infinite
-  start_off_mesh,  ///< the start is farther from the surface than snapping allows
-  goal_off_mesh,   ///< the goal is
-  other_island,    ///< both are on the surface, on pieces of it that do not touch
+  not_finite,      ///< A coordinate is NaN or infinite.
+  start_off_mesh,  ///< The start is farther from the surface than snapping allows.
+  goal_off_mesh,   ///< The goal is farther from the surface than snapping allows.
+  other_island,    ///< Start and goal lie on different islands.
 };
 
-/// The shortest of the paths to several goals.
+/// Shortest of the paths to several goals.
 struct GoalPath {
-  std::size_t goal = 0;  ///< index of the goal reached
-  NavPath path;
+  std::size_t goal = 0;  ///< Index of the goal that the path leads to.
+  NavPath path;          ///< The path to that goal.
 };
 
-/// A point of a walk and when it is reached, as a fraction of the displacement asked for.
+/// Point of a walk along the surface.
 struct WalkPoint {
-  Vec3d position{};
-  PolyId poly = kNoPoly;
-  double fraction = 0.0;
+  Vec3d position{};       ///< World position, metres.
+  PolyId poly = kNoPoly;  ///< Polygon that the position lies on.
+  double fraction = 0.0;  ///< Fraction of the requested displacement that is used up here, 0 to 1.
 };
 
-/// Points of a walk in order. Those of a usual step lie in the object: it allocates nothing.
+/// Points of a walk, in order. Up to eight points are stored inline, so a usual step allocates nothing.
 using WalkPoints = SmallVector<WalkPoint, 8>;
 
-/// A straight or sliding walk along the surface. Each leg between consecutive points lies within one
-/// polygon and follows its height to a centimetre. A walk that ends before fraction 1 was stopped.
+/// Result of a walk along the surface. Each leg between consecutive points lies within one polygon and
+/// follows its height to 1 cm. If the last fraction is below 1, the walk was stopped.
 struct SurfaceWalk {
-  WalkPoints points;      ///< at least the start
-  double length = 0.0;    ///< metres walked, in three dimensions
-  bool hit_wall = false;  ///< an edge of the mesh stopped or turned the walk
-  Vec3d wall_normal{};    ///< ground-plane normal of the last wall met, pointing into the mesh
+  WalkPoints points;      ///< Start, polygon crossings and end. Empty if the start cannot be snapped.
+  double length = 0.0;    ///< Length of the walk in 3D, metres.
+  bool hit_wall = false;  ///< True if an edge of the mesh stopped the walk or changed its direction.
+  Vec3d wall_normal{};    ///< Ground-plane normal of the last edge hit. It points into the mesh.
 };
 
-/// Where agents can walk: a Recast NavMesh with queries. Built once, then constant: every query is
-/// const, changes no flags and may run from any number of threads at the same time. One that was moved
-/// from may only be assigned to or destroyed.
+/// Surface on which an agent of one size can stand, with queries: a Recast NavMesh.
+/// It does not change after it is built. All queries are const and thread-safe. A moved-from NavMesh may
+/// only be assigned to or destroyed.
 class NavMesh {
  public:
+  /// Three indices of vertices.
   using Triangle = std::array<std::uint32_t, 3>;
 
-  /// Builds from triangles (counter-clockwise seen from above is walkable; Y up, metres), at any
-  /// distance from the world's origin. Errors: invalid_argument naming the setting, vertex or index
-  /// at fault or the size of a grid beyond `max_cells`; nothing_navigable where no surface is left;
-  /// unsupported where Detour cannot number the polygons. With `settings.tile_size`, `threads` share out
-  /// the tiles (0: one a core, at most 16); the mesh is the same, bit for bit, for any number of them.
+  /// Builds a NavMesh from triangles. The result is bit-identical for any number of threads.
+  /// @param settings Agent, cell sizes and limits.
+  /// @param vertices Positions, metres, Y up, at any distance from the world origin.
+  /// @param triangles Indices. A triangle can be walked on if it is counter-clockwise seen from above.
+  /// @param threads Threads that build tiles if `settings.tile_size` is set. 0: one thread per core, at
+  /// most 16.
+  /// @return invalid_argument for a setting, vertex or index out of range (the message names it) or a
+  /// grid of more than `max_cells` cells; nothing_navigable if no surface remains; unsupported if Detour
+  /// cannot number the polygons.
   static Result<NavMesh> build(const NavMeshSettings& settings, std::span<const Vec3d> vertices,
                                std::span<const Triangle> triangles, int threads = 0);
-  /// The same from a stage and the objects in it (gather_parts). Errors: as both.
+  /// Builds a NavMesh from a static scene and the objects in it. See gather_parts.
+  /// @return the errors of gather_parts and of the other build().
   static Result<NavMesh> build(const NavMeshSettings& settings, std::span<const NavMeshPart> parts,
                                int threads = 0);
 
+  /// Moves the mesh. The source may then only be assigned to or destroyed.
   NavMesh(NavMesh&&) noexcept;
+  /// Moves the mesh. The source may then only be assigned to or destroyed.
   NavMesh& operator=(NavMesh&&) noexcept;
+  /// Frees the mesh.
   ~NavMesh();
 
+  /// Settings that the mesh was built with.
   const NavMeshSettings& settings() const noexcept;
-  /// Box around the navigable surface.
+  /// Bounding box of the navigable surface, metres.
   Aabb<double> bounds() const noexcept;
+  /// Number of polygons.
   std::size_t polygon_count() const noexcept;
-  /// Area of the surface, square metres.
+  /// Area of the surface, m².
   double navigable_area() const noexcept;
-  /// The surface as triangles, for drawing.
+  /// The surface as separate triangles in world coordinates, for drawing.
   std::vector<std::array<Vec3d, 3>> triangles() const;
-  /// The surface, or one island of it, as vertices and indices: world coordinates, each vertex once,
-  /// triangles island after island and counter-clockwise seen from above. Empty where there is no such
-  /// island.
+  /// The surface as an indexed mesh in world coordinates, without duplicate vertices. Triangles are
+  /// ordered by island and counter-clockwise seen from above.
+  /// @param island Return this island only. The result is empty if it does not exist.
   NavMeshTriangles surface(std::optional<std::size_t> island = {}) const;
 
-  // ---- islands: connected pieces of the surface, numbered by falling area
+  // ---- Islands: connected components of the surface, numbered by decreasing area
+  /// Number of islands.
   std::size_t island_count() const noexcept;
-  /// Island of a polygon; island 0 is the largest. kNoIsland for kNoPoly and whatever is no polygon of
-  /// this mesh.
+  /// Island of a polygon. Island 0 is the largest. Returns kNoIsland if `poly` is not a polygon of this
+  /// mesh.
   std::size_t island_of(PolyId poly) const noexcept;
-  /// Square metres; 0 where there is no such island.
+  /// Area of an island, m². 0 if it does not exist.
   double island_area(std::size_t island) const noexcept;
-  /// Greatest ground-plane distance of a vertex from the island's centroid of area, metres; 0 where
-  /// there is no such island.
+  /// Largest ground-plane distance of a vertex from the centroid of the island, metres. 0 if the island
+  /// does not exist.
   double island_radius(std::size_t island) const noexcept;
 
-  // ---- points
-  /// Nearest point of the surface, or of the island asked for, within the extents; none for NaN or
-  /// infinite input and where there is no such island. Each polygon offers its point nearest on the
-  /// ground plane; surface straight above or below p by no more than the agent's climb counts as at p,
-  /// and of several such the nearest in height is taken.
+  // ---- Points
+  /// Nearest point of the surface within `options.half_extents` of p.
+  /// For each polygon, the candidate is its point nearest to p on the ground plane. Surface directly
+  /// above or below p by at most the agent's climb height counts as distance 0. Among several such
+  /// candidates the one nearest in height is returned.
+  /// @return nothing if no surface is within reach, if p is not finite, or if the requested island does
+  /// not exist.
   std::optional<NavPoint> snap_point(const Vec3d& p, const SnapOptions& options = {}) const;
-  /// True where p lies above or below the surface by at most `max_height_delta` metres.
+  /// Returns true if p is at most `max_height_delta` metres above or below the surface.
   bool is_navigable(const Vec3d& p, double max_height_delta = 0.5) const;
-  /// Height of the surface on `poly` at the ground position of p, metres; NaN for kNoPoly and whatever
-  /// is no polygon of this mesh.
+  /// Height of the surface of `poly` at the ground position of p, metres. NaN if `poly` is not a polygon
+  /// of this mesh.
   double height_at(PolyId poly, const Vec3d& p) const noexcept;
-  /// Uniform over the surface by area (alias table: constant time), from the caller's generator;
-  /// `island` restricts it. No polygon where there is no such island.
+  /// Random point, uniform over the area of the surface. Takes constant time (alias table).
+  /// @param rng Source of random numbers.
+  /// @param island Sample this island only. If it does not exist, the result has no polygon (kNoPoly).
   NavPoint random_point(Rng& rng, std::optional<std::size_t> island = {}) const;
-  /// Uniform over the part of the surface within `radius` metres of p in space; none where there is no
-  /// such part or less than about a thousandth of what lies above or below the disc.
+  /// Random point, uniform over the part of the surface within `radius` metres (3D) of p.
+  /// @return nothing if that part is empty or smaller than about 1/1000 of the surface above and below
+  /// the disc.
   std::optional<NavPoint> random_point_near(Rng& rng, const Vec3d& p, double radius,
                                             std::optional<std::size_t> island = {}) const;
-  /// Ground-plane distance from p, snapped, to the nearest edge of the mesh that can be reached on the
-  /// surface within it, at most `max_radius`; infinity where p cannot be snapped.
+  /// Ground-plane distance from p to the nearest boundary edge, metres. p is snapped first. Only edges
+  /// that can be reached on the surface within that distance count.
+  /// @return `max_radius` if no edge is nearer, infinity if p cannot be snapped.
   double distance_to_closest_obstacle(const Vec3d& p, double max_radius = 2.0,
                                       const SnapOptions& options = {}) const;
-  /// The edge itself; none where p cannot be snapped or no edge is within `max_radius`.
+  /// Nearest boundary edge within `max_radius` metres of p. See distance_to_closest_obstacle.
+  /// @return nothing if p cannot be snapped or no edge is near enough.
   std::optional<ObstacleHit> closest_obstacle(const Vec3d& p, double max_radius = 2.0,
                                               const SnapOptions& options = {}) const;
-  /// All edges within `radius` that can be reached on the surface within it, each with its nearest
-  /// point; the normal there points to p, or into the mesh where p is on the edge.
+  /// All boundary edges that can be reached on the surface within `radius` metres. Each has its nearest
+  /// point. The normal points from there to p, or into the mesh if p lies on the edge.
   std::vector<ObstacleHit> obstacles_near(const NavPoint& p, double radius) const;
-  /// Which cells of a grid over the bounds are walkable within `max_height_delta` of `height` (world,
-  /// metres). Errors: invalid_argument for a cell that is not positive, a grid of more than 2^28 cells,
-  /// or, in Habitat's layout, a cell larger than the mesh.
+  /// Rasterizes the walkable surface near one height over the bounds of the mesh.
+  /// @param height World height, metres. A cell is walkable if surface lies within `max_height_delta`
+  /// metres of it.
+  /// @param metres_per_cell Cell size, metres.
+  /// @param max_height_delta Largest distance of a walkable surface from `height`, metres.
+  /// @param layout Position of the grid and of the tests.
+  /// @return invalid_argument if the cell size is not positive, if the grid has more than 2^28 cells, or
+  /// if, with TopDownLayout::habitat, a cell is larger than the mesh.
   Result<TopDownMap> top_down_map(double height, double metres_per_cell, double max_height_delta = 0.5,
                                   TopDownLayout layout = TopDownLayout::centres) const;
 
-  // ---- paths: the shortest on the surface, exactly (Polyanya, unfolded over slopes), so that distances
-  // are symmetric and obey the triangle inequality. The surface is that of the height triangles; a
-  // polygon that is level to a millimetre counts as flat. The first distance asked for prepares the
-  // others, once a mesh: tenths of a second and tens of megabytes for hundreds of polygons, at most 95
-  // MiB; seconds and up to 64 MiB on large hills (docs/notes/navigation.md).
-  /// Whether find_path finds a path: every search ends, so this needs none.
+  // ---- Paths: the shortest paths on the surface (Polyanya, with slopes unfolded)
+  // Distances are exact. They are symmetric and satisfy the triangle inequality. The surface is that of
+  // the height triangles; a polygon that is level to 1 mm counts as flat. The first distance query of a
+  // mesh prepares tables for the later ones. That takes tenths of a second and at most 95 MiB for
+  // hundreds of polygons, or seconds and up to 64 MiB on large hills (docs/notes/navigation.md).
+  /// Tells whether find_path finds a path, without searching for it.
   PathStatus path_status(const Vec3d& start, const Vec3d& goal,
                          const SnapOptions& options = {}) const noexcept;
-  /// The shortest path between two points, after snapping. Errors (nothing_navigable) say why there is
-  /// none, as path_status does: a point off the mesh, or different islands.
+  /// Shortest path between two points. Both are snapped first.
+  /// @return nothing_navigable if a point is off the mesh or the points lie on different islands.
   Result<NavPath> find_path(const Vec3d& start, const Vec3d& goal,
                             const SnapOptions& options = {}) const;
-  /// Length of find_path, infinity where there is none.
+  /// Length of the path that find_path returns, metres. Infinity if there is none.
   double geodesic_distance(const Vec3d& start, const Vec3d& goal, const SnapOptions& options = {}) const;
-  /// The shortest of the paths to many goals, and the goal it leads to. Goals that cannot be reached are
-  /// passed over; the error says why none can.
+  /// Shortest of the paths to several goals. Goals that cannot be reached are ignored.
+  /// @return nothing_navigable, with the reason, if no goal can be reached.
   Result<GoalPath> find_path_to_any(const Vec3d& start, std::span<const Vec3d> goals,
                                     const SnapOptions& options = {}) const;
-  /// Distance to the nearest goal along the surface, infinity where none can be reached.
+  /// Distance along the surface to the nearest goal, metres. Infinity if no goal can be reached.
   double geodesic_distance(const Vec3d& start, std::span<const Vec3d> goals,
                            const SnapOptions& options = {}) const;
-  /// The same for points whose polygons are known, without a search for them. Errors: invalid_argument
-  /// for no polygon of this mesh; nothing_navigable.
+  /// Shortest path between two points whose polygons are known. Skips the search for the polygons.
+  /// @return invalid_argument if a polygon is not of this mesh; nothing_navigable if there is no path.
   Result<NavPath> path_between(const NavPoint& start, const NavPoint& goal) const;
+  /// Length of the path that path_between returns, metres. Infinity if there is none.
   double distance_between(const NavPoint& start, const NavPoint& goal) const;
-  /// The same to a chosen error, with a proven lower bound: on hills, where exact distances are searched
-  /// for. Elsewhere it is exact. Errors: invalid_argument for a relative error that is not in [0, 0.1].
+  /// Distance to a chosen accuracy with a proven lower bound. It saves time on hills, where exact
+  /// distances need a search. On other surfaces the result is exact.
+  /// @return invalid_argument if the relative error is not in [0, 0.1].
   Result<BoundedDistance> distance_between(const NavPoint& start, const NavPoint& goal,
                                            const DistanceOptions& options) const;
 
-  // ---- walking
-  /// Walks from `start` along the ground-plane part of `displacement`, polygon by polygon, so that no
-  /// step is too long. At an edge of the mesh it slides along it, or stops at the first one. Where
-  /// `start.poly` is not known or does not hold the position, the start is snapped first (within the
-  /// agent's radius plus 0.1 m beside and twice its climb plus 0.1 m up or down); `points` is empty
-  /// where that fails.
+  // ---- Walking
+  /// Walks from `start` along the ground-plane part of `displacement`, polygon by polygon. A
+  /// displacement of any length is followed correctly.
+  /// If `start.poly` is unknown or does not contain the position, the start is snapped first:
+  /// horizontally within the agent's radius plus 0.1 m, vertically within twice its climb height plus
+  /// 0.1 m. If that fails, `points` is empty.
+  /// @param start Point to start from.
+  /// @param displacement Displacement in world coordinates, metres.
+  /// @param slide True: slide along edges of the mesh. False: stop at the first edge.
   SurfaceWalk walk(const NavPoint& start, const Vec3d& displacement, bool slide) const;
 
+  /// @private
   struct Impl;
+  /// @private
   explicit NavMesh(std::unique_ptr<Impl> impl) noexcept;
-  const Impl& impl() const noexcept { return *impl_; }  ///< for the library's own parts
+  /// @private Data of the mesh, for other parts of the library.
+  const Impl& impl() const noexcept { return *impl_; }
 
  private:
   std::unique_ptr<Impl> impl_;

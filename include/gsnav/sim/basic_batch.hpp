@@ -22,23 +22,30 @@
 
 namespace gsnav {
 
-/// N environments over M scenes that they share, on a backend of your choice; BatchSimulator takes a
-/// Device. One call does what N simulators would do, bit for bit.
+/// Batch of navigation environments that share scenes, on a backend of your choice. BatchSimulator is
+/// the same for a Device chosen at run time.
 ///
-///     auto sim = make_batch_simulator(backend, scenes, config, 256, episode_of).value();
-///     auto out = sim.reset().value();
-///     while (running) out = sim.step(policy(out)).value();
+/// @code
+/// auto sim = make_batch_simulator(backend, scenes, config, 256, episode_of).value();
+/// auto out = sim.reset().value();
+/// while (running) out = sim.step(policy(out)).value();
+/// @endcode
 ///
-/// Environment e draws its sensors' noise with seed + e. Environments that are in one scene at one time
-/// share its avatars' capsules and skinned Gaussians. Scenes are held once, however many environments
-/// look at them. The backend must outlive it. After an error reset() begins anew. One that was moved
-/// from has no environments and answers with invalid_argument.
+/// One call steps all environments. Environment e returns the same bits as a BasicSimulator with seed +
+/// e. Each scene is held in memory once. Environments that are in the same scene at the same time share
+/// its capsules and skinned Gaussians. The backend must outlive the simulator. After an error, call
+/// reset(). A moved-from batch has no environments and returns invalid_argument. Not thread-safe.
 template <Backend B>
 class BasicBatchSimulator {
  public:
-  /// `next_episode` is asked for each episode of each environment; see EpisodeSource. Errors:
-  /// invalid_argument (names the field, sensor or scene); unsupported, naming a sensor whose images
-  /// cannot stay where BatchConfig::images says.
+  /// Creates a batch over scenes in memory.
+  /// @param backend Backend that renders. It must outlive the batch.
+  /// @param scenes Scenes that episodes refer to by index.
+  /// @param config Settings for all environments.
+  /// @param environments Number of environments.
+  /// @param next_episode Called for each new episode of each environment. See EpisodeSource.
+  /// @return invalid_argument, with the field, sensor or scene at fault; unsupported, with the sensor,
+  /// if its images cannot stay where BatchConfig::images asks for them.
   static Result<BasicBatchSimulator> create(B& backend,
                                             std::vector<std::shared_ptr<const SimulatorScene>> scenes,
                                             BatchConfig config, std::size_t environments,
@@ -52,10 +59,11 @@ class BasicBatchSimulator {
         backend, [held = std::move(scenes)](std::size_t i) -> Result<ScenePointer> { return held[i]; },
         {}, count, std::move(config), environments, std::move(next_episode));
   }
-  /// The same over scenes that are loaded in the background and leave when they are not needed.
-  /// `next_episode` is asked for the next episode of an environment already when one begins, so that its
-  /// scene can be loaded meanwhile. Errors: as above; invalid_argument where `library` is null. What
-  /// loading a scene reports comes from the reset or step that needs it.
+  /// Creates a batch over scenes that are loaded in the background and freed when no environment uses
+  /// them. `next_episode` is called one episode ahead, when the previous episode of an environment
+  /// begins, so that its scene can be loaded meanwhile. Errors of loading are returned by the reset() or
+  /// step() that needs the scene.
+  /// @return the errors of create(); invalid_argument if `library` is null.
   static Result<BasicBatchSimulator> create_from_library(B& backend,
                                                          std::shared_ptr<SceneLibrary> library,
                                                          BatchConfig config, std::size_t environments,
@@ -68,12 +76,16 @@ class BasicBatchSimulator {
         environments, std::move(next_episode));
   }
 
+  /// Number of environments, N.
   std::size_t environments() const noexcept { return worlds_.size(); }
+  /// World of one environment: agent, task and clock. @pre environment < environments().
   const World& world(std::size_t environment) const noexcept { return worlds_.world(environment); }
+  /// Index of the scene that an environment is in.
   std::size_t scene_of(std::size_t environment) const noexcept { return worlds_.scene_of(environment); }
 
-  /// Begins the next episode in every environment or, with a mask [N], in those where it is not 0.
-  /// Errors: what the episode source and World::reset report; rendering.
+  /// Begins the next episode in every environment.
+  /// @param mask Shape [N]. If given, only environments with a nonzero value are reset.
+  /// @return the errors of the episode source, of World::reset, or of rendering.
   Result<BatchStep> reset(std::span<const std::uint8_t> mask = {}) {
     if (environments() == 0) return moved_away();
     if (Status s = worlds_.reset(parallel(), mask); !s) return s;
@@ -81,16 +93,21 @@ class BasicBatchSimulator {
     return observe(mask.empty());
   }
 
-  /// One action for each environment, [N]. Errors: invalid_argument (another number of actions; an
-  /// environment that is done, with AutoReset::disabled; before reset), with the environment's number;
-  /// what World::step reports; rendering.
+  /// Performs one action per environment.
+  /// @param actions Shape [N].
+  /// @return invalid_argument for a wrong number of actions, before reset(), or, with
+  /// AutoReset::disabled, for an environment that is done (the message names it); the errors of
+  /// World::step and of rendering.
   Result<BatchStep> step(std::span<const Action> actions) { return act(actions); }
-  /// The same by velocities, as BasicSimulator::step(VelocityCommand).
+  /// Drives each environment by a velocity for one control period. See BasicSimulator::step.
+  /// @param commands Shape [N].
   Result<BatchStep> step(std::span<const VelocityCommand> commands) { return act(commands); }
 
-  /// Renders made so far, and how many times an avatar was skinned for them.
+  /// Number of images rendered so far. Sensors with the same position and field of view share one.
   std::size_t render_count() const noexcept { return rig_.render_count(); }
+  /// Number of times that an avatar was skinned so far.
   std::size_t pose_count() const noexcept { return scenes_.pose_count(); }
+  /// Turns rendering on or off, from the next call on.
   void set_rendering(bool on) noexcept { config_.rendering = on; }
 
  private:
@@ -132,7 +149,7 @@ class BasicBatchSimulator {
     auto worlds = BatchWorld::create(std::move(places), config.task, config.auto_reset, environments,
                                      std::move(next_episode));
     if (!worlds) return worlds.status();
-    // Scenes of a library are known only when they come.
+    // Scenes of a library can be checked only after they are loaded.
     SceneOf checked = [scene_of, config](std::size_t i) -> Result<ScenePointer> {
       auto scene = scene_of(i);
       if (!scene) return scene;
@@ -167,7 +184,7 @@ class BasicBatchSimulator {
   static Status moved_away() {
     return {Errc::invalid_argument, "this BatchSimulator was moved from: use what it became"};
   }
-  /// Frees scenes that no environment is in any more.
+  /// Frees the scenes that no environment uses.
   void free_scenes() {
     if (!scenes_leave_) return;
     std::fill(in_use_.begin(), in_use_.end(), std::uint8_t{0});
@@ -180,7 +197,7 @@ class BasicBatchSimulator {
       if constexpr (is_host_backend<B>) {
         backend_->parallel_for(n, f);
       } else {
-        // Worlds step on the host, whatever draws them.
+        // Worlds always step on the host.
         const std::size_t piece = n / kPieces + 1;
         pool_->run(static_cast<std::uint32_t>((n + piece - 1) / piece), [&f, n, piece](std::uint32_t p) {
           for (std::size_t i = p * piece; i < std::min(n, (p + 1) * piece); ++i) f(i);
@@ -207,7 +224,7 @@ class BasicBatchSimulator {
     }
     rig_.resize(buffers_, environments());
     views_.clear();
-    // Where the last call drew nothing, what has not moved since has no image either.
+    // If the last call did not render, environments that have not moved need an image too.
     const bool every = all || !std::exchange(drawn_, false);
     for (std::size_t e = 0; e < environments(); ++e) {
       if (every || worlds_.moved(e)) add_view(e, e);
@@ -221,7 +238,7 @@ class BasicBatchSimulator {
     return out;
   }
 
-  /// The last images of the episodes that ended, before their environments go on.
+  /// Renders the last images of the episodes that ended, before their environments are reset.
   Status observe_finished() {
     if (!config_.rendering || images_.empty()) return {};
     const std::span<const std::size_t> finished = worlds_.info().finished;
@@ -241,7 +258,7 @@ class BasicBatchSimulator {
     }
   }
 
-  /// What environment e sees, into a row of the images.
+  /// Adds the view of environment e. Its images go to row `row`.
   void add_view(std::size_t e, std::size_t row) {
     const AgentPose& agent = world(e).agent();
     SceneView& v = views_.emplace_back();
@@ -266,15 +283,16 @@ class BasicBatchSimulator {
   SensorRig<B> rig_;
   bool scenes_leave_;
   BatchScenes<B> scenes_;
-  std::vector<std::uint8_t> in_use_;  // of each scene
-  bool drawn_ = false;                // all rows of buffers_ are of the worlds before the present call
+  std::vector<std::uint8_t> in_use_;  // For each scene: 1 if an environment is in it.
+  bool drawn_ = false;                // True if buffers_ holds an image of every environment as of the
+                                      // last call.
   SensorImages<B> buffers_, final_buffers_;
-  std::unique_ptr<ThreadPool> pool_;  // where the backend's own work is not the host's
+  std::unique_ptr<ThreadPool> pool_;  // Steps the worlds if the backend does not compute on the host.
   std::vector<BatchObservation> images_, final_images_;
   std::vector<SceneView> views_;
 };
 
-/// BasicBatchSimulator<B>::create, and create_from_library, with B deduced.
+/// Calls BasicBatchSimulator<B>::create.
 template <Backend B>
 Result<BasicBatchSimulator<B>> make_batch_simulator(
     B& backend, std::vector<std::shared_ptr<const SimulatorScene>> scenes, BatchConfig config,
@@ -283,6 +301,7 @@ Result<BasicBatchSimulator<B>> make_batch_simulator(
                                         std::move(next_episode));
 }
 
+/// Calls `BasicBatchSimulator<B>::create_from_library`, whose comment describes the arguments.
 template <Backend B>
 Result<BasicBatchSimulator<B>> make_batch_simulator_from_library(B& backend,
                                                                  std::shared_ptr<SceneLibrary> library,

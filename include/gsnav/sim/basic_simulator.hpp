@@ -13,34 +13,43 @@
 
 namespace gsnav {
 
-/// What the noise of an observation depends on: the seed, the episode and how many actions it has seen.
+/// Seed of the sensor noise of one observation. It depends on the seed, the episode and the number of
+/// actions so far.
 std::uint64_t noise_seed(std::uint64_t seed, const WorldState& state) noexcept;
 
-/// Where the camera of an ImageNav goal looks: about +Y by an angle that the episode's id alone decides,
-/// so that an episode has one goal image.
+/// Orientation of the camera for an ImageNav goal: a turn about +Y by an angle derived from the
+/// episode's id. Each episode therefore has one goal image.
 Quatd goal_rotation(const PointNavEpisode& episode) noexcept;
 
-/// The simulator over a backend of your choice; Simulator takes a Device. Scene, avatars, agent,
-/// sensors and the PointNav task.
+/// Navigation simulator for one agent, on a backend of your choice: a scene, moving avatars, sensors and
+/// a PointNav task. Simulator is the same for a Device chosen at run time.
 ///
-///     auto sim = make_simulator(backend, scene, config).value();
-///     auto obs = sim.reset(episode).value();
-///     while (!sim.done()) obs = sim.step(policy(obs)).value();
-///     auto metrics = sim.metrics();
+/// @code
+/// auto sim = make_simulator(backend, scene, config).value();
+/// auto obs = sim.reset(episode).value();
+/// while (!sim.done()) obs = sim.step(policy(obs)).value();
+/// auto metrics = sim.metrics();
+/// @endcode
 ///
-/// During an action avatars and agent move together over one control period; avatars are skinned only
-/// when a sensor looks. The same calls give the same bits, where floating point rounds to nearest as a
-/// program starts; flushing denormals to zero changes none. The backend must outlive it. One that was
-/// moved from answers whatever can fail with invalid_argument; world().navmesh() and avatars() must not
-/// be asked of it.
+/// The agent and all avatars move together during one control period. Avatars are skinned only when a
+/// sensor renders. The same sequence of calls returns the same bits if the floating-point rounding mode
+/// is round-to-nearest (the default). Flush-to-zero does not change them. The backend must outlive the
+/// simulator. A moved-from simulator returns invalid_argument from every call that can fail; do not call
+/// world().navmesh() or avatars() on it. Not thread-safe; use one simulator per thread.
 template <Backend B>
 class BasicSimulator {
  public:
-  /// Errors: invalid_argument (names the field, sensor or asset).
+  /// Creates a simulator that owns its scene.
+  /// @return invalid_argument, with the field, sensor or asset at fault.
   static Result<BasicSimulator> create(B& backend, SimulatorScene scene, SimulatorConfig config) {
     return create(backend, std::make_shared<const SimulatorScene>(std::move(scene)), std::move(config));
   }
-  /// `others` adds bodies to the scene's avatars, numbered behind them. Errors: as above.
+  /// Creates a simulator that shares a scene with others.
+  /// @param backend Backend that renders. It must outlive the simulator.
+  /// @param scene Scene to simulate.
+  /// @param config Settings.
+  /// @param others Adds bodies to the scene's avatars. They are numbered after the avatars.
+  /// @return invalid_argument, with the field, sensor or asset at fault.
   static Result<BasicSimulator> create(B& backend, std::shared_ptr<const SimulatorScene> scene,
                                        SimulatorConfig config, World::BodySource others = {}) {
     if (scene == nullptr) return {Errc::invalid_argument, "SimulatorScene is null"};
@@ -55,24 +64,28 @@ class BasicSimulator {
     return BasicSimulator(backend, std::move(*world), std::move(config), std::move(scene));
   }
 
-  /// Begins an episode. Errors: what World::reset reports; rendering.
+  /// Starts an episode and renders the first observation.
+  /// @return the errors of World::reset, or of rendering.
   Result<Observations> reset(const PointNavEpisode& episode) {
     if (Status s = world_.reset(episode); !s) return s;
     return observe();
   }
 
-  /// Acts for one control period; Action::stop ends the episode. Errors: what World::step reports;
-  /// rendering.
+  /// Performs one action for one control period and renders. Action::stop ends the episode.
+  /// @return the errors of World::step, or of rendering.
   Result<Observations> step(Action action) {
     if (Result<StepInfo> r = world_.step(action); !r) return r.status();
     return observe();
   }
+  /// Moves at a commanded velocity for one control period and renders.
+  /// @return the errors of World::step, or of rendering.
   Result<Observations> step(const VelocityCommand& command) {
     if (Result<StepInfo> r = world_.step(command); !r) return r.status();
     return observe();
   }
 
-  /// Renders what the agent sees now, without acting. Errors: what rendering reports.
+  /// Renders the current observation without acting.
+  /// @return an error of rendering.
   Result<Observations> observe() {
     if (Status s = alive(); !s) return s;
     Observations obs;
@@ -93,34 +106,49 @@ class BasicSimulator {
     return obs;
   }
 
+  /// True if the episode has ended.
   bool done() const noexcept { return world_.done(); }
+  /// Metrics as if the episode ended now. They are final once done().
   EpisodeMetrics metrics() const { return world_.metrics(); }
+  /// Current time on the scene's clock, seconds.
   double clock() const noexcept { return world_.time(); }
+  /// Current pose of the agent.
   const AgentPose& agent() const noexcept { return world_.agent(); }
+  /// The agent with its task and clock, without images.
   const World& world() const noexcept { return world_; }
+  /// Configuration, with `render` as the simulator resolved it.
   const SimulatorConfig& config() const noexcept { return config_; }
+  /// The scene that the simulator runs in.
   const SimulatorScene& scene() const noexcept { return scene_.scene(); }
+  /// Avatars of the scene.
   const std::vector<AvatarActor>& avatars() const noexcept { return scene_.scene().avatars; }
 
-  /// Everything that changes while it runs, and the way back to it; observe() then sees what was seen
-  /// there.
+  /// Complete state of the episode. Restore it with set_state(); observe() then renders the same images
+  /// again.
   const WorldState& state() const noexcept { return world_.state(); }
-  /// As World::set_state, its errors: nothing is changed by a state that is refused.
+  /// Restores a state. A state that is rejected changes nothing.
+  /// @return the errors of World::set_state.
   Status set_state(const WorldState& state) { return world_.set_state(state); }
-  /// As World::set_agent: metres, radians, its errors.
+  /// Moves the agent to another position. See World::set_agent.
+  /// @param position World position, metres.
+  /// @param yaw, pitch Radians.
+  /// @return the errors of World::set_agent.
   Status set_agent(const Vec3d& position, double yaw, double pitch = 0.0) {
     return world_.set_agent(position, yaw, pitch);
   }
-  /// Decides the sensors' noise from here on.
+  /// Sets the seed of the sensor noise for all later observations.
   void set_seed(std::uint64_t seed) noexcept { config_.seed = seed; }
 
-  /// Turns rendering on or off from the next action on.
+  /// Turns rendering on or off, from the next action on.
   void set_rendering(bool on) noexcept { config_.rendering = on; }
-  /// Renders made so far: sensors at one place with one field of view count once.
+  /// Number of images rendered so far. Sensors with the same position and field of view share one.
   std::size_t render_count() const noexcept { return rig_.render_count() + spectator_count_; }
 
-  /// Renders any camera at the present time (a map, a spectator). Images live until the next call.
-  /// Errors: what BasicRenderer::render reports.
+  /// Renders the scene at the current time from any camera, for a map or a spectator view. The images
+  /// are valid until the next call.
+  /// @param camera Camera in world coordinates.
+  /// @param outputs Bitmask of kRgb, kAlpha, ...
+  /// @return the errors of BasicRenderer::render.
   Result<const Frames<float>*> render(const Camera& camera, unsigned outputs = kRgb) {
     if (Status s = alive(); !s) return s;
     if (Status s = scene_.pose(0, world_.time()); !s) return s;
@@ -132,9 +160,10 @@ class BasicSimulator {
     return &spectator_;
   }
 
-  /// The goal of ImageNav: what an agent at the episode's goal sees, turned by goal_rotation(), with
-  /// nobody about. The images are in the sensors' order and live until the next call. Errors:
-  /// invalid_argument before reset; rendering.
+  /// Renders the goal images of an ImageNav task: the view of an agent at the goal, turned by
+  /// goal_rotation(), without avatars.
+  /// @return images in the order of the sensors, valid until the next call; invalid_argument before
+  /// reset(), or an error of rendering.
   Result<std::span<const Observation>> goal_images() {
     if (Status s = alive(); !s) return s;
     const WorldState& s = world_.state();
@@ -179,7 +208,7 @@ class BasicSimulator {
   std::size_t spectator_count_ = 0;
 };
 
-/// BasicSimulator<B>::create with B deduced.
+/// Calls BasicSimulator<B>::create.
 template <Backend B>
 Result<BasicSimulator<B>> make_simulator(B& backend, SimulatorScene scene, SimulatorConfig config) {
   return BasicSimulator<B>::create(backend, std::move(scene), std::move(config));

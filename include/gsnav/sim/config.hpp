@@ -19,32 +19,35 @@
 
 namespace gsnav {
 
+/// Settings of a simulator.
 struct SimulatorConfig {
+  /// Agent, actions and rules of the task.
   TaskConfig task{};
-  /// An RGB and a depth sensor ("rgb", "depth") of 256 x 256 pixels and 90 degrees, 1.5 m above the
-  /// ground, unless others are given. Empty: nothing is rendered.
+  /// Sensors of the agent. Default: an RGB and a depth sensor ("rgb", "depth") of 256 x 256 pixels and
+  /// 90 degrees, 1.5 m above the ground. Empty: nothing is rendered.
   std::vector<SensorSpec> sensors = rgbd_sensors();
-  /// How sensors draw. They choose `outputs`, and the scene's first asset chooses `sort_order`: a value
-  /// that is neither the default nor theirs is an error.
+  /// How sensors render. Leave `outputs` at its default, because the sensors determine it. `sort_order`
+  /// comes from the first asset of the scene; any value other than the default or that one is an error.
   RenderConfig render{};
-  /// Draws the assets by levels of detail: the profile lod (docs/concepts/scene.md), with
-  /// Exponential::fast whatever render.quality has. Each needs its tree (SceneAsset::lod). No
-  /// hysteresis: an image depends on its camera, not on what was seen before.
+  /// Render the assets at a level of detail that depends on the distance (profile `lod`,
+  /// docs/concepts/scene.md). Implies Exponential::fast. Every asset needs a tree (SceneAsset::lod).
+  /// There is no hysteresis: an image depends only on its camera.
   std::optional<LodChoice> lod{};
-  /// Draws of the assets only what is seen from where a camera is, by the rules of the profile fast
-  /// (VisibleSets). Each needs its sets (SceneAsset::visible); from where these know nothing, all is
-  /// drawn.
+  /// Render only the Gaussians that are visible from the camera's cell (VisibleSets), with the rules of
+  /// the profile `fast`. Every asset needs visible sets (SceneAsset::visible). From positions outside
+  /// all cells, everything is drawn.
   bool visible_sets = false;
-  bool rendering = true;   ///< off: physics and metrics only, no image memory
-  std::uint64_t seed = 0;  ///< of the sensors' noise
+  bool rendering = true;   ///< False: simulate without rendering and without memory for images.
+  std::uint64_t seed = 0;  ///< Seed of the sensor noise.
 };
 
-/// What of its assets a simulator draws.
+/// Part of the assets that a simulator with this configuration draws.
 inline DetailChoice detail_choice(const SimulatorConfig& config) {
   return {config.lod, config.visible_sets};
 }
 
-/// invalid_argument, naming the field, where a value is impossible.
+/// Checks the values of a configuration.
+/// @return invalid_argument, with the field that is out of range.
 inline Status validate(const SimulatorConfig& config) {
   if (Status s = validate(config.task); !s) return s;
   if (Status s = validate(config.render); !s) return s;
@@ -56,7 +59,8 @@ inline Status validate(const SimulatorConfig& config) {
   return validate(std::span<const SensorSpec>(config.sensors));
 }
 
-/// Whether a simulator may run in `scene` so: what of it is missing, or what of `config` it contradicts.
+/// Checks that a simulator with `config` can run in `scene`.
+/// @return invalid_argument, with the missing part of the scene or the contradicting field.
 inline Status validate(const SimulatorScene& scene, const SimulatorConfig& config) {
   if (Status s = validate(scene); !s) return s;
   const SortOrder asked = config.render.sort_order;
@@ -69,15 +73,16 @@ inline Status validate(const SimulatorScene& scene, const SimulatorConfig& confi
   return validate_detail(scene, detail_choice(config));
 }
 
-/// Where images are.
+/// Memory in which images are returned.
 enum class ImageMemory : std::uint8_t {
+  /// Host memory.
   host,
-  backend,  ///< in the backend's own, a GPU's say; on host backends the same
+  backend,  ///< Memory of the backend, for example of a GPU. Host backends treat it like `host`.
 };
 
 namespace detail {
 
-/// The image with this uuid, or null.
+/// The image of sensor `uuid`, or null.
 template <class Image>
 const Image* find_image(std::span<const Image> images, std::string_view uuid) noexcept {
   for (const Image& i : images) {
@@ -85,7 +90,7 @@ const Image* find_image(std::span<const Image> images, std::string_view uuid) no
   }
   return nullptr;
 }
-/// The same; throws gsnav::Error naming the images that there are.
+/// The image of sensor `uuid`. Throws gsnav::Error, with the names that exist, if there is none.
 template <class Image>
 const Image& image_named(std::span<const Image> images, std::string_view uuid) {
   if (const Image* const found = find_image(images, uuid)) return *found;
@@ -100,72 +105,86 @@ const Image& image_named(std::span<const Image> images, std::string_view uuid) {
 
 }  // namespace detail
 
+/// Settings of a batch of environments.
 struct BatchConfig : SimulatorConfig {
+  /// When an environment that is done begins its next episode.
   AutoReset auto_reset = AutoReset::next_step;
-  /// Times of a scene for which its avatars are held posed at once; more are drawn one after the other.
-  /// Memory grows with it.
+  /// Number of poses of a scene's avatars that are held at once, >= 1. If environments in one scene need
+  /// more distinct times, they are rendered in several passes. Memory grows with it.
   std::size_t pose_slots = 8;
-  /// `backend` leaves images on the GPU that drew them: colour, depth and alpha of pinholes, without
-  /// noise.
+  /// Where images are returned. ImageMemory::backend leaves them on the GPU. It supports RGB, depth and
+  /// alpha of pinhole cameras without noise.
   ImageMemory images = ImageMemory::host;
 };
 
-/// One sensor's image. Valid until the next step or reset of its simulator.
+/// Image of one sensor. Valid until the next reset(), step() or observe() of its simulator.
 struct Observation {
+  /// Sensor name from SensorSpec::uuid.
   std::string_view uuid;
+  /// Kind of the image.
   SensorKind kind = SensorKind::rgb;
+  /// Image size in pixels, and number of channels.
   int height = 0, width = 0, channels = 0;
-  std::span<const float> data;  ///< [H][W][channels], row 0 on top
+  std::span<const float> data;  ///< Shape [height][width][channels], top row first.
 };
 
-/// What the agent perceives after a reset or an action, and what that action did.
+/// Result of a reset or an action: images, goal, and outcome of the action.
 struct Observations : StepInfo {
-  std::span<const Observation> images;  ///< in the sensors' order; empty without rendering
+  std::span<const Observation> images;  ///< Images in the order of the sensors. Empty if nothing was
+                                        ///< rendered.
+  /// Goal as seen from the agent.
   PointGoal point_goal{};
-  double time = 0.0;  ///< seconds on the scene's clock
+  double time = 0.0;  ///< Time on the scene's clock, seconds.
 
-  /// The image of sensor `uuid`, [H][W][channels]. Throws gsnav::Error (aborts under -fno-exceptions)
-  /// where there is no image of that name: it lists the sensors, or says that nothing was rendered.
+  /// The image of sensor `uuid`, shape [height][width][channels].
+  /// Throws gsnav::Error (aborts under -fno-exceptions) if there is no such image. The message lists the
+  /// sensors, or says that nothing was rendered.
   std::span<const float> operator[](std::string_view uuid) const {
     return detail::image_named(images, uuid).data;
   }
-  /// The same with its size, or null where there is no image of that name.
+  /// The image of sensor `uuid` with its size, or null if there is none.
   const Observation* find(std::string_view uuid) const noexcept {
     return detail::find_image(images, uuid);
   }
 };
 
-/// One sensor's images of all environments, [environments][height][width][channels]. Valid until the
-/// next call. interop/dlpack.hpp makes tensors of them, wherever they are.
+/// Images of one sensor for all environments, shape [environments][height][width][channels]. Valid until
+/// the next call of the simulator. interop/dlpack.hpp wraps them as tensors.
 struct BatchObservation {
+  /// Sensor name from SensorSpec::uuid.
   std::string_view uuid;
+  /// Kind of the image.
   SensorKind kind = SensorKind::rgb;
+  /// Number of images.
   std::size_t environments = 0;
+  /// Image size in pixels, and number of channels.
   int height = 0, width = 0, channels = 0;
-  std::span<const float> data;  ///< in host memory; empty where images stay in the backend's
-  const float* on_backend =
-      nullptr;  ///< there (BatchConfig::images), whole when the call that drew them returns
+  std::span<const float> data;  ///< Pixels in host memory. Empty if images stay in the backend's memory.
+  const float* on_backend = nullptr;  ///< Pixels in the backend's memory (BatchConfig::images), or null.
+                                      ///< Rendering has finished when the call returns.
 
-  /// The image, in host memory, of one environment (of a finished one: by its place in
-  /// BatchStep::finished).
+  /// The image of one environment in host memory. In `final_images`, `environment` is the index in
+  /// BatchStep::finished.
   std::span<const float> of(std::size_t environment) const noexcept {
     const std::size_t n = data.size() / environments;
     return data.subspan(environment * n, n);
   }
 };
 
-/// What Gymnasium's VectorEnv returns: observations, rewards, terminated, truncated and what else there
-/// is to know.
+/// Result of a batch step, in the form of Gymnasium's VectorEnv: observations, rewards, terminated,
+/// truncated and further information.
 struct BatchStep : BatchInfo {
-  std::span<const BatchObservation> images;  ///< in the sensors' order; empty without rendering
-  /// The last images of episodes that ended in this step and whose environments were reset in it, a row
-  /// for each of `finished`; only with AutoReset::same_step.
+  std::span<const BatchObservation> images;  ///< Images in the order of the sensors. Empty if nothing
+                                             ///< was rendered.
+  /// Last images of the episodes that ended in this step, one row per entry of `finished`. Filled only
+  /// with AutoReset::same_step.
   std::span<const BatchObservation> final_images;
 
-  /// The images of sensor `uuid`. Throws and finds as Observations does.
+  /// The images of sensor `uuid`. Throws gsnav::Error like Observations::operator[].
   const BatchObservation& operator[](std::string_view uuid) const {
     return detail::image_named(images, uuid);
   }
+  /// The images of sensor `uuid`, or null if there are none.
   const BatchObservation* find(std::string_view uuid) const noexcept {
     return detail::find_image(images, uuid);
   }

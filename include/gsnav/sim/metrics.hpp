@@ -10,17 +10,18 @@
 
 namespace gsnav {
 
-// Symbols: l  shortest path from start to goal along the surface, metres
-//          p  length of the path that the agent took, metres
-//          g  what is left to the goal at the end along the surface (DTG), metres
+// Symbols used below, all in metres:
+// l  length of the shortest path from start to goal along the surface
+// p  length of the path that the agent took
+// g  remaining distance to the goal along the surface at the end (DTG)
 
-/// S = 1 where stop was called and g < threshold (strictly), else 0.
+/// Success of an episode: true if `stop` was called and g < threshold (strictly).
 inline bool episode_success(bool stop_called, double g, double threshold) noexcept {
   return stop_called && g < threshold;
 }
 
 namespace detail {
-/// l / max(l, p); with l = 0: 1 for an agent that stayed, else 0. An unreachable goal gives 0.
+/// Ratio l / max(l, p). If l = 0: 1 for an agent that did not move, else 0. An unreachable goal gives 0.
 inline double path_efficiency(double l, double p) noexcept {
   if (!is_finite(l) || !(l >= 0)) return 0.0;
   if (l == 0) return p == 0 ? 1.0 : 0.0;
@@ -28,91 +29,100 @@ inline double path_efficiency(double l, double p) noexcept {
 }
 }  // namespace detail
 
-/// SPL = S l / max(l, p). With l = 0: S where p = 0, else 0.
+/// SPL: S l / max(l, p), where S is 1 for success, else 0. If l = 0: S if p = 0, else 0.
 inline double success_weighted_by_path_length(bool success, double l, double p) noexcept {
   return success ? detail::path_efficiency(l, p) : 0.0;
 }
 
-/// SoftSPL = max(0, 1 - g / l) l / max(l, p). With l = 0 the progress term is 1 where g = 0, else 0.
+/// SoftSPL: max(0, 1 - g / l) l / max(l, p). If l = 0, the first factor is 1 if g = 0, else 0.
 inline double soft_success_weighted_by_path_length(double g, double l, double p) noexcept {
   const double progress = l > 0 ? max(0.0, 1.0 - g / l) : (g == 0 ? 1.0 : 0.0);
   const double soft = progress * detail::path_efficiency(l, p);
   return is_finite(soft) ? soft : 0.0;
 }
 
-/// STL = S T0 / max(T0, T) with T = steps and T0 = l / forward_step, both in actions: the time of
-/// whoever goes the shortest way at full speed without turning. With l = 0: S where no step was taken,
+/// STL: S T0 / max(T0, T), with T = steps and T0 = l / forward_step in actions. T0 is the time of an
+/// agent that follows the shortest path at full speed without turning. If l = 0: S if no step was taken,
 /// else 0.
 inline double success_weighted_by_time(bool success, double l, double forward_step,
                                        std::size_t steps) noexcept {
   return success ? detail::path_efficiency(l / forward_step, static_cast<double>(steps)) : 0.0;
 }
 
-/// Within this distance of a person the agent intrudes, metres.
+/// Distance to a person below which the agent intrudes, metres.
 inline constexpr double kPersonalSpace = 1.0;
 
-/// clamp(1 - d / 1 m, 0, 1): how far the agent is inside a person's space. d: metres from the agent's
-/// surface to the avatar's nearest capsule surface; negative in overlap, infinity with nobody there.
+/// Depth of the agent inside a person's space: clamp(1 - d / 1 m, 0, 1).
+/// @param d Distance in metres from the agent's surface to the nearest capsule of the avatar. Negative
+/// if they overlap, infinity if there are no avatars.
 inline double intrusion(double d) noexcept {
   return d < kPersonalSpace ? clamp(1.0 - d / kPersonalSpace, 0.0, 1.0) : 0.0;
 }
 
-/// A person's space is kept where the agent's surface is at least this far from the avatar's, metres.
+/// Smallest distance between the surfaces of agent and person that respects personal space, metres.
 ///
-/// Personal Space Compliance of the SocialNav benchmark (Gong et al. 2024, "From Cognition to
-/// Precognition", Falcon) counts the steps in which no person is nearer than 1.0 m, between the centres
-/// of bodies of 0.25 m (robot) and 0.3 m (person). Here distances are between surfaces, so that agents
-/// and people of any size compare: 1.0 - 0.25 - 0.3 = 0.45 m.
+/// The Personal Space Compliance of the SocialNav benchmark (Gong et al. 2024, "From Cognition to
+/// Precognition", Falcon) counts the steps in which no person is nearer than 1.0 m. It measures between
+/// the centres of bodies with radii of 0.25 m (robot) and 0.3 m (person). gsnav measures between
+/// surfaces, so that agents and people of any size can be compared: 1.0 - 0.25 - 0.3 = 0.45 m.
 inline constexpr double kCompliantGap = 0.45;
 
-/// Whether the agent keeps out of a person's space (kCompliantGap). d as of `intrusion`.
+/// Returns true if the distance d respects personal space (kCompliantGap). See intrusion() for d.
 inline bool keeps_personal_space(double d) noexcept { return d >= kCompliantGap; }
 
-/// What one action did, for the metrics. `stop` is no step.
+/// Input of the metrics for one action. `stop` does not count as an action.
 struct StepRecord {
-  double moved = 0.0;            ///< metres from the position before to the one after, straight
-  bool wall_collision = false;   ///< an edge of the NavMesh stopped or turned the move
-  bool capsule_blocked = false;  ///< an avatar stopped or turned the move
-  bool avatar_contact = false;   ///< bodies touched during the step, whoever's fault; a move that was
-                                 ///< stopped before they did is `capsule_blocked` only
-  /// Smallest distance during the step to each avatar that is active, metres; empty with none.
+  double moved = 0.0;            ///< Straight distance between the positions before and after the
+                                 ///< action, metres.
+  bool wall_collision = false;   ///< An edge of the NavMesh stopped or deflected the move.
+  bool capsule_blocked = false;  ///< An avatar stopped or deflected the move.
+  bool avatar_contact = false;   ///< Agent and avatar touched during the step, whichever of them moved.
+                                 ///< If the move was stopped before they touched, only `capsule_blocked`
+                                 ///< is set.
+  /// Smallest distance to each active avatar during the step, metres. Empty if there are none.
   std::span<const double> avatar_distances{};
 };
 
-/// The outcome of one episode.
+/// Metrics of one episode.
 struct EpisodeMetrics {
-  bool success = false;
-  double spl = 0.0;
-  double soft_spl = 0.0;
-  double stl = 0.0;                         ///< success weighted by time
-  double distance_to_goal = 0.0;            ///< geodesic, metres; infinity where cut off
-  double euclidean_distance_to_goal = 0.0;  ///< straight, metres
-  double collision_rate = 0.0;      ///< CR: steps with avatar contact or a capsule-blocked move / steps
-  double psi = 0.0;                 ///< mean intrusion over steps and avatars active then; 0 with none
-  double psc = 1.0;                 ///< steps in which the agent kept out of everybody's space / steps,
-                                    ///< in [0, 1]; 1 with nobody there or no step
-  bool human_collision = false;     ///< H-Coll: a person was touched in some step, whoever's fault
-  bool human_blocked = false;       ///< a person stopped or turned a move in some step
-  std::size_t collisions = 0;       ///< steps that ran into a wall
-  std::size_t collision_steps = 0;  ///< steps counted by CR
-  std::size_t steps = 0;            ///< actions, stop excluded
-  double start_distance = 0.0;      ///< l, metres
-  double path_length = 0.0;         ///< p, metres
-  double min_clearance = std::numeric_limits<double>::infinity();  ///< to any avatar, metres
-  bool stop_called = false;
+  bool success = false;           ///< `stop` was called within the success distance of the goal.
+  double spl = 0.0;               ///< Success weighted by path length, 0 to 1.
+  double soft_spl = 0.0;          ///< SPL with progress in place of success, 0 to 1.
+  double stl = 0.0;               ///< Success weighted by time, 0 to 1.
+  double distance_to_goal = 0.0;  ///< Remaining distance along the surface, metres. Infinity
+                                  ///< if the goal cannot be reached.
+  double euclidean_distance_to_goal = 0.0;  ///< Remaining straight distance, metres.
+  double collision_rate = 0.0;      ///< CR: fraction of steps with an avatar contact or a move blocked
+                                    ///< by an avatar.
+  double psi = 0.0;                 ///< Mean intrusion over all steps and the avatars active in them. 0
+                                    ///< if there are none.
+  double psc = 1.0;                 ///< Fraction of steps that respected the personal space of everyone.
+                                    ///< 1 if there were no avatars or no steps.
+  bool human_collision = false;     ///< H-Coll: a person was touched in some step, whichever side moved.
+  bool human_blocked = false;       ///< A person stopped or deflected a move in some step.
+  std::size_t collisions = 0;       ///< Number of steps that ran into a wall.
+  std::size_t collision_steps = 0;  ///< Number of steps that CR counts.
+  std::size_t steps = 0;            ///< Number of actions, without `stop`.
+  double start_distance = 0.0;      ///< Length of the shortest path from the start (l), metres.
+  double path_length = 0.0;         ///< Length of the path taken (p), metres.
+  double min_clearance = std::numeric_limits<double>::infinity();  ///< Smallest distance to any avatar,
+                                                                   ///< metres.
+  bool stop_called = false;                                        ///< The agent called `stop`.
 };
 
-/// Collects the steps of one episode.
+/// Accumulates the steps of one episode and computes its metrics.
 class EpisodeTracker {
  public:
-  /// Begins an episode whose goal is `start_distance` metres away along the surface; an action moves by
-  /// `forward_step` metres at most.
+  /// Begins an episode.
+  /// @param start_distance Distance to the goal along the surface (l), metres.
+  /// @param forward_step Largest distance that one action moves, metres.
   void reset(double start_distance, double forward_step = 0.25) noexcept {
     *this = {};
     m_.start_distance = start_distance;
     forward_step_ = forward_step;
   }
 
+  /// Adds one step.
   void add(const StepRecord& r) noexcept {
     ++m_.steps;
     m_.path_length += r.moved;
@@ -130,7 +140,10 @@ class EpisodeTracker {
     compliant_ += compliant ? 1 : 0;
   }
 
-  /// The metrics if the episode ended here, `geodesic` and `euclidean` metres from the goal.
+  /// Metrics as if the episode ended now.
+  /// @param stop_called True if the agent has called stop.
+  /// @param geodesic, euclidean Remaining distance to the goal, along the surface and straight, metres.
+  /// @param success_distance The episode succeeds if `geodesic` is below it, metres.
   EpisodeMetrics finish(bool stop_called, double geodesic, double euclidean,
                         double success_distance) const noexcept {
     EpisodeMetrics m = m_;
@@ -156,32 +169,33 @@ class EpisodeTracker {
   std::size_t compliant_ = 0;
 };
 
-/// Means over episodes, each episode counting once.
+/// Mean metrics over episodes. Every episode has the same weight.
 struct MetricsSummary {
-  std::size_t episodes = 0;
-  double success_rate = 0.0;  ///< SR
-  double spl = 0.0;
-  double soft_spl = 0.0;
-  double stl = 0.0;
-  double distance_to_goal = 0.0;  ///< DTG, geodesic, metres
-  double euclidean_distance_to_goal = 0.0;
-  double collision_rate = 0.0;  ///< CR
-  double psi = 0.0;
-  double psc = 0.0;
-  double collisions = 0.0;  ///< wall hits an episode
-  /// H-Coll of the SocialNav benchmark (Falcon): episodes in which a person was touched / episodes, in
-  /// [0, 1]. There nothing stops a robot short of a person; here the step filter does, and what it
-  /// stopped is counted by the next two.
+  std::size_t episodes = 0;                 ///< Number of episodes.
+  double success_rate = 0.0;                ///< SR: fraction of episodes that succeeded.
+  double spl = 0.0;                         ///< Mean SPL.
+  double soft_spl = 0.0;                    ///< Mean SoftSPL.
+  double stl = 0.0;                         ///< Mean STL.
+  double distance_to_goal = 0.0;            ///< DTG: mean remaining distance along the surface, metres.
+  double euclidean_distance_to_goal = 0.0;  ///< Mean remaining straight distance, metres.
+  double collision_rate = 0.0;  ///< CR: mean fraction of steps with an avatar contact or block.
+  double psi = 0.0;             ///< Mean PSI, see EpisodeMetrics::psi.
+  double psc = 0.0;             ///< Mean PSC, see EpisodeMetrics::psc.
+  double collisions = 0.0;      ///< Mean number of steps that ran into a wall, per episode.
+  /// H-Coll of the SocialNav benchmark (Falcon): fraction of episodes in which a person was touched. In
+  /// that benchmark nothing stops the robot before it touches a person. In gsnav the motion stops at
+  /// contact; the next two fields count such stops.
   double human_collision_episode_rate = 0.0;
-  double human_blocked_episode_rate = 0.0;  ///< episodes in which a person stopped a move / episodes
+  double human_blocked_episode_rate = 0.0;  ///< Fraction of episodes in which a person stopped a move.
   double disturbed_episode_rate =
-      0.0;  ///< episodes with any step counted by CR / episodes: either of both
-  double steps = 0.0;
-  double path_length = 0.0;
-  double min_clearance = std::numeric_limits<double>::infinity();  ///< the least of all episodes
+      0.0;  ///< Fraction of episodes with at least one step that CR counts: a contact or a stop.
+  double steps = 0.0;        ///< Mean number of actions.
+  double path_length = 0.0;  ///< Mean length of the path taken, metres.
+  double min_clearance = std::numeric_limits<double>::infinity();  ///< Smallest distance to any avatar
+                                                                   ///< over all episodes, metres.
 };
 
-/// Means of `episodes`; zeros for none.
+/// Means over `episodes`. All values are 0 if there are none.
 inline MetricsSummary summarize(std::span<const EpisodeMetrics> episodes) noexcept {
   MetricsSummary s;
   s.episodes = episodes.size();
@@ -214,7 +228,7 @@ inline MetricsSummary summarize(std::span<const EpisodeMetrics> episodes) noexce
   return s;
 }
 
-/// Calls f(name, value) for each metric of an episode, by the names that files have.
+/// Calls f(name, value) for each metric of an episode. Files use the same names.
 template <class M, class F>
 requires std::is_same_v<std::remove_const_t<M>, EpisodeMetrics>
 void for_each_metric(M& m, const F& f) {
@@ -227,7 +241,7 @@ void for_each_metric(M& m, const F& f) {
   f("start_distance", m.start_distance), f("path_length", m.path_length);
   f("min_clearance", m.min_clearance), f("stop_called", m.stop_called);
 }
-/// The same for the means over episodes.
+/// Calls f(name, value) for each metric of a summary. Files use the same names.
 template <class M, class F>
 requires std::is_same_v<std::remove_const_t<M>, MetricsSummary>
 void for_each_metric(M& s, const F& f) {

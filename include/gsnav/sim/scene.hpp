@@ -20,57 +20,64 @@ struct PackedCloud;
 struct SceneBands;
 struct VisibleSets;
 
-/// A cloud, as floats or packed, and how it stands in the world.
+/// Static Gaussians of a scene, as floats or packed, with their transform. Set either `cloud` or
+/// `packed`.
 struct SceneAsset {
-  std::shared_ptr<const GaussianCloud> cloud;  ///< null where `packed` is set
-  Similarity world_from_asset{};
-  /// Its levels of detail (build_lod, io::cached_lod); read where SimulatorConfig::lod is set.
+  std::shared_ptr<const GaussianCloud> cloud;  ///< Gaussians stored as floats. Null if `packed` is set.
+  Similarity world_from_asset{};               ///< Transform from the asset's frame to the world.
+  /// Level-of-detail tree (build_lod, io::cached_lod). Required if SimulatorConfig::lod is set.
   std::shared_ptr<const LodTree> lod{};
-  /// What is seen of it from where agents go (build_visible_sets, io::cached_visible_sets); read where
-  /// SimulatorConfig::visible_sets is set.
+  /// Gaussians visible from each cell of space (build_visible_sets, io::cached_visible_sets). Required
+  /// if SimulatorConfig::visible_sets is set.
   std::shared_ptr<const VisibleSets> visible{};
-  /// In place of `cloud`. It has no levels of detail and no visible sets.
+  /// Gaussians stored in packed form, in place of `cloud`. They have no levels of detail and no visible
+  /// sets.
   std::shared_ptr<const PackedCloud> packed{};
-  /// SH bands that its chunks need (scene_bands), the others are not read; null: all are. Levels of
-  /// detail read all.
+  /// SH bands to read per chunk (scene_bands). Null: all. Levels of detail always read all bands.
   std::shared_ptr<const SceneBands> bands{};
 
-  /// Of the cloud that is set; one of `cloud` and `packed` must be.
+  /// Sort order of the cloud that is set. @pre `cloud` or `packed` is set.
   SortOrder sort_order() const noexcept;
 };
 
-/// A surface of triangles and how it stands in the world; seen among the Gaussians
-/// (docs/reference/composition.md).
+/// Triangle mesh in a scene, composited with the Gaussians (docs/reference/composition.md).
 struct SceneMesh {
-  std::shared_ptr<const PlacedMeshes> surface;
-  Similarity world_from_surface{};
+  std::shared_ptr<const PlacedMeshes> surface;  ///< Triangles and their materials.
+  Similarity world_from_surface{};              ///< Transform from the mesh's frame to the world.
 };
 
-/// What a simulator runs in. Shared, never changed: many simulators may use one.
+/// Everything that a simulator runs in. It does not change, so simulators can share it.
 struct SimulatorScene {
-  std::vector<SceneAsset> assets;
-  std::vector<SceneMesh> meshes;
-  MeshLight light{};  ///< of the meshes
-  std::shared_ptr<const NavMesh> navmesh;
-  std::vector<AvatarActor> avatars;
+  std::vector<SceneAsset> assets;          ///< Static Gaussians.
+  std::vector<SceneMesh> meshes;           ///< Triangle meshes.
+  MeshLight light{};                       ///< Light on the meshes.
+  std::shared_ptr<const NavMesh> navmesh;  ///< Surface that agents walk on.
+  std::vector<AvatarActor> avatars;        ///< People with their motions and trajectories.
 };
 
-/// What of a scene's assets is drawn.
+/// Which part of a scene's assets is drawn.
 struct DetailChoice {
-  std::optional<LodChoice> lod{};  ///< by levels of detail; none: whole
-  bool visible_sets = false;       ///< only what is seen from where the camera is
+  std::optional<LodChoice> lod{};  ///< Level of detail. Empty: the assets as they are.
+  bool visible_sets = false;       ///< Draw only the Gaussians that are visible from the camera's cell.
 };
 
-/// invalid_argument, naming the part, where something is missing.
+/// Checks that a scene is complete enough to simulate.
+/// @return invalid_argument, with the part that is missing.
 Status validate(const SimulatorScene& scene);
-/// The same of what is drawn: a NavMesh may be missing.
+/// Checks that a scene is complete enough to render. A NavMesh is not required.
+/// @return invalid_argument, with the part that is missing.
 Status validate_assets(const SimulatorScene& scene);
 
-/// Whether a scene can be drawn so. invalid_argument, naming what is missing or out of range.
+/// Checks that a scene has the data that `choice` needs.
+/// @return invalid_argument, with the part that is missing or out of range.
 Status validate_detail(const SimulatorScene& scene, const DetailChoice& choice);
 
-/// Appends how the scene's avatars move over [t0, t1], numbered as they stand in the scene. `before`:
-/// what this gave for an interval that ended at t0, or null; with it the same comes in half the time.
+/// Appends the motion of the scene's avatars over [t0, t1], numbered in scene order.
+/// @param scene Scene with the avatars.
+/// @param t0, t1 Interval on the scene's clock, seconds.
+/// @param out Receives the moving capsules.
+/// @param before The capsules of an interval that ended at t0, or null. They halve the time and do not
+/// change the result.
 void append_bodies(const SimulatorScene& scene, double t0, double t1, std::vector<DynamicCapsule>& out,
                    const CapsuleSet* before = nullptr);
 

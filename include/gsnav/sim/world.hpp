@@ -16,128 +16,153 @@
 
 namespace gsnav {
 
-/// Where the agent stands and looks. World frame: metres, Y up; forward is -Z turned by `yaw`
-/// (radians about +Y, positive to the left).
+/// Position and orientation of the agent. Forward is -Z turned by `yaw`.
 struct AgentPose {
-  Vec3d position{};
-  double yaw = 0.0;
-  PolyId poly = kNoPoly;
-  double pitch = 0.0;  ///< of the sensors, radians, positive upwards; the body stays upright
+  Vec3d position{};       ///< World position, metres, Y up.
+  double yaw = 0.0;       ///< Turn about +Y, radians, positive to the left.
+  PolyId poly = kNoPoly;  ///< Polygon that the agent stands on.
+  double pitch = 0.0;     ///< Tilt of the sensors, radians, positive upwards. The body stays upright.
 
+  /// Orientation of the body in the world, without pitch.
   Quatd rotation() const noexcept { return yaw_rotation(yaw); }
+  /// Unit vector that the body faces, on the ground plane.
   Vec3d forward() const noexcept { return {-std::sin(yaw), 0.0, -std::cos(yaw)}; }
 };
 
-/// What one action did.
+/// Outcome of one action.
 struct StepInfo {
-  bool collided = false;  ///< a wall or an avatar stopped or turned the move
-  bool wall_collision = false;
-  bool capsule_blocked = false;  ///< an avatar stopped or turned the move
-  bool avatar_contact = false;   ///< counted by CR: an avatar was touched or stopped the move
-  bool avatar_touched = false;   ///< counted by H-Coll: bodies touched, whoever's fault
-  bool pushed_into = false;      ///< an avatar walked into the agent where it stood
-  double moved = 0.0;            ///< metres, straight
-  /// Smallest distance to any avatar during the step, metres; infinity with none.
+  bool collided = false;         ///< A wall or an avatar stopped or deflected the move.
+  bool wall_collision = false;   ///< A wall stopped or deflected the move.
+  bool capsule_blocked = false;  ///< An avatar stopped or deflected the move.
+  bool avatar_contact = false;   ///< Counted by CR: an avatar was touched, or it stopped the move.
+  bool avatar_touched = false;   ///< Counted by H-Coll: agent and avatar touched, whichever of them
+                                 ///< moved.
+  bool pushed_into = false;      ///< An avatar walked into the agent.
+  double moved = 0.0;            ///< Straight distance between the positions before and after, metres.
+  /// Smallest distance to any avatar during the step, metres. Infinity if there are none.
   double avatar_clearance = std::numeric_limits<double>::infinity();
-  double reward = 0.0;  ///< see RewardConfig
+  double reward = 0.0;  ///< Reward of the action, see RewardConfig.
 };
 
-/// The goal as the agent senses it.
+/// Goal in the coordinates of the agent.
 struct PointGoal {
-  double distance = 0.0;  ///< straight, on the ground plane, metres
-  double angle = 0.0;     ///< radians to the left of forward, in (-pi, pi]
+  double distance = 0.0;  ///< Straight distance on the ground plane, metres.
+  double angle = 0.0;     ///< Direction, radians to the left of forward, in (-pi, pi].
 };
 
-/// All that changes while a World runs. A copy is a place to come back to.
+/// Complete state of a World. Copy it to save a checkpoint.
 struct WorldState {
-  PointNavEpisode episode;
-  AgentPose agent;
-  NavPoint goal;  ///< the episode's, on the surface
-  StepInfo last;
-  EpisodeTracker tracker;
-  double time = 0.0, start_time = 0.0;                                ///< seconds on the scene's clock
-  double distance_to_goal = std::numeric_limits<double>::infinity();  ///< along the surface, metres
-  int steps = 0;
+  PointNavEpisode episode;  ///< The episode.
+  AgentPose agent;          ///< Pose of the agent.
+  NavPoint goal;            ///< Goal of the episode, snapped to the surface.
+  StepInfo last;            ///< Result of the last action.
+  EpisodeTracker tracker;   ///< Metrics accumulated so far.
+  /// Current time, and time at which the episode began, seconds on the scene's clock.
+  double time = 0.0, start_time = 0.0;
+  double distance_to_goal = std::numeric_limits<double>::infinity();  ///< Distance to the goal along the
+                                                                      ///< surface, metres.
+  int steps = 0;  ///< Number of actions so far, without `stop`.
+  /// `done`: the episode has ended. `stop_called`: the agent ended it. `running`: an episode was
+  /// started.
   bool done = true, stop_called = false, running = false;
 };
 
-/// The task without pictures: an agent on a NavMesh among moving bodies, one episode after the other.
-/// No member depends on wall-clock time or on an earlier episode: the same calls give the same bits.
+/// Navigation task without rendering: an agent on a NavMesh among moving bodies. The same sequence of
+/// calls returns the same bits, whatever the wall-clock time and the earlier episodes.
 class World {
  public:
-  /// Appends the bodies' motion over [t0, t1] (seconds of the scene's clock), numbering the avatars.
+  /// Function that appends the motion of bodies over [t0, t1] (seconds on the scene's clock) and numbers
+  /// the avatars.
   using BodySource = std::function<void(double t0, double t1, std::vector<DynamicCapsule>& out)>;
 
-  /// Errors: invalid_argument (names the field).
+  /// Creates a world. It has no episode until reset().
+  /// @return invalid_argument, with the field at fault.
   static Result<World> create(std::shared_ptr<const NavMesh> navmesh, const TaskConfig& config,
                               BodySource bodies = {});
 
-  /// Puts the agent at the start and the clock to the episode's start time. Errors: nothing_navigable
-  /// (names the episode) where the start or goal is off the NavMesh or out of reach; what
-  /// CapsuleSet::create reports.
+  /// Places the agent at the start of an episode and sets the clock to its start time.
+  /// @return nothing_navigable, with the episode, if the start or goal is off the NavMesh or the goal
+  /// cannot be reached; invalid_argument if a value is not finite; the errors of CapsuleSet::create.
   Status reset(const PointNavEpisode& episode);
 
-  /// Acts for one control period; `stop` ends the episode and takes no time. Errors: invalid_argument
-  /// before reset or after the end; what CapsuleSet::create reports.
+  /// Performs one action for one control period. Action::stop ends the episode and takes no time.
+  /// @return invalid_argument before reset() or after the end; the errors of CapsuleSet::create.
   Result<StepInfo> step(Action action);
-  /// The same by velocities: the arc that they describe, its chord taken in each substep.
+  /// Moves at a commanded velocity for one control period. The agent follows the chord of its arc in
+  /// each substep.
+  /// @return the errors of step(Action).
   Result<StepInfo> step(const VelocityCommand& command);
-  /// The same among bodies that the caller made for all who share them: [substeps], set k over
-  /// [tick(k), tick(k + 1)]. Errors also: invalid_argument for another number of sets.
+  /// Performs one action among bodies that the caller provides, so that several worlds can share them.
+  /// @param action Action to perform.
+  /// @param bodies Shape [substeps]. Element k covers [tick(k), tick(k + 1)].
+  /// @return the errors of step(Action); invalid_argument for a wrong number of sets.
   Result<StepInfo> step(Action action, std::span<const CapsuleSet* const> bodies);
+  /// Moves at a commanded velocity among bodies that the caller provides. See the overload for Action.
   Result<StepInfo> step(const VelocityCommand& command, std::span<const CapsuleSet* const> bodies);
 
+  /// True if the episode has ended, or if there is none yet.
   bool done() const noexcept { return s_.done; }
-  /// The episode is over because stop was called; else, where done, because it was cut off.
+  /// True if the agent ended the episode by Action::stop. False, if done(), means that max_steps was
+  /// reached.
   bool stop_called() const noexcept { return s_.stop_called; }
-  /// Metrics as if the episode ended now; final once done().
+  /// Metrics as if the episode ended now. They are final once done().
   EpisodeMetrics metrics() const;
-  /// Metres to the goal along the surface; infinity where cut off.
+  /// Distance to the goal along the surface, metres. Infinity if the goal cannot be reached.
   double distance_to_goal() const noexcept { return s_.distance_to_goal; }
+  /// Goal as seen from the agent.
   PointGoal point_goal() const noexcept;
 
+  /// Current time on the scene's clock, seconds.
   double time() const noexcept { return s_.time; }
-  /// Where substep k of the next action begins, seconds; k = substeps: where the action ends.
+  /// Time at which substep k of the next action begins, seconds. tick(substeps) is the end of the
+  /// action.
   double tick(int k) const noexcept;
+  /// Current pose of the agent.
   const AgentPose& agent() const noexcept { return s_.agent; }
+  /// Outcome of the last action.
   const StepInfo& last_step() const noexcept { return s_.last; }
+  /// Current episode.
   const PointNavEpisode& episode() const noexcept { return s_.episode; }
+  /// Settings of the task.
   const TaskConfig& config() const noexcept { return config_; }
+  /// The surface that the agent walks on. @pre not moved_from().
   const NavMesh& navmesh() const noexcept { return *navmesh_; }
 
-  /// What is needed to come back here: set_state() makes everything that follows happen again, bit for
-  /// bit.
+  /// Complete state. After set_state() with it, the same calls return the same bits again.
   const WorldState& state() const noexcept { return s_; }
-  /// `state` comes from a World of the same NavMesh, settings and bodies. It is taken as it is, never
-  /// snapped: of a running episode the agent must be within 0.1 m of the surface beside it and 0.5 m
-  /// above or below. Errors, which change nothing: invalid_argument, naming the field (a time, place or
-  /// angle that is not finite, steps below 0, a polygon that is none of this NavMesh); nothing_navigable
-  /// (the agent is off the NavMesh).
+  /// Restores a state taken from a World with the same NavMesh, settings and bodies. A state that is
+  /// rejected changes nothing. The agent is not snapped: in a running episode it must lie within 0.1 m
+  /// horizontally and 0.5 m vertically of the surface.
+  /// @return invalid_argument, with the field, for a value that is not finite, negative `steps`, or a
+  /// polygon of another NavMesh; nothing_navigable if the agent is off the NavMesh.
   Status set_state(const WorldState& state);
-  /// Whether it was moved from: all that can fail then returns invalid_argument, and navmesh() must not
-  /// be asked.
+  /// True if the World was moved from. Calls that can fail then return invalid_argument; navmesh() must
+  /// not be called.
   bool moved_from() const noexcept { return navmesh_ == nullptr; }
-  /// Puts the agent somewhere else on the surface; no time passes and nothing is counted. Errors:
-  /// nothing_navigable off the NavMesh or on an island without the goal; invalid_argument (not finite;
-  /// no episode is running). Metres in the world, yaw and pitch in radians.
+  /// Moves the agent to another position of the surface. No time passes and no metric changes.
+  /// @param position World position, metres. It is snapped.
+  /// @param yaw, pitch Radians. Pitch is limited to [-pi/2, pi/2].
+  /// @return nothing_navigable if the position is off the NavMesh or the goal cannot be reached from it;
+  /// invalid_argument if a value is not finite or no episode is running.
   Status set_agent(const Vec3d& position, double yaw, double pitch = 0.0);
 
-  /// The bodies over [t0, t1], seconds on the scene's clock. A policy may look ahead with it; avatars
-  /// are scripted, so this is what will happen. Errors: what CapsuleSet::create reports.
+  /// Bodies over [t0, t1], seconds on the scene's clock. Avatars are scripted, so a policy can use this
+  /// to look ahead.
+  /// @return the errors of CapsuleSet::create.
   Result<CapsuleSet> bodies(double t0, double t1) const;
-  /// Query 1: how far the agent is from the nearest body now, metres. Errors: what CapsuleSet::create
-  /// reports.
+  /// Current distance from the agent to the nearest body.
+  /// @return the errors of CapsuleSet::create.
   Result<Clearance> clearance() const;
-  /// Query 2: what the next action would do, without doing it: the code of step() on the same bodies.
-  /// Errors: as step.
+  /// Predicts what step(action) would return, without changing the world.
+  /// @return the errors of step().
   Result<StepInfo> probe(Action action) const;
-  /// The agent as nav::step takes it.
+  /// The agent in the form that gsnav::step takes.
   AgentState agent_state() const noexcept {
     return {s_.agent.position, config_.agent_radius, config_.agent_height, s_.agent.poly};
   }
 
  private:
-  struct Motion;  // what an action asks of the body in a substep
+  struct Motion;  // Motion of the body in one substep.
   World(std::shared_ptr<const NavMesh> navmesh, const TaskConfig& config, BodySource bodies)
       : navmesh_(std::move(navmesh)), config_(config), source_(std::move(bodies)) {}
 
@@ -160,7 +185,7 @@ class World {
   TaskConfig config_;
   BodySource source_;
   WorldState s_;
-  // Least distance to each avatar during the present action, by the avatar's number.
+  // Smallest distance to each avatar during the current action, sorted by avatar number.
   std::vector<double> approach_, distances_;
   std::vector<std::uint32_t> avatars_;
 };

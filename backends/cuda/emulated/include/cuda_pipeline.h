@@ -3,7 +3,7 @@
 
 #include <cstring>
 
-// Copies into shared memory beside other work: here they are done when they are waited for, not before.
+// Asynchronous copies into shared memory. Here they happen when they are waited for, not before.
 
 namespace gsnav::emulated {
 void copy_later(void* to, const void* from, std::size_t bytes);

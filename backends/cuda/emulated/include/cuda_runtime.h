@@ -6,13 +6,15 @@
 
 namespace gsnav::emulated {
 
-/// A launch: `from` has what stands between <<< and >>>. Arguments are copied before it returns.
+/// A kernel launch. The constructor takes the arguments between <<< and >>>. Kernel arguments are copied
+/// before the call returns.
 class Launcher {
  public:
   Launcher(const char* name, dim3 grid, dim3 block, std::size_t shared = 0, cudaStream_t stream = nullptr)
       : name_(name), launch_{grid, block, shared, stream} {}
 
-  /// `kernel`: calls it with what it is given, so that its parameters may be deduced from the arguments.
+  /// @param kernel Calls the kernel with its arguments, so that template parameters can be deduced from
+  /// them.
   template <class Kernel, class... P>
   void operator()(Kernel kernel, const P&... arguments) const {
     if (!accepts(launch_)) return;

@@ -5,8 +5,9 @@
 #include <cstdint>
 #include <functional>
 
-// The part of the CUDA runtime that gsnav::cuda and its tests call, done on the host: one device, whose memory is the
-// host's. What a stream is given waits until somebody waits for it, so that who reads too early reads something else.
+// The part of the CUDA runtime that gsnav::cuda and its tests use, on the host. There is one device, and
+// its memory is host memory. Work in a stream is done when something waits for the stream, so that code
+// that reads too early reads wrong values.
 
 enum cudaError_t {
   cudaSuccess = 0,
@@ -96,7 +97,8 @@ namespace gsnav::emulated {
 
 using Work = std::function<void()>;
 
-/// To be done when somebody waits for the stream, or part of what it captures.
+/// Adds work to a stream, or to the graph that it captures. It is done when something waits for the
+/// stream.
 cudaError_t enqueue(cudaStream_t stream, Work work);
 cudaError_t set_attribute(cudaFuncAttribute attribute, int value);
 

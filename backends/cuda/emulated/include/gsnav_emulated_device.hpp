@@ -8,7 +8,7 @@
 #include <type_traits>
 #include <utility>
 
-// Blocks of threads on the host: what device code finds around it when a C++ compiler has compiled it
+// Blocks of threads on the host: the environment of device code that a C++ compiler has compiled
 // (docs/notes/cuda.md).
 
 struct CUstream_st;
@@ -22,32 +22,32 @@ struct dim3 {
 
 namespace gsnav::emulated {
 
-/// What the threads of a warp gave, once all that were to come had come.
+/// Values of the threads of a warp, after all threads of the mask have arrived.
 struct Gathered {
   std::uint64_t value[32];
   int readers;
 };
 
-/// The calling thread's value among those of `mask`. Returns when all of them have called, for the same
-/// `what`. Ends the program, naming kernel, block and thread, where one of them has ended, is not there
-/// or has not named itself.
+/// Waits until all threads of `mask` have called with the same `what`, and returns their values. Ends
+/// the program, with kernel, block and thread, if one of them has ended, does not exist, or is not in
+/// its own mask.
 Gathered& gather(unsigned mask, std::uint64_t value, const char* what);
 
-/// Every thread of the block that has not ended waits for the others; the sum of their numbers.
+/// Barrier of the block for all threads that have not ended. Returns the sum of their numbers.
 int block_barrier(int number);
 
-/// A place where another thread may go on before this one.
+/// A point where another thread may run.
 void interleave();
 
-/// Lets all others go on first, as far as they get. A loop that waits for what another thread writes has
-/// to call it.
+/// Lets all other threads run as far as they can. A loop that waits for a value from another thread must
+/// call it.
 void pause();
 
-/// Of the thread in its warp, and in its block.
+/// Index of the thread in its warp, and in its block.
 unsigned lane();
 unsigned thread_rank();
 
-/// Memory of the block that its launch asked for, on a line of 16 bytes.
+/// Dynamic shared memory of the block, aligned to 16 bytes.
 void* dynamic_shared();
 
 struct Launch {
@@ -56,11 +56,11 @@ struct Launch {
   CUstream_st* stream;
 };
 
-/// Runs every block of a grid, one after the other in an order that GSNAV_EMULATED_SEED decides.
+/// Runs all blocks of a grid, one after the other, in an order determined by GSNAV_EMULATED_SEED.
 void run_grid(const Launch& launch, const char* name, void (*thread)(const void*),
               const void* arguments);
 
-/// False, with the error set that cudaGetLastError returns, where a device would refuse.
+/// Returns false, and sets the error of cudaGetLastError, if a device would reject the launch.
 bool accepts(const Launch& launch);
 
 template <class T>
@@ -77,7 +77,7 @@ T value_of_bits(std::uint64_t bits) {
   return value;
 }
 
-/// Reads of what was gathered, and gives it back.
+/// Access to gathered values. Releases them when destroyed.
 class Reading {
  public:
   Reading(unsigned mask, std::uint64_t value, const char* what) : g_(gather(mask, value, what)) {}
@@ -90,7 +90,7 @@ class Reading {
   Gathered& g_;
 };
 
-/// The value of `from`; bits that nobody gave where that thread is not of the mask.
+/// Value of thread `from`. If that thread is not in the mask, a bit pattern that no thread has set.
 template <class T>
 T shuffled(unsigned mask, const T& value, unsigned from, const char* what) {
   const Reading all(mask, bits_of_value(value), what);
@@ -98,15 +98,15 @@ T shuffled(unsigned mask, const T& value, unsigned from, const char* what) {
                                   : value_of_bits<T>(0xdeadbeefdeadbeefull);
 }
 
-/// Puts changed(*to) in place of *to, which it returns. One thread of the host runs all threads of a
-/// grid, so that nothing comes in between.
+/// Replaces *to by changed(*to) and returns the old value. It is atomic, because one host thread runs
+/// all threads of a grid.
 template <class T, class F>
 T atomically(T* to, F changed) {
   interleave();
   return std::exchange(*to, changed(*to));
 }
 
-/// Bits [begin, end) of a key, by which a sort of the toolkit orders; fewer than 64.
+/// Bits [begin, end) of a key, as used by sorts of the toolkit. Fewer than 64.
 template <class Key>
 std::uint64_t digits_of(Key key, int begin, int end) {
   return std::uint64_t{key} >> begin & ((std::uint64_t{1} << (end - begin)) - 1);

@@ -26,8 +26,8 @@ namespace gsnav {
 namespace cuda {
 class PinnedRing;
 
-/// The cubic of `fast` saves a CPU work; a GPU has an instruction that is faster yet and as good as
-/// degree 5.
+/// Exponential that device kernels use. The cubic of `fast` saves time on a CPU. On a GPU the hardware
+/// instruction is faster, and as accurate as degree 5.
 constexpr Exp2 device_exp2(Exp2 asked) noexcept {
   return asked == Exp2::degree3 ? Exp2::hardware : asked;
 }
@@ -35,73 +35,106 @@ constexpr Exp2 device_exp2(Exp2 asked) noexcept {
 
 class CudaBatchRenderer;
 
-/// Device memory of one GPU.
+/// Memory space of one GPU.
 struct CudaSpace {};
 
-/// Runs on one NVIDIA GPU, by the same kernels as the CPU: keys and footprints, and float32 images of
-/// the profile `exact`, have the CPU's bits; images of `fast` differ by the CPU's exponential
-/// (docs/notes/cuda.md). Work goes to one stream in order. Link gsnav::cuda; the header itself needs no
-/// CUDA.
+/// Backend for one NVIDIA GPU.
+/// It uses the same kernels as the CPU. Keys, footprints, and float32 images of the profile `exact` are
+/// bit-identical to those of the CPU. Images of `fast` differ by the CPU's exponential
+/// (docs/notes/cuda.md). All work goes to one stream, in order. Link gsnav::cuda; the header itself does
+/// not need CUDA.
 ///
-/// A call that the driver refuses is remembered and reported by the next `synchronize()`; what was asked
-/// for after it is not done.
+/// If the driver rejects a call, the next `synchronize()` returns the error. Later calls before that do
+/// nothing.
 class CudaBackend {
  public:
+  /// Memory of the backend's arrays.
   using memory_space = CudaSpace;
-  /// What draws many cameras at once (optional member; gsnav/backends/cuda/batch.hpp, included below).
+  /// Renderer for many cameras at once (optional member of a backend). Defined in
+  /// gsnav/backends/cuda/batch.hpp, which is included below.
   using batch_renderer = CudaBatchRenderer;
 
-  /// GPUs that the driver shows; 0 where there is no driver.
+  /// Number of GPUs that the driver reports. 0 if there is no driver.
   static int device_count() noexcept;
 
-  /// `device`: in [0, device_count()). `stream`: the caller's cudaStream_t, or null for one of its own.
-  /// Throws gsnav::Error (backend_failure, invalid_argument) naming the device and what the driver said.
+  /// Opens a GPU. Throws gsnav::Error (backend_failure or invalid_argument) with the device and the
+  /// driver's message.
+  /// @param device Index in [0, device_count()).
+  /// @param stream The caller's cudaStream_t, or null for a stream of its own.
   explicit CudaBackend(int device = 0, CUstream_st* stream = nullptr);
+  /// Waits for the work and frees the resources.
   ~CudaBackend();
   CudaBackend(const CudaBackend&) = delete;
   CudaBackend& operator=(const CudaBackend&) = delete;
 
+  /// Allocates device memory. Returns null if there is not enough.
   void* allocate(std::size_t bytes, std::size_t align);
+  /// Frees device memory.
   void deallocate(void* p, std::size_t bytes) noexcept;
-  /// Page-locked host memory; null where there is none.
+  /// Allocates page-locked host memory. Returns null if there is none.
   static void* allocate_host(std::size_t bytes) noexcept;
+  /// Frees memory from allocate_host().
   static void deallocate_host(void* p) noexcept;
-  /// Copies to the device of up to 1 MiB never wait for the stream, and what is copied may change at
-  /// once. Others return early only from and to pinned memory.
+  /// Copies between host and device, in stream order. A copy of up to 1 MiB to the device never waits
+  /// for the stream, and its source may change as soon as the call returns. Other copies return early
+  /// only for pinned host memory.
   void copy(void* dst, const void* src, std::size_t bytes, CopyKind kind);
+  /// Sets bytes of device memory, in stream order.
   void fill(void* p, unsigned char byte, std::size_t bytes);
-  /// Defined where nvcc compiles (backends/cuda/device.cuh).
+  /// Calls f(i) for i in [0, n) on the GPU. Defined in backends/cuda/device.cuh, for nvcc only.
   template <class F>
   void parallel_for(std::size_t n, const F& f);
+  /// Waits for the stream.
+  /// @return backend_failure if a call since the last synchronize() failed.
   Status synchronize();
 
+  /// Number of pieces into which callers should divide work.
   std::size_t concurrency() const noexcept { return 1; }
+  /// Index of the GPU.
   int device() const noexcept { return device_; }
+  /// The stream that all work goes to.
   CUstream_st* stream() const noexcept { return stream_; }
-  /// What the consumer's stream is given from now on waits for what this one has been given so far; the
-  /// host does not wait. For handing images over without a copy.
+  /// Makes all later work on the consumer's stream wait for the work submitted here so far. The host
+  /// does not wait. Use it to hand over images without a copy.
   void hand_over_to(CUstream_st* consumer);
+  /// Name of the GPU.
   std::string device_name() const;
 
+  /// Sorts pairs by the lowest `bits` bits of the key, stable. Arrays have n elements in device memory.
+  /// @return true if the result is in the alternate arrays, false if it is in `keys` and `values`.
   bool sort_pairs(std::uint32_t* keys, std::uint32_t* values, std::uint32_t* keys_alt,
                   std::uint32_t* values_alt, std::size_t n, int bits);
 
-  // Stages by kernels of its own (core/stages.hpp).
+  // Stages with their own kernels (core/stages.hpp).
+  /// Projects a set.
   void run(stage::Project, const ViewedSet<float>& args, const ProjectOutputs<float>& out);
+  /// Counts the splats of each tile.
   void run(stage::CountTiles, const BinArgs<float>& args, const NoCull& cull);
+  /// Counts the splats of each tile that are not behind a mesh.
   void run(stage::CountTiles, const BinArgs<float>& args, const MeshCull<float>& cull);
+  /// Writes the splats to the lists of their tiles.
   void run(stage::ScatterTiles, const BinArgs<float>& args, const NoCull& cull);
+  /// Writes the splats that are not behind a mesh to the lists of their tiles.
   void run(stage::ScatterTiles, const BinArgs<float>& args, const MeshCull<float>& cull);
+  /// Blends the splats of each tile.
   void run(stage::Blend, const RasterArgs<float>& args);
+  /// Blends splats and meshes.
   void run(stage::BlendWithMeshes, const RasterArgs<float>& args);
+  /// Rasterizes the triangles of meshes.
   void run(stage::RasterizeMesh, const MeshRasterArgs<float>& args);
+  /// Projects the vertices of meshes.
   void run(stage::Each, std::size_t chunks, const ProjectMeshVertices<float>& k);
+  /// Counts the pieces of triangles in each chunk.
   void run(stage::Each, std::size_t chunks, const CountMeshTriangles<float>& k);
+  /// Computes the index of each chunk's first piece.
   void run(stage::Each, std::size_t one, const ScanMeshTriangles<float>& k);
+  /// Writes the pieces of triangles in each chunk.
   void run(stage::Each, std::size_t chunks, const WriteMeshTriangles<float>& k);
+  /// Shades rows of pixels of meshes.
   void run(stage::Each, std::size_t rows, const ShadeMeshRow<float>& k);
+  /// Skins one avatar.
   void run(stage::Skin, const SkinningArgs<float>& args) { run(stage::SkinAll{}, std::span(&args, 1)); }
-  /// One launch for all of four influences, one for all of eight.
+  /// Skins several avatars: one launch for all with four influences, one for all with eight.
   void run(stage::SkinAll, std::span<const SkinningArgs<float>> avatars);
 
  private:
@@ -113,7 +146,7 @@ class CudaBackend {
   template <class Cull>
   void scatter(const BinArgs<float>& args, const Cull& cull);
 
-  /// Scratch that outlives a call, by use.
+  /// Uses of scratch memory that persists between calls.
   enum Slot {
     kCubTemp,
     kPerSplat,
@@ -143,7 +176,7 @@ class CudaBackend {
 static_assert(Backend<CudaBackend>);
 
 #if !defined(__CUDACC__)
-// Compiled in gsnav::cuda: what a host compiler cannot.
+// Templates compiled into gsnav::cuda, because a host compiler cannot compile them.
 extern template Status render_camera<float, CudaBackend>(CudaBackend&,
                                                          RenderWorkspace<float, CudaBackend>&,
                                                          std::span<const GaussianSet>, const Camera&,

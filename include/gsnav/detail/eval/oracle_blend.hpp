@@ -12,11 +12,12 @@
 #include "gsnav/detail/eval/oracle_config.hpp"
 #include "gsnav/detail/eval/oracle_project.hpp"
 
-// From a sorted list of records to pixels. Every kind, order and level blends by OraclePixel::blend.
+// Blending of sorted records into pixels. Every kind and order of reference blends with
+// OraclePixel::blend.
 
 namespace gsnav::eval::detail {
 
-/// Running state of a pixel, front to back.
+/// State of a pixel during blending from front to back.
 struct OraclePixel {
   double transmittance = 1, weights = 0;
   Vec3d color{};
@@ -24,8 +25,10 @@ struct OraclePixel {
   std::uint32_t blended = 0, last_rank = 0;
   bool closed = false, undecided = false, undecided_depth = false, order_flip = false;
 
-  /// Blends one Gaussian: 2^log2_alpha is its alpha before max_alpha, depth() its depth along the ray,
-  /// `mesh` how far the mesh is.
+  /// Blends one Gaussian.
+  /// @param log2_alpha log2 of its alpha before the limit max_alpha.
+  /// @param mesh Depth of the mesh at this pixel, infinity if there is none.
+  /// @param depth Returns the depth of the Gaussian along the ray.
   template <class Depth>
   void blend(const OracleRules& rules, double log2_alpha, const Vec3d& c, std::uint32_t rank,
              double mesh, const Depth& depth) noexcept {
@@ -58,7 +61,7 @@ struct OraclePixel {
     closed = transmittance < stop;
   }
 
-  /// The mesh at depth z takes what is left.
+  /// Blends an opaque mesh at depth z, which takes the remaining transmittance.
   void close(const OracleRules& rules, double z, const Vec3d& c) noexcept {
     const double weight = transmittance;
     color += c * weight;
@@ -69,7 +72,7 @@ struct OraclePixel {
     transmittance = 0;
   }
 
-  /// A surface that is seen through.
+  /// Blends a transparent fragment of a mesh.
   void pass(const OracleRules& rules, const OracleFragment& f) noexcept {
     const double before = transmittance, weight = f.alpha * before, open = 1 - rules.first_hit_tau;
     const double stop = rules.transmittance_min;
@@ -83,7 +86,7 @@ struct OraclePixel {
       undecided_depth = undecided_depth || abs(transmittance - at) < kUndecidedCrossing;
     undecided = undecided || abs(transmittance - stop) < kUndecidedRelative * stop;
     closed = closed || transmittance < stop;
-    last_rank = 0;  // another list begins
+    last_rank = 0;  // Another list begins.
   }
 
   void write(const OracleRules& rules, OracleFrames& out, std::size_t pixel) const noexcept {
@@ -102,7 +105,7 @@ struct OraclePixel {
   }
 };
 
-/// Columns of row y at which a record is asked.
+/// Columns of a row at which a record is evaluated.
 template <class Model>
 struct OracleSpan {
   int x0, x1;
@@ -110,13 +113,13 @@ struct OracleSpan {
       : x0(s.boxed ? r.box.x0 : s.rect.x0), x1(s.boxed ? r.box.x1 : s.rect.x1) {}
 };
 
-/// Blends a pixel that has fragments: each Gaussian lies before, between or behind them by its depth
-/// along the ray; of those between the same two the order of `list` holds.
+/// Blends a pixel with transparent fragments. Each Gaussian is placed in front of, between or behind
+/// them by its depth along the ray. Gaussians between the same two fragments keep the order of `list`.
 template <class Model>
 void blend_among(const OracleScene<Model>& scene, View<const std::uint32_t> list, int x, int y,
                  const std::vector<OracleFragment>& fragments, OraclePixel& pixel) {
   struct Met {
-    std::size_t behind;  // so many fragments
+    std::size_t behind;  // Number of fragments in front of the Gaussian.
     const OracleRecord<Model>* record;
     double log2_alpha, depth;
   };
@@ -150,12 +153,12 @@ void blend_among(const OracleScene<Model>& scene, View<const std::uint32_t> list
   }
 }
 
-/// Blends one row by the order of `list` (indices of records that reach the row).
+/// Blends one row in the order of `list`, which holds indices of records that reach the row.
 template <class Model>
 void blend_in_order(const OracleScene<Model>& scene, View<const std::uint32_t> list, int y,
                     std::vector<OraclePixel>& pixels) {
   std::size_t open = pixels.size();
-  std::vector<std::uint8_t> apart(pixels.size());  // blended by themselves
+  std::vector<std::uint8_t> apart(pixels.size());  // 1 for pixels that blend_among handles.
   if (scene.mesh != nullptr && !scene.mesh->fragments.empty()) {
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       const int x = scene.rect.x0 + static_cast<int>(i);
@@ -182,7 +185,7 @@ void blend_in_order(const OracleScene<Model>& scene, View<const std::uint32_t> l
   }
 }
 
-/// Blends one row, each pixel by its own order of depths. Columns are taken in strips of at most
+/// Blends one row, each pixel in its own order of depth. Columns are processed in strips of at most
 /// kOracleFragments pairs (or one column), so that memory does not grow with the image.
 template <class Model>
 void blend_per_ray(const OracleScene<Model>& scene, View<const std::uint32_t> list, int y,
@@ -241,7 +244,7 @@ void blend_per_ray(const OracleScene<Model>& scene, View<const std::uint32_t> li
   }
 }
 
-/// Renders row y of the scene into row `to` of `out`. Returns what it took.
+/// Renders row y of the scene into row `to` of `out`. Returns the work that it took.
 template <class Model>
 OracleCounts blend_row(const OracleScene<Model>& scene, View<const std::uint32_t> list, int y,
                        OracleFrames& out, std::size_t to) {
@@ -269,8 +272,8 @@ OracleCounts blend_row(const OracleScene<Model>& scene, View<const std::uint32_t
   return counts;
 }
 
-/// Lists of records by row, for as many rows from y0 on as hold at most 2^24 pairs (or one row): 64 MiB.
-/// A counting scatter in the order of the records, which each row's list keeps.
+/// Lists of records per row, for rows from y0 until 2^24 pairs (64 MiB) or at least one row. Built by a
+/// counting sort that keeps the order of the records.
 template <class Model>
 class RowLists {
  public:
@@ -319,7 +322,7 @@ class RowLists {
   std::vector<std::uint32_t> records_;
 };
 
-/// Renders rows [y0, y1) of the scene into `out`, which holds nothing else.
+/// Renders rows [y0, y1) of the scene into `out`, which is resized to them.
 template <class Model, Backend B>
 void render_rows(B& backend, const OracleScene<Model>& scene, int y0, int y1, OracleFrames& out) {
   out.resize(scene.rect.width(), static_cast<std::size_t>(y1 - y0));

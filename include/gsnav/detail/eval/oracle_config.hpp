@@ -14,86 +14,96 @@
 
 namespace gsnav::eval {
 
-/// What the image of a set of Gaussians is taken to be. An error figure names the kind it is against.
+/// Definition of the reference image. Quote it with every error figure.
 enum class OracleKind : std::uint8_t {
-  contract,     ///< docs/reference/image_contract.md, "The image"
-  untruncated,  ///< the contract without alpha_min and transmittance_min; max_alpha stays
-  ray,          ///< maximum response along each pixel's ray: the model error of EWA. Near rules stay
+  contract,     ///< The image contract: docs/reference/image_contract.md, "The image".
+  untruncated,  ///< The contract without alpha_min and transmittance_min. max_alpha applies.
+  ray,          ///< Maximum response along each pixel's ray. It shows the error of the EWA
+                ///< approximation. The contract's near rules apply.
 };
 
-/// What decides which Gaussian is in front. Ties go by stable id (set, row).
+/// Order in which Gaussians are blended. Equal values are ordered by stable id (set, row).
 enum class OracleOrder : std::uint8_t {
-  own,          ///< the kind's: float32_key, but per_ray for OracleKind::ray
-  float32_key,  ///< the contract's: the very key that renderers sort by
-  float64,      ///< the same quantity in float64
-  per_ray,      ///< at each pixel by the depth along its ray, the one that depth images show
+  own,          ///< The order of the kind: per_ray for OracleKind::ray, else float32_key.
+  float32_key,  ///< The contract's order: the float32 key that renderers sort by.
+  float64,      ///< The unrounded key in float64.
+  per_ray,      ///< Per pixel, by the depth along its ray, as in depth images.
 };
 
-/// Half-open rectangle of pixels [x0, x1) x [y0, y1).
+/// Half-open rectangle of pixels: [x0, x1) x [y0, y1).
 struct PixelRect {
-  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;  ///< Bounds, pixels. x1 and y1 are excluded.
 
+  /// Whether the rectangle has no pixels.
   bool empty() const noexcept { return x0 >= x1 || y0 >= y1; }
+  /// Width in pixels, 0 if empty.
   std::size_t width() const noexcept { return empty() ? 0 : static_cast<std::size_t>(x1 - x0); }
+  /// Height in pixels, 0 if empty.
   std::size_t height() const noexcept { return empty() ? 0 : static_cast<std::size_t>(y1 - y0); }
+  /// Pixels that both rectangles have.
   PixelRect intersection(const PixelRect& o) const noexcept {
     return {max(x0, o.x0), max(y0, o.y0), min(x1, o.x1), min(y1, o.y1)};
   }
 };
 
-/// A surface that is seen through, at one pixel.
+/// Transparent surface at one pixel.
 struct OracleFragment {
-  double depth = 0, alpha = 1;  ///< planar z, metres; in [0, 1]
-  Vec3d rgb{};                  ///< display-referred
+  double depth = 0, alpha = 1;  ///< Planar z in metres, and alpha in [0, 1].
+  Vec3d rgb{};                  ///< Colour, display-referred.
 };
 
-/// A mesh as an oracle takes it: what each pixel of the camera's image shows of it.
+/// Image of a mesh for the reference renderer.
 struct OracleMesh {
-  std::vector<double> depth;  ///< [H][W] planar z, metres; infinity: none
-  std::vector<double> rgb;    ///< [H][W][3], display-referred
-  /// [H][W], what is before that, near to far; or empty
+  std::vector<double> depth;  ///< Planar z, shape [height][width], metres. Infinity: no mesh.
+  std::vector<double> rgb;    ///< Colour, shape [height][width][3], display-referred.
+  /// Transparent surfaces in front of it, near to far, shape [height][width]. May be empty.
   std::vector<std::vector<OracleFragment>> fragments{};
 };
 
-/// Which oracle, by which rules.
+/// Settings of the reference renderer.
 struct OracleConfig {
-  /// Rules of the image. `outputs`, `tuning` and `quality.exponential` mean nothing here: every image is
-  /// made, in float64, without tiles. `response` and `compat` must be the contract's, and where there is
-  /// a mesh `composite` and `blend_space` too.
+  /// Settings of the image. `outputs`, `tuning` and `quality.exponential` are ignored: all images are
+  /// produced, in float64, without tiles. `response` and `compat` must be those of the contract, and
+  /// with a mesh also `composite` and `blend_space`.
   RenderConfig rules{};
-  OracleKind kind = OracleKind::contract;
-  OracleOrder order = OracleOrder::own;
-  /// true: each Gaussian is asked only at the pixels of the box where its alpha may pass; for `contract`
-  /// and `ray` the image is that of false, bit for bit. false: every Gaussian at every pixel.
-  /// `untruncated` with boxes leaves alpha < kNegligibleAlpha out.
+  OracleKind kind = OracleKind::contract;  ///< Definition of the image.
+  OracleOrder order = OracleOrder::own;    ///< Order of blending.
+  /// True: evaluate each Gaussian only in the box where its alpha may reach the limit. For `contract`
+  /// and `ray` the image is bit-identical to that without boxes. For `untruncated` it omits alpha <
+  /// kNegligibleAlpha. False: evaluate every Gaussian at every pixel.
   bool boxed = true;
-  PixelRect crop{};  ///< what to render of the camera's image; all 0: everything
-  /// Hides the Gaussians behind it and closes its pixels (docs/reference/composition.md). Null: none.
-  /// Must outlive the call.
+  PixelRect crop{};  ///< Part of the image to render. All 0: everything.
+  /// Mesh to composite: it hides the Gaussians behind it and closes its pixels
+  /// (docs/reference/composition.md). May be null. Must outlive the call.
   const OracleMesh* mesh = nullptr;
 };
 
-/// Below this the boxes of OracleKind::untruncated leave a Gaussian out. A pixel's colour is linear in
-/// each alpha with a slope of at most c, the largest colour component (background included), so n
-/// Gaussians left out move it by less than n c 2^-40 and its alpha by n 2^-40: 9.1e-7 c for a million.
+/// Alpha below which OracleKind::untruncated with boxes omits a Gaussian.
+/// A pixel's colour is linear in each alpha, with a slope of at most c, the largest colour component
+/// (background included). Omitting n Gaussians therefore changes the colour by less than n c 2^-40 and
+/// alpha by less than n 2^-40, or 9.1e-7 c for a million.
 inline constexpr double kLog2NegligibleAlpha = -40;
+/// The alpha itself, 2^kLog2NegligibleAlpha.
 inline constexpr double kNegligibleAlpha = 0x1p-40;
 
-/// Where float32 may rightly take the other side of a comparison: relative distance of a float64 alpha
-/// from alpha_min and of T from the stop; absolute distance of T from a depth's crossing.
+/// Margin within which float32 may rightly decide a comparison differently: relative distance of alpha
+/// from alpha_min, and of T from transmittance_min.
 inline constexpr double kUndecidedRelative = 1e-5;
+/// The same for depths: absolute distance of T from the crossing that defines a depth.
 inline constexpr double kUndecidedCrossing = 1e-3;
-/// And of a Gaussian's depth along the ray from the mesh's, metres.
+/// Margin between a Gaussian's depth along the ray and that of the mesh, metres.
 inline constexpr double kUndecidedMesh = 1e-4;
 
-/// What an oracle's image was made of.
+/// Work that the reference image took.
 struct OracleCounts {
-  std::uint64_t gaussians = 0;    ///< in all sets
-  std::uint64_t visible = 0;      ///< whose box reaches the crop
-  std::uint64_t listed = 0;       ///< (pixel, Gaussian) pairs that were asked, if the pixel was open
-  std::uint64_t evaluations = 0;  ///< pairs blended: what a renderer cannot do without
-  std::uint64_t order_flips = 0;  ///< pixels marked in order_flip
+  std::uint64_t gaussians = 0;    ///< Number of Gaussians in all sets.
+  std::uint64_t visible = 0;      ///< Number of Gaussians whose box intersects the crop.
+  std::uint64_t listed = 0;       ///< Number of (pixel, Gaussian) pairs listed. They are evaluated if
+                                  ///< the pixel is open.
+  std::uint64_t evaluations = 0;  ///< Number of pairs blended, which no renderer can avoid.
+  std::uint64_t order_flips = 0;  ///< Number of pixels marked in order_flip.
 
+  /// Adds the counts of another image.
   OracleCounts& operator+=(const OracleCounts& o) noexcept {
     gaussians += o.gaussians;
     visible += o.visible;
@@ -104,26 +114,33 @@ struct OracleCounts {
   }
 };
 
-/// Images of one camera (or its crop) in float64, row-major from the top-left pixel. Masks: 0 or 1.
+/// Reference images of one camera or its crop, in float64, row-major from the top-left pixel. Masks are
+/// 0 or 1.
 struct OracleFrames {
-  std::size_t width = 0, height = 0;
-  std::vector<double> rgb;                ///< [H][W][3], over the background, unclamped
-  std::vector<double> alpha;              ///< [H][W], 1 - transmittance
-  std::vector<double> median_depth;       ///< [H][W] metres, where T crosses 1/2; 0: no return
-  std::vector<double> expected_depth;     ///< [H][W] metres, sum(w z) / sum(w); 0 where sum(w) = 0
-  std::vector<double> accumulated_depth;  ///< [H][W] metres, sum(w z)
-  std::vector<double> first_hit_depth;    ///< [H][W] metres, where alpha reaches first_hit_tau; 0: never
-  /// A Gaussian met before the stop has alpha within kUndecidedRelative of alpha_min, or one takes T
-  /// within kUndecidedRelative of transmittance_min, or one lies within kUndecidedMesh of the mesh.
+  std::size_t width = 0, height = 0;      ///< Size of the images in pixels.
+  std::vector<double> rgb;                ///< Shape [height][width][3], over the background, not
+                                          ///< clamped.
+  std::vector<double> alpha;              ///< Shape [height][width], 1 - transmittance.
+  std::vector<double> median_depth;       ///< Shape [height][width], metres, where T crosses 1/2. 0: no
+                                          ///< return.
+  std::vector<double> expected_depth;     ///< Shape [height][width], metres, sum(w z) / sum(w). 0 if
+                                          ///< sum(w) = 0.
+  std::vector<double> accumulated_depth;  ///< Shape [height][width], metres, sum(w z).
+  std::vector<double> first_hit_depth;    ///< Shape [height][width], metres, where alpha reaches
+                                          ///< first_hit_tau. 0: never.
+  /// 1 if float32 may rightly give another colour: before the stop, a Gaussian has alpha within
+  /// kUndecidedRelative of alpha_min, or it takes T within kUndecidedRelative of transmittance_min, or
+  /// it lies within kUndecidedMesh of the mesh.
   std::vector<std::uint8_t> undecided;
-  /// A Gaussian takes T within kUndecidedCrossing of 1/2 or of 1 - first_hit_tau.
+  /// 1 if a Gaussian takes T within kUndecidedCrossing of 1/2 or of 1 - first_hit_tau.
   std::vector<std::uint8_t> undecided_depth;
-  /// The Gaussians blended here stand in another order by float64 (where the image is by the float32
-  /// key) or by the float32 key (where it is by anything else). Exact: a list is out of order if and
-  /// only if two neighbours in it are.
+  /// 1 if the Gaussians blended here are in another order by the other key: float64 if the image uses
+  /// the float32 key, else the float32 key. The test is exact, because a list is out of order if and
+  /// only if two neighbours are.
   std::vector<std::uint8_t> order_flip;
-  OracleCounts counts;
+  OracleCounts counts;  ///< Work that the images took.
 
+  /// Sets the size and fills all images with zeros.
   void resize(std::size_t w, std::size_t h) {
     width = w;
     height = h;
@@ -135,7 +152,8 @@ struct OracleFrames {
   }
 };
 
-/// Names the field that cannot be, or ok.
+/// Checks the settings.
+/// @return invalid_argument or unsupported, with the field.
 inline Status validate(const OracleConfig& c, const Camera& camera) {
   if (Status s = gsnav::validate(c.rules); !s) return s;
   if (Status s = gsnav::validate(camera); !s) return s;
@@ -180,7 +198,7 @@ inline Status validate(const OracleConfig& c, const Camera& camera) {
   return {};
 }
 
-/// The pixels that a config asks for.
+/// Pixels to render.
 inline PixelRect oracle_rect(const OracleConfig& c, const Camera& camera) noexcept {
   return c.crop.empty() ? PixelRect{0, 0, camera.width, camera.height} : c.crop;
 }

@@ -16,8 +16,8 @@
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/render/config.hpp"
 
-// A row of a set as oracles see it, in long double and in metres. Only the decoding of stored rows
-// (set_rows.hpp) is shared with the kernels: every formula here is written from the contract.
+// A row of a set in long double and metres. Only the decoding of stored rows (set_rows.hpp) is shared
+// with the kernels. Every formula here is written independently from the contract.
 
 namespace gsnav::eval::detail {
 
@@ -46,7 +46,8 @@ inline Real3 operator*(const RealColumns& m, const Real3& v) noexcept {
   return v.x * m[0] + v.y * m[1] + v.z * m[2];
 }
 
-/// Columns of the rotation of a quaternion of any length but 0.
+/// Columns of the rotation matrix of a quaternion. The quaternion need not be normalized, but must not
+/// be 0.
 inline RealColumns rotation_columns(Real w, Real x, Real y, Real z) noexcept {
   const Real s = 2 / (w * w + x * x + y * y + z * z);
   return {{{1 - s * (y * y + z * z), s * (x * y + w * z), s * (x * z - w * y)},
@@ -54,8 +55,8 @@ inline RealColumns rotation_columns(Real w, Real x, Real y, Real z) noexcept {
            {s * (x * z + w * y), s * (y * z - w * x), 1 - s * (x * x + y * y)}}};
 }
 
-/// Basis function l (0 to 3), m (-l to l) of the real spherical harmonics with the Condon-Shortley phase
-/// at the unit vector d, by the recurrence of the associated Legendre polynomials.
+/// Real spherical harmonic of degree l (0 to 3) and order m (-l to l) with the Condon-Shortley phase, at
+/// the unit vector d. Uses the recurrence of the associated Legendre polynomials.
 inline Real spherical_harmonic(int l, int m, const Real3& d) noexcept {
   const Real pi = 3.14159265358979323846264338327950288L;
   const int order = m < 0 ? -m : m;
@@ -78,7 +79,7 @@ inline Real spherical_harmonic(int l, int m, const Real3& d) noexcept {
   return std::sqrt(Real(2)) * norm * legendre * (m < 0 ? sine : cosine);
 }
 
-/// A colour value in the space that a frame is blended in (IEC 61966-2-1).
+/// Converts a colour value to the space in which the frame is blended (IEC 61966-2-1).
 inline Real in_blend_space(Real value, ColorSpace from, ColorSpace to) noexcept {
   if (from == to) return value;
   value = std::max(value, Real(0));
@@ -102,15 +103,15 @@ inline Real3 stored_coefficient(const ColorRows& gs, std::size_t row, int k) noe
           half_to_float(gs.shN_half[at + 2])};
 }
 
-/// One set as a camera sees it.
+/// One set in the frame of a camera.
 struct OracleSet {
   GaussianSet set;
   Camera camera;
   SortOrder sort_order;
-  std::size_t first_row = 0;        ///< among the rows of all sets
-  RealColumns camera_from_asset{};  ///< scale included
-  Real3 origin_in_camera{};         ///< the asset's origin, camera axes, metres
-  Real3 eye{};                      ///< camera position, asset frame
+  std::size_t first_row = 0;        ///< Index of its first row among the rows of all sets.
+  RealColumns camera_from_asset{};  ///< Includes the scale.
+  Real3 origin_in_camera{};         ///< Origin of the asset in camera axes, metres.
+  Real3 eye{};                      ///< Camera position in the asset's frame.
   double log2_alpha_min;
 
   OracleSet(const GaussianSet& s, const Camera& c, const RenderConfig& rules, std::size_t first)
@@ -131,19 +132,20 @@ struct OracleSet {
     for (std::size_t k = 0; k < 3; ++k) camera_from_asset[k] = Real(a.scale) * view(turn[k]);
     const Vec3d& t = c.viewmat.translation;
     origin_in_camera = view({a.translation.x, a.translation.y, a.translation.z}) + Real3{t.x, t.y, t.z};
-    // Where camera axes are 0: camera_from_asset has orthogonal columns, of one length.
+    // The position where all camera axes are 0. The columns of camera_from_asset are orthogonal and of
+    // equal length.
     const auto along = [this](const Real3& column) {
       return -inner(column, origin_in_camera) / inner(column, column);
     };
     eye = {along(camera_from_asset[0]), along(camera_from_asset[1]), along(camera_from_asset[2])};
   }
-  /// Stable id: sets one after the other, each in the order it was read in, however its rows lie in
-  /// memory.
+  /// Stable id: position in the order in which rows were read, over all sets. It does not depend on how
+  /// rows are stored.
   std::uint32_t id(std::size_t row) const noexcept {
     const View<const std::uint32_t> rows = set.gaussians.row_ids;
     return static_cast<std::uint32_t>(first_row + (rows.empty() ? row : rows[row]));
   }
-  /// The mean, asset frame.
+  /// Mean in the asset's frame.
   Real3 place(std::size_t row) const noexcept {
     const GaussianRows& gs = set.gaussians;
     const Vec3<float> offset = mean_of(gs.shape, row);
@@ -154,12 +156,12 @@ struct OracleSet {
     }
     return p;
   }
-  /// The mean in camera axes, metres.
+  /// Mean in camera axes, metres.
   Real3 center(std::size_t row) const noexcept {
     return camera_from_asset * place(row) + origin_in_camera;
   }
 
-  /// Columns of M, Sigma = M M^T, in camera axes, metres.
+  /// Columns of M in camera axes, metres, with Sigma = M M^T.
   RealColumns factor(std::size_t row) const noexcept {
     const ShapeRows& gs = set.gaussians.shape;
     RealColumns m;
@@ -176,20 +178,20 @@ struct OracleSet {
     return m;
   }
 
-  /// What the contract sorts by, metres, not rounded.
+  /// Quantity that the contract sorts by, metres, not rounded.
   Real key(std::size_t row) const noexcept {
     const Real3 at = center(row);
     return sort_order == SortOrder::z_depth ? at.z : std::sqrt(inner(at, at));
   }
 
-  /// The contract's near rules.
+  /// Returns true if the Gaussian passes the contract's near rules.
   bool in_front(const Real3& center, const RealColumns& m) const noexcept {
     const Real sigma_z = std::sqrt(m[0].z * m[0].z + m[1].z * m[1].z + m[2].z * m[2].z);
     return static_cast<float>(center.z) > static_cast<float>(camera.near_plane) &&
            (!(camera.near_sigma > 0) || center.z > camera.near_sigma * sigma_z);
   }
 
-  /// Colour seen from the camera, SH to `degree`, in `blend_space`.
+  /// Colour towards the camera, with SH up to `degree`, in `blend_space`.
   Vec3d color(std::size_t row, int degree, ColorSpace blend_space) const noexcept {
     const ColorRows& gs = set.gaussians.color;
     Real3 d = place(row) + Real(-1) * eye;
@@ -212,8 +214,8 @@ struct OracleSet {
   }
 };
 
-/// The integer that a render of `bits` key bits sorts a float32 key by: all of its bits, or fewer
-/// counted from the near plane's on (RenderConfig::key_bits).
+/// Integer that a renderer with `bits` key bits sorts by: all bits of the float32 key, or fewer, counted
+/// from the near plane (RenderConfig::key_bits).
 inline std::uint32_t sorted_code(float key, int bits, float near_plane) noexcept {
   const std::uint32_t whole = std::bit_cast<std::uint32_t>(key);
   if (bits >= 32) return whole;
@@ -222,7 +224,7 @@ inline std::uint32_t sorted_code(float key, int bits, float near_plane) noexcept
   return std::min(steps, (std::uint32_t{1} << bits) - 1);
 }
 
-/// Pixels of the camera's image whose centre lies within the half sizes of the centre.
+/// Pixels of the image whose centres lie within a half size of the given centre.
 inline PixelRect pixels_within(const Camera& camera, double center_x, double half_x, double center_y,
                                double half_y) noexcept {
   const auto first = [](double low, int size) {
@@ -235,22 +237,24 @@ inline PixelRect pixels_within(const Camera& camera, double center_x, double hal
           end(center_x + half_x, camera.width), end(center_y + half_y, camera.height)};
 }
 
-/// sigma_z multiples that a Gaussian of this log2 opacity reaches, where alpha falls to 2^log2_edge.
+/// Distance from the mean, in standard deviations, at which alpha falls to 2^log2_edge.
 inline double reached_sigmas(double log2_opacity, double log2_edge) noexcept {
   return std::sqrt(std::max(2 * std::log(2.0) * (log2_opacity - log2_edge), 0.0));
 }
 
-/// A Gaussian by the contract: linearised at its mean, dilated, and seen in the pixel's plane.
+/// A Gaussian by the contract (EWA): linearized at its mean, dilated, and evaluated in the image plane.
 struct EwaModel {
-  double mean_x, mean_y;  ///< pixels
+  double mean_x, mean_y;  ///< Projected mean, pixels.
   double per_variance_x, slope,
-      per_rest;  ///< 1 / var(x); cov / var(x); 1 / (var(y) - cov^2 / var(x)), px
+      per_rest;  ///< 1 / var(x), cov / var(x), and 1 / (var(y) - cov^2 / var(x)), in pixels.
   double log2_opacity;
-  Vec3d mean_ray;              ///< through the mean, third component 1
-  std::array<Vec3d, 3> areas;  ///< cross products of M's columns, divided by the longest
-  double fx, fy, z, reach;     ///< metres
+  Vec3d mean_ray;              ///< Ray through the mean. The third component is 1.
+  std::array<Vec3d, 3> areas;  ///< Cross products of the columns of M, divided by the longest.
+  double fx, fy, z, reach;     ///< Focal lengths in pixels; depth of the mean and limit of the depth
+                               ///< offset in metres.
 
-  /// False: not drawn. `box` holds every pixel with alpha >= 2^log2_cut.
+  /// Projects a Gaussian. `box` contains every pixel with alpha >= 2^log2_cut.
+  /// @return false if it is not drawn.
   static bool make(const OracleSet& s, std::size_t row, double log2_cut, EwaModel& out,
                    PixelRect& box) noexcept {
     const Camera& c = s.camera;
@@ -259,7 +263,7 @@ struct EwaModel {
     if (!s.in_front(mean, m)) return false;
     const Real u = mean.x / mean.z, v = mean.y / mean.z;
 
-    // Rows of J M, J the Jacobian with its limits.
+    // Rows of J M, where J is the Jacobian with its limits.
     const Real side = 0.3L * c.width / (2 * c.fx), top = 0.3L * c.height / (2 * c.fy);
     const Real uj = std::clamp<Real>(u, -(c.cx / c.fx + side), (c.width - c.cx) / c.fx + side);
     const Real vj = std::clamp<Real>(v, -(c.cy / c.fy + top), (c.height - c.cy) / c.fy + top);
@@ -267,7 +271,7 @@ struct EwaModel {
     const Real3 lx{inner(jx, m[0]), inner(jx, m[1]), inner(jx, m[2])};
     const Real3 ly{inner(jy, m[0]), inner(jy, m[1]), inner(jy, m[2])};
     const Real a0 = inner(lx, lx), c0 = inner(ly, ly);
-    // Lagrange's identity: a0 c0 - b0^2, but a sum of squares.
+    // Lagrange's identity turns a0 c0 - b0^2 into a sum of squares, which does not cancel.
     const Real3 crossed = outer(lx, ly);
     const auto dilated = [&](Real h) { return inner(crossed, crossed) + h * (a0 + c0) + h * h; };
     const Real h = s.set.eps2d, det = dilated(h);
@@ -281,7 +285,7 @@ struct EwaModel {
     out.slope = static_cast<double>(inner(lx, ly) / variance_x);
     out.per_rest = static_cast<double>(variance_x / det);
     out.log2_opacity = static_cast<double>(std::log2(opacity));
-    // What overflows float32 is not drawn, by any backend.
+    // Gaussians whose values overflow float32 are not drawn by any backend.
     constexpr double huge = 3e38;
     if (!(opacity > 0 && out.log2_opacity >= log2_cut && det <= huge && variance_x <= huge &&
           variance_y <= huge && std::abs(out.mean_x) <= huge && std::abs(out.mean_y) <= huge)) {
@@ -300,7 +304,8 @@ struct EwaModel {
     const Real sigma_z = std::sqrt(m[0].z * m[0].z + m[1].z * m[1].z + m[2].z * m[2].z);
     out.reach = reached_sigmas(out.log2_opacity, s.log2_alpha_min) * static_cast<double>(sigma_z);
 
-    // q = k^2 touches x = mean +- k sqrt(variance); the pad is a hundred times its rounding.
+    // The ellipse q = k^2 touches x = mean +- k sqrt(variance). The margin is a hundred times the
+    // rounding error.
     const double k = reached_sigmas(out.log2_opacity, log2_cut) * (1 + 1e-9);
     const auto half = [k](Real variance, double at) {
       return k * std::sqrt(static_cast<double>(variance)) + 1e-12 * std::abs(at);
@@ -309,17 +314,17 @@ struct EwaModel {
                         half(variance_y, out.mean_y));
     return true;
   }
-  /// log2 of alpha before max_alpha: q as a square in x, and the square of what y has left of its line
-  /// on x.
+  /// log2 of alpha before max_alpha. q is written as a square in x plus a square of the rest of y after
+  /// regression on x.
   double log2_alpha(double px, double py) const noexcept {
     const double dx = px - mean_x, dy = py - mean_y;
     const double rest = dy - slope * dx;
     const double q = dx * dx * per_variance_x + rest * rest * per_rest;
     return log2_opacity - q * (0.5 / std::log(2.0));
   }
-  /// The place of the largest response along the ray r, of the ellipsoid without dilation: at
-  /// z (r' adj(Sigma) m) / (r' adj(Sigma) r), m the ray through the mean, adj(Sigma) the sum of n n'
-  /// over `areas`.
+  /// Depth of the largest response along the ray r, for the ellipsoid without dilation: z (r' adj(Sigma)
+  /// m) / (r' adj(Sigma) r). m is the ray through the mean, and adj(Sigma) is the sum of n n' over
+  /// `areas`.
   double depth(double px, double py) const noexcept {
     const double du = (px - mean_x) / fx, dv = (py - mean_y) / fy;
     double along = 0, turned = 0;

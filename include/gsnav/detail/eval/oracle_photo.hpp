@@ -17,7 +17,7 @@ inline constexpr int kMaxPhotoFactor = 16;
 
 namespace detail {
 
-/// A camera with k times the resolution: each pixel becomes k x k.
+/// Camera with k times the resolution. Each pixel becomes k x k.
 inline Camera magnified(Camera c, int k) noexcept {
   c.fx *= k;
   c.fy *= k;
@@ -28,7 +28,7 @@ inline Camera magnified(Camera c, int k) noexcept {
   return c;
 }
 
-/// Reduces k x k blocks of `fine` to one row-range of `out`, from row `to` on.
+/// Reduces k x k blocks of `fine` to pixels of `out`, from row `to` on.
 class PhotoReducer {
  public:
   PhotoReducer(int k, const OracleFrames& fine, OracleFrames& out, std::size_t to) noexcept
@@ -88,16 +88,24 @@ class PhotoReducer {
 
 }  // namespace detail
 
-/// O_photo(k): what a sensor that integrates over its pixels sees. The oracle of `config` at k times the
-/// resolution (in [1, 16]; each pixel k x k), reduced to the camera's own. Per k x k block:
-///  - colour, alpha and accumulated depth: the mean;
-///  - median, expected and first-hit depth: the median of the samples that have a return (the lower of
-///  two
-///    middle ones: a depth that was seen), 0 where less than half of the samples have one;
-///  - masks: set where any sample's is.
-/// `config.crop` is in pixels of `camera`; counts are those of the fine image. Works in bands of rows of
-/// about 2^20 fine pixels: 90 MB above what oracle_render needs.
-/// Errors: those of oracle_render; invalid_argument where k or k times the image is too large.
+/// Renders what a sensor sees that integrates over its pixels, O_photo(k). The reference of `config` is
+/// rendered at k times the resolution and reduced to that of the camera.
+///
+/// Each k x k block is reduced as follows:
+/// - colour, alpha and accumulated depth: mean
+/// - median, expected and first-hit depth: median of the samples with a return (the lower of two middle
+///   ones, so that it is a depth that occurs); 0 if fewer than half of the samples have a return
+/// - masks: 1 if any sample is 1
+///
+/// Works in bands of about 2^20 fine pixels, which take 90 MB in addition to the memory of
+/// oracle_render.
+/// @param backend Backend on the host that runs the reference renderer.
+/// @param sets Gaussians to render.
+/// @param camera Camera, with the resolution of the result.
+/// @param k Factor, in [1, 16].
+/// @param config `crop` is in pixels of `camera`. Counts are those of the fine image.
+/// @return the errors of oracle_render; invalid_argument if k is out of range or the fine image too
+/// large.
 template <Backend B>
 requires is_host_backend<B> Result<OracleFrames> oracle_photo(B& backend,
                                                               std::span<const GaussianSet> sets,

@@ -15,41 +15,41 @@
 #include "gsnav/detail/eval/oracle_config.hpp"
 #include "gsnav/detail/eval/oracle_gaussian.hpp"
 
-// From sets of Gaussians to one sorted list of records: what oracles of every kind share.
+// From sets of Gaussians to one sorted list of records. All kinds of reference use it.
 
 namespace gsnav::eval::detail {
 
-/// A Gaussian ready to be blended.
+/// A Gaussian that is ready to be blended.
 template <class Model>
 struct OracleRecord {
   Model model;
   Vec3d color;
-  PixelRect box;       ///< within the crop; may be empty where boxes are not used
-  std::uint32_t id;    ///< stable
-  std::uint32_t rank;  ///< place in the order that order_flip compares with
+  PixelRect box;       ///< Box within the crop. May be empty if boxes are not used.
+  std::uint32_t id;    ///< Stable id.
+  std::uint32_t rank;  ///< Position in the order that order_flip compares with.
 };
 
-/// The rules of blending, limits in the form they are compared in.
+/// Settings of blending, with limits as they are compared.
 struct OracleRules {
   double log2_alpha_min, max_alpha, transmittance_min, first_hit_tau;
   bool normalize_closed;
   Vec3d background;
 };
 
-/// Records in the order of the image (of float32 keys for OracleOrder::per_ray), for one camera and
-/// crop.
+/// Records of one camera and crop, in blending order (for OracleOrder::per_ray, in the order of float32
+/// keys).
 template <class Model>
 struct OracleScene {
   std::vector<OracleRecord<Model>> records;
   OracleRules rules;
   PixelRect rect;
-  double log2_cut;  ///< fainter pairs need not be asked
+  double log2_cut;  ///< Pairs with lower log2 alpha need not be evaluated.
   bool boxed, per_ray;
   const OracleMesh* mesh;
   std::size_t image_width;
   OracleCounts counts;
 
-  /// Of the camera's pixel (x, y): the mesh's depth, infinity where there is none.
+  /// Depth of the mesh at pixel (x, y) of the camera. Infinity if there is none.
   double mesh_depth(int x, int y) const noexcept {
     return mesh == nullptr ? std::numeric_limits<double>::infinity() : mesh->depth[pixel(x, y)];
   }
@@ -61,13 +61,13 @@ struct OracleScene {
 struct OracleCandidate {
   double key64;
   std::uint32_t code;
-  std::uint32_t id;   ///< stable: what decides ties
-  std::uint32_t row;  ///< among the rows of all sets as they lie in memory
+  std::uint32_t id;   ///< Stable id. It decides between equal keys.
+  std::uint32_t row;  ///< Index among the stored rows of all sets.
 };
 
 inline constexpr std::size_t kOracleChunk = 2048;
 
-/// Candidates of all sets: what is drawn and, where boxes are used, reaches the crop.
+/// Returns the Gaussians of all sets that are drawn and, with boxes, reach the crop.
 template <class Model, Backend B>
 std::vector<OracleCandidate> oracle_candidates(B& backend, std::span<const OracleSet> sets, int key_bits,
                                                OracleScene<Model>& scene) {
@@ -100,8 +100,8 @@ std::vector<OracleCandidate> oracle_candidates(B& backend, std::span<const Oracl
   return all;
 }
 
-/// Projects, culls and sorts; what is drawn is projected again to be recorded in its place, so that
-/// nothing is held twice.
+/// Projects, culls and sorts. Gaussians that are drawn are projected a second time when their records
+/// are written, so that projections need not be kept.
 template <class Model, Backend B>
 OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> gaussian_sets,
                                      const Camera& camera, const OracleConfig& config) {
@@ -121,7 +121,7 @@ OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> ga
   scene.image_width = static_cast<std::size_t>(camera.width);
   scene.per_ray = config.order == OracleOrder::per_ray ||
                   (config.order == OracleOrder::own && config.kind == OracleKind::ray);
-  // What falls short of alpha_min by less than the undecided margin has to be seen too.
+  // Include Gaussians whose alpha is below alpha_min by less than the undecided margin.
   scene.log2_cut = truncated      ? scene.rules.log2_alpha_min - 3 * kUndecidedRelative
                    : config.boxed ? kLog2NegligibleAlpha
                                   : -infinity;
@@ -146,7 +146,7 @@ OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> ga
   } else {
     std::sort(order.begin(), order.end(), by_code);
   }
-  // Places in the other order, for order_flip; by pixel, the order of the list is the other one.
+  // Ranks in the other order, for order_flip. With per_ray, the other order is that of the list.
   std::vector<std::uint32_t> place(order.size()), rank(order.size());
   for (std::size_t i = 0; i < order.size(); ++i) place[i] = static_cast<std::uint32_t>(i);
   if (!scene.per_ray) {

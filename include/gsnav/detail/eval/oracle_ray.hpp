@@ -11,21 +11,25 @@
 
 namespace gsnav::eval::detail {
 
-/// A Gaussian by its largest response along each pixel's ray r = (u, v, 1), camera axes:
-///     q = (mu x r)' S (mu x r) / (r' adj(S) r),   S = Sigma + h diag((z/fx)^2, (z/fy)^2, 0),
-/// found at depth z - z (r' adj(S) d) / (r' adj(S) r), d = r - mu / z. S is the dilation of the contract
-/// carried to the mean's depth, and adj(S) = sum of n n' over the cross products n of two columns of S's
-/// factor (Cauchy-Binet), so that nothing cancels and nothing is inverted. A Gaussian whose response is
-/// largest behind the camera is not seen by that ray. No Jacobian, hence none of its limits.
+/// A Gaussian by its largest response along each pixel's ray r = (u, v, 1), in camera axes:
+///
+///     q = (mu x r)' S (mu x r) / (r' adj(S) r),   S = Sigma + h diag((z/fx)^2, (z/fy)^2, 0)
+///
+/// The depth of that response is z - z (r' adj(S) d) / (r' adj(S) r), with d = r - mu / z. S contains
+/// the dilation of the contract, scaled to the depth of the mean. adj(S) is the sum of n n' over the
+/// cross products n of two columns of S's factor (Cauchy-Binet). Nothing cancels and nothing is
+/// inverted. A ray does not see a Gaussian whose largest response lies behind the camera. There is no
+/// Jacobian and hence no limit on it.
 struct RayModel {
-  std::array<Vec3d, 3> factor;  ///< columns: axes times standard deviations, metres
-  Vec3d dilation;               ///< diagonal of S - Sigma
-  Mat3d adjugate;               ///< adj(S)
-  double u, v, z;               ///< ray through the mean; its depth, metres
+  std::array<Vec3d, 3> factor;  ///< Columns: axes times standard deviations, metres.
+  Vec3d dilation;               ///< Diagonal of S - Sigma.
+  Mat3d adjugate;               ///< adj(S).
+  double u, v, z;               ///< Ray through the mean, and its depth in metres.
   double fx, fy, cx, cy;
   double log2_opacity, reach;
 
-  /// False: not drawn. `box` holds every pixel with alpha >= 2^log2_cut.
+  /// Projects a Gaussian. `box` contains every pixel with alpha >= 2^log2_cut.
+  /// @return false if it is not drawn.
   static bool make(const OracleSet& s, std::size_t row, double log2_cut, RayModel& out,
                    PixelRect& box) noexcept {
     const Camera& c = s.camera;
@@ -45,7 +49,7 @@ struct RayModel {
     out.dilation = {wide * wide, high * high, 0};
     const Vec3d columns[5] = {out.factor[0], out.factor[1], out.factor[2], {wide, 0, 0}, {0, high, 0}};
     const Vec3d mean_ray{out.u, out.v, 1};
-    double area0 = 0, area = 0;  // of the outline's plane, without and with the dilation
+    double area0 = 0, area = 0;  // Area of the outline, without and with the dilation.
     out.adjugate = {};
     for (int i = 0; i < 5; ++i) {
       for (int j = i + 1; j < 5; ++j) {
@@ -70,7 +74,7 @@ struct RayModel {
     const double du = (px - cx) / fx - u, dv = (py - cy) / fy - v;
     const Along along_ray = along(du, dv);
     if (!(along_ray.response > along_ray.turn)) return -std::numeric_limits<double>::infinity();
-    const Vec3d n{-dv * z, du * z, (u * dv - v * du) * z};  // mu x r
+    const Vec3d n{-dv * z, du * z, (u * dv - v * du) * z};  // mu x r.
     double q = dilation.x * n.x * n.x + dilation.y * n.y * n.y;
     for (const Vec3d& column : factor) {
       const double across = column.x * n.x + column.y * n.y + column.z * n.z;
@@ -79,7 +83,8 @@ struct RayModel {
     return log2_opacity - q / along_ray.response / (2 * std::log(2.0));
   }
 
-  /// Limited like the contract's: standard deviations along the view axis around the centre.
+  /// Depth of the largest response. As in the contract, the offset from the centre is limited to a
+  /// number of standard deviations along the view axis.
   double depth(double px, double py) const noexcept {
     const double du = (px - cx) / fx - u, dv = (py - cy) / fy - v;
     const Along a = along(du, dv);
@@ -89,9 +94,8 @@ struct RayModel {
  private:
   Vec3d row(int axis) const noexcept { return {factor[0][axis], factor[1][axis], factor[2][axis]}; }
 
-  /// r' adj(S) r and r' adj(S) d of the ray r = (u + du, v + dv, 1), d = (du, dv, 0). Plain products:
-  /// what fma would add in accuracy, a call of it costs ten times over where the processor's is not
-  /// used.
+  /// r' adj(S) r and r' adj(S) d for the ray r = (u + du, v + dv, 1) with d = (du, dv, 0). Uses plain
+  /// products: where the compiler has no fma instruction, a call of fma costs ten times more.
   struct Along {
     double response, turn;
   };
@@ -102,9 +106,9 @@ struct RayModel {
     return {ru * x + rv * y + (a(0, 2) * ru + a(1, 2) * rv + a(2, 2)), du * x + dv * y};
   }
 
-  /// Pixels inside the outline of the ellipsoid q = k2. Its extent in u around the mean's, d, solves
-  /// (d z)^2 = k2 (X - 2 d Y + d^2 Z), X, Y, Z the covariance of (x - u z, z); it is bounded where the
-  /// ellipsoid lies wholly before the camera.
+  /// Pixels inside the outline of the ellipsoid q = k2. Its extent d in u around the mean solves (d z)^2
+  /// = k2 (X - 2 d Y + d^2 Z), where X, Y, Z are the covariance of (x - u z, z). It is bounded if the
+  /// ellipsoid lies completely in front of the camera.
   PixelRect outline(const Camera& c, double k2) const noexcept {
     const Vec3d along_z = row(2);
     const double depth2 = dot(along_z, along_z);
@@ -121,7 +125,7 @@ struct RayModel {
     extent(u, 0, center_u, half_u);
     extent(v, 1, center_v, half_v);
     const double mean_x = cx + fx * u, mean_y = cy + fy * v;
-    // 1e-8 of the offset as well: `front` is a difference.
+    // Add 1e-8 of the offset as well, because `front` is a difference.
     return pixels_within(
         c, mean_x + fx * center_u, fx * (half_u + 1e-8 * std::abs(center_u)) + 1e-12 * std::abs(mean_x),
         mean_y + fy * center_v, fy * (half_v + 1e-8 * std::abs(center_v)) + 1e-12 * std::abs(mean_y));

@@ -8,17 +8,19 @@
 
 namespace gsnav::eval {
 
-/// Structural similarity of two images: 1 where they are equal.
+/// Structural similarity of two images. 1: equal.
 struct Ssim {
-  double mean = 1.0;  ///< mean of the channels
-  std::array<double, 3> channel{1.0, 1.0, 1.0};
+  double mean = 1.0;                             ///< Mean over the channels.
+  std::array<double, 3> channel{1.0, 1.0, 1.0};  ///< Value of each channel.
 };
 
-/// SSIM of Wang, Bovik, Sheikh and Simoncelli (2004): a Gaussian window of 11 x 11 and sigma 1.5,
-/// K1 = 0.01, K2 = 0.03, L = 1, each channel by itself. Border: only windows that lie wholly inside
-/// count, as in the authors' code; along a side shorter than 11 the window is cut to the largest odd
-/// length that fits. Images are [height][width][3]; values are clamped to [0, 1], NaN as 0.
-/// Errors: invalid_argument where a size is not positive or disagrees.
+/// Computes SSIM (Wang, Bovik, Sheikh and Simoncelli 2004): Gaussian window of 11 x 11 with sigma 1.5,
+/// K1 = 0.01, K2 = 0.03, L = 1, each channel separately. As in the authors' code, only windows
+/// completely inside the image count. Along a side shorter than 11 the window is cut to the largest odd
+/// length that fits.
+/// @param reference, test Shape [height][width][3]. Values are clamped to [0, 1]; NaN counts as 0.
+/// @param width, height Size of both images in pixels.
+/// @return invalid_argument if a size is not positive or disagrees.
 Result<Ssim> ssim(Samples reference, Samples test, int width, int height);
 
 }  // namespace gsnav::eval

@@ -8,26 +8,32 @@
 
 namespace gsnav {
 
-/// Geodesic distances from anywhere on a NavMesh to the nearest of fixed goals, exact or to a chosen
-/// error, computed once: a lookup searches nothing. For rewards and distances to goal that are asked for
-/// every step of an episode.
+/// Precomputed distances along a NavMesh from any point to the nearest of fixed goals. A lookup needs no
+/// search, which suits rewards and distances that are evaluated in every step of an episode.
 ///
-/// A face of the surface is cut into cells when a lookup first falls on it (microseconds, once a face);
-/// the values do not depend on who asks, or in which order. Any number of threads may look up; valid for
-/// as long as its NavMesh. Memory: 56 bytes a window of the search, of which a face has 2 to 16; for
-/// faces that were looked up on at most 17 times that, four or five times on hills.
+/// Distances are exact, or accurate to a chosen relative error. A face of the surface is divided into
+/// cells at its first lookup, which takes microseconds. Values do not depend on the order of lookups.
+/// Lookups are thread-safe. The NavMesh must outlive the field. Memory: 56 bytes per window of the
+/// search (2 to 16 windows per face), plus up to 17 times that for faces that were looked up (four to
+/// five times on hills).
 class GeodesicField {
  public:
-  /// Distances are at most `relative_error` (0 to 0.1) above the exact ones, in parts of them, and never
-  /// below; 0 is exact to rounding. Errors: invalid_argument for no goals or another relative error;
-  /// nothing_navigable naming a goal that is off the mesh.
+  /// Computes the field.
+  /// @param mesh Mesh of the field. It must outlive the field.
+  /// @param goals Goals, world coordinates, metres.
+  /// @param options Limits of snapping the goals to the mesh.
+  /// @param relative_error Distances are never below the exact ones, and at most this fraction above
+  /// them. 0 to 0.1; 0 is exact up to rounding.
+  /// @return invalid_argument if there are no goals or the error is out of range; nothing_navigable,
+  /// with the goal, if a goal is off the mesh.
   static Result<GeodesicField> make(const NavMesh& mesh, std::span<const Vec3d> goals,
                                     const SnapOptions& options = {}, double relative_error = 0.0);
   GeodesicField(GeodesicField&&) noexcept;
   GeodesicField& operator=(GeodesicField&&) noexcept;
   ~GeodesicField();
 
-  /// Metres to the nearest goal; infinity where none is on the point's island or it has no polygon.
+  /// Distance to the nearest goal, metres. Infinity if the point has no polygon or no goal lies on its
+  /// island.
   double distance(const NavPoint& p) const noexcept;
 
  private:

@@ -9,41 +9,46 @@
 
 namespace gsnav {
 
+/// Options of plan_velocity.
 struct LocalPlannerOptions {
-  double max_speed = 1.0;     ///< metres a second
-  double horizon = 4.0;       ///< seconds ahead for which bodies are kept clear of
-  double wall_horizon = 0.5;  ///< seconds ahead for which walls are, where nobody is near
-  double margin = 0.05;       ///< metres kept beyond touching, >= 0
-  double escape_time = 0.5;   ///< seconds in which to leave a body's disc from inside
+  double max_speed = 1.0;     ///< Largest speed, m/s.
+  double horizon = 4.0;       ///< Time for which the plan avoids bodies, seconds.
+  double wall_horizon = 0.5;  ///< Time for which the plan avoids walls when no body is near, seconds.
+  double margin = 0.05;       ///< Distance to keep from bodies, metres, >= 0.
+  double escape_time = 0.5;   ///< Time in which the agent should leave the disc around a body if it is
+                              ///< inside it, seconds.
 };
 
-/// The velocity for the next tick.
+/// Velocity for the next tick.
 struct PlannedVelocity {
-  Vec3d velocity{};  ///< on the ground plane, metres a second
-  bool safe = true;  ///< nobody comes within the margin within the horizon, as far as can be foreseen
-  double contact_after = 0;  ///< seconds until somebody does; the horizon where nobody
-  std::size_t bodies = 0;    ///< avatars that were near enough to matter
+  Vec3d velocity{};  ///< Velocity on the ground plane, m/s.
+  bool safe = true;  ///< True if, as predicted, no body comes within the margin during the horizon.
+  double contact_after = 0;  ///< Predicted time until a body does, seconds. The horizon if none does.
+  std::size_t bodies = 0;    ///< Number of avatars that were near enough to matter.
 };
 
-/// A velocity near `preferred` that meets nobody, as far as can be foreseen from one tick of their
-/// motion, and that leaves a way out.
+/// Chooses a velocity near `preferred` that avoids all bodies, as far as one tick of their motion
+/// predicts, and that leaves room to evade.
 ///
-/// Tried are the velocity of optimal reciprocal collision avoidance (van den Berg et al. 2011) with the
-/// whole responsibility on the agent, because scripted avatars take none, among discs around the avatars
-/// and the edges of the NavMesh; `preferred`; standing; and 24 directions at full and half speed. Each
-/// is walked on the mesh for the horizon and swept against the capsules: within the tick [t0, t1]
-/// (seconds) of `bodies` as they move, then in the pose of its end at the avatar's mean velocity. The
-/// price of a velocity is its difference from `preferred` and the urgency 1 / t of the first contact (as
-/// in van den Berg et al. 2008), once with the margin and once, without, for the best that can be done
-/// after it: backing off is tried like all else, before it is too late. A contact within the tick is
-/// taken only where nothing avoids it, the latest first.
+/// Candidates are: the velocity of optimal reciprocal collision avoidance (ORCA, van den Berg et al.
+/// 2011) among discs around the avatars and the edges of the NavMesh; `preferred`; standing; and 24
+/// directions at full and half speed. In ORCA the agent takes the whole responsibility, because scripted
+/// avatars do not react.
 ///
-/// Where nobody is near it is the velocity nearest to `preferred` that meets no wall. Best effort: take
-/// the step itself by step(), which guarantees. No state; constant in its arguments, so that any number
-/// of threads may plan.
+/// Each candidate is walked on the mesh for the horizon and swept against the capsules. During the tick
+/// [t0, t1] (seconds) of `bodies` they move as given, after that in their final pose at the mean
+/// velocity of their avatar. The cost of a candidate is its difference from `preferred` plus the urgency
+/// 1 / t of the first contact (van den Berg et al. 2008). The urgency is counted twice: once with the
+/// margin, and once without it for the best continuation. The agent therefore backs off before it is too
+/// late. A candidate with a contact within the tick is chosen only if every candidate has one; then the
+/// latest contact wins.
 ///
-/// Zero velocity, not safe, for an agent that is invalid or off the mesh, a velocity that is not finite
-/// or options out of range.
+/// If no body is near, the result is the velocity nearest to `preferred` that meets no wall. The plan is
+/// a prediction; step() guarantees that the agent does not enter a body. The function has no state and
+/// is thread-safe.
+///
+/// @return zero velocity with `safe` = false if the agent is invalid or off the mesh, if `preferred` is
+/// not finite, or if an option is out of range.
 PlannedVelocity plan_velocity(const NavMesh& mesh, const AgentState& agent, const Vec3d& preferred,
                               const CapsuleSet& bodies, const LocalPlannerOptions& options = {});
 

@@ -7,12 +7,12 @@
 
 namespace gsnav::detail {
 
-/// The numbers among a NavMesh's settings, as Habitat names them in JSON and orders them in its
-/// `.navmesh`.
+/// Numeric settings of a NavMesh, with Habitat's JSON names and in the order of a `.navmesh` file.
 inline constexpr std::size_t kSettingCount = 13;
+/// One numeric setting.
 struct SettingField {
-  const char* name;
-  double NavMeshSettings::*value;  ///< null: verts_per_poly
+  const char* name;                ///< Habitat's name.
+  double NavMeshSettings::*value;  ///< Null for verts_per_poly, which is an integer.
 };
 inline constexpr SettingField kSettingFields[kSettingCount] = {
     {"cellSize", &NavMeshSettings::cell_size},

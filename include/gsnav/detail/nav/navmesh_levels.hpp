@@ -10,24 +10,27 @@
 
 namespace gsnav {
 
-/// A storey: surface of about one height.
+/// A storey: the surface of a NavMesh at about one height.
 struct NavLevel {
-  double height = 0.0;  ///< mean over its area, world, metres
-  double area = 0.0;    ///< square metres that `height` is the mean of
+  double height = 0.0;  ///< Mean height over its area in the world, metres.
+  double area = 0.0;    ///< Area that `height` is averaged over, m².
 };
 
+/// Options of find_levels.
 struct LevelOptions {
-  double band = 0.15;    ///< half the range of heights that make a level, metres
-  double min_gap = 1.5;  ///< levels are at least this far apart: a dais or a stair's landing is no level
-  double min_area = 2.0;  ///< square metres that make a level
+  double band = 0.15;     ///< Half the height range of a storey, metres.
+  double min_gap = 1.5;   ///< Smallest height difference of two storeys, metres. It excludes platforms
+                          ///< and landings.
+  double min_area = 2.0;  ///< Smallest area of a storey, m².
 };
 
-/// Storeys of a NavMesh, from the lowest up: the heights with the most surface first, then those that
-/// are left `min_gap` away. Surface sloped by more than 10 degrees (stairs, ramps) counts for none.
+/// Finds the storeys of a NavMesh and returns them from the lowest to the highest. Heights with the
+/// largest area are chosen first, each at least `min_gap` from those before. Surface steeper than 10
+/// degrees (stairs, ramps) is ignored.
 std::vector<NavLevel> find_levels(const NavMesh& mesh, const LevelOptions& options = {});
 
-/// The level that someone at height `y` is on: the highest that lies at most `tolerance` above it. The
-/// lowest where all are higher; none without levels or where y is NaN.
+/// Index of the storey for the height `y`: the highest storey that is at most `tolerance` above y. If
+/// all are higher, the lowest. Nothing if there are no storeys or y is NaN.
 std::optional<std::size_t> level_at(std::span<const NavLevel> levels, double y,
                                     double tolerance = 0.25) noexcept;
 

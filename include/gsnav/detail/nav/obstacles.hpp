@@ -13,43 +13,49 @@
 
 namespace gsnav {
 
-/// The bodies that agents meet during one tick [t0, t1]: capsules whose endpoints and radii move
-/// linearly. Built once a tick and immutable, so that a step, its queries and any number of threads see
-/// the same bodies over the same interval. The order in which capsules were given does not matter.
+/// The moving bodies of one tick [t0, t1]: capsules whose endpoints and radii change linearly.
+/// Immutable, so that a step, its queries and all threads use the same bodies. The order of the input
+/// does not matter.
 class CapsuleSet {
  public:
-  /// Nobody there.
+  /// Creates a set without bodies.
   CapsuleSet() = default;
 
-  /// Validates and sorts `capsules` (world, Y up, metres). Errors (invalid_argument, naming avatar and
-  /// bone): a NaN or infinite number, a negative radius, a coordinate beyond 1e9 m, t1 < t0.
+  /// Checks and sorts capsules (world coordinates, metres, Y up) that move during [t0, t1], seconds.
+  /// @return invalid_argument, with avatar and bone, for a NaN or infinite value, a negative radius, a
+  /// coordinate beyond 1e9 m, or t1 < t0.
   static Result<CapsuleSet> create(std::vector<DynamicCapsule> capsules, double t0 = 0.0,
                                    double t1 = 1.0);
 
-  /// Bodies that stand still.
+  /// Creates a set of bodies that stand still.
   static Result<CapsuleSet> standing(std::span<const Capsule<double>> capsules,
                                      std::uint32_t avatar = 0);
 
+  /// Begin of the interval, seconds.
   double t0() const noexcept { return t0_; }
+  /// End of the interval, seconds.
   double t1() const noexcept { return t1_; }
+  /// True if there are no capsules.
   bool empty() const noexcept { return capsules_.empty(); }
+  /// Number of capsules.
   std::size_t size() const noexcept { return capsules_.size(); }
-  /// All capsules by (avatar, bone).
+  /// All capsules, sorted by avatar and bone.
   std::span<const DynamicCapsule> capsules() const noexcept { return capsules_; }
 
-  /// Fraction of the interval that time t (seconds) is at, in [0, 1].
+  /// Position of time t (seconds) in the interval as a fraction, clamped to [0, 1].
   double fraction_at(double t) const noexcept {
     const double u = t1_ > t0_ ? (t - t0_) / (t1_ - t0_) : 0.0;
     return u > 0.0 ? (u < 1.0 ? u : 1.0) : 0.0;
   }
 
-  /// Consecutive capsules of one avatar and the box that they sweep during the interval.
+  /// Consecutive capsules of one avatar, with the box that they sweep during the interval.
   struct Group {
-    std::size_t first = 0, count = 0;
-    Aabb<double> swept{};
+    std::size_t first = 0, count = 0;  ///< Index of the first capsule; number of capsules.
+    Aabb<double> swept{};              ///< Box that the capsules sweep, metres.
   };
+  /// All groups.
   std::span<const Group> groups() const noexcept { return groups_; }
-  /// Calls f(group), once each, for the groups whose swept box meets `box`: by a grid on the ground
+  /// Calls f(group) once for each group whose swept box intersects `box`. Uses a grid on the ground
   /// plane.
   template <class F>
   void groups_in(const Aabb<double>& box, F&& f) const {
@@ -59,25 +65,26 @@ class CapsuleSet {
         const std::size_t cell = std::size_t{r} * columns_ + c;
         for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
           const std::uint32_t g = in_cell_[i];
-          // A group in many cells belongs to the first of those looked at.
+          // A group lies in several cells. Report it only in the first of those visited.
           if (c != max(q.c0, cells_[g].c0) || r != max(q.r0, cells_[g].r0)) continue;
           if (!apart(box, groups_[g].swept)) f(groups_[g]);
         }
       }
     }
   }
-  /// Whether there is a group whose swept box meets `box`.
+  /// Returns true if the swept box of any group intersects `box`.
   bool meets(const Aabb<double>& box) const {
     bool any = false;
     if (!empty()) groups_in(box, [&](const Group&) { any = true; });
     return any;
   }
+  /// Capsules of a group.
   View<const DynamicCapsule> capsules_of(const Group& g) const noexcept {
     return {capsules_.data() + g.first, g.count};
   }
 
  private:
-  /// Cells that a box reaches into, both ends included.
+  /// Range of cells that a box covers, ends included.
   struct Cells {
     std::uint32_t c0 = 0, c1 = 0, r0 = 0, r1 = 0;
   };
@@ -99,11 +106,11 @@ class CapsuleSet {
   std::vector<DynamicCapsule> capsules_;
   std::vector<Group> groups_;
   double t0_ = 0.0, t1_ = 1.0;
-  Vec3d low_{};  ///< of the grid
+  Vec3d low_{};  ///< Corner of the grid.
   double columns_per_metre_ = 0.0, rows_per_metre_ = 0.0;
   std::uint32_t columns_ = 1, rows_ = 1;
-  std::vector<std::uint32_t> first_{0, 0}, in_cell_;  ///< groups by cell
-  std::vector<Cells> cells_;                          ///< of each group
+  std::vector<std::uint32_t> first_{0, 0}, in_cell_;  ///< Groups, sorted by cell.
+  std::vector<Cells> cells_;                          ///< Cells of each group.
 };
 
 }  // namespace gsnav

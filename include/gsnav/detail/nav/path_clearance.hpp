@@ -7,27 +7,30 @@
 
 namespace gsnav {
 
+/// Options of keep_clear.
 struct ClearanceOptions {
-  /// Metres to keep between the path and the mesh's edges where there is room; between edges that are
-  /// nearer than twice that it goes through the middle. The mesh itself ends an agent's radius from
-  /// walls.
+  /// Distance to keep between the path and the edges of the mesh, metres. Where there is less than twice
+  /// this space, the path goes through the middle. The mesh itself ends one agent radius from walls.
   double clearance = 0.2;
-  double spacing = 0.1;  ///< metres between the path's points, in (0.01, 1]
-  int passes = 200;      ///< each moves a point by half its spacing at most
+  double spacing = 0.1;  ///< Distance between points of the path, metres, in (0.01, 1].
+  int passes = 200;      ///< Number of iterations. Each moves a point by at most half the spacing.
 };
 
-/// A path with room beside it.
+/// A path that keeps its distance from edges.
 struct ClearPath {
-  NavPath path;
-  double least =
-      0.0;  ///< metres to the nearest edge from points between the ends; 2 m above `clearance` at most
+  NavPath path;        ///< The path.
+  double least = 0.0;  ///< Smallest distance from interior points to an edge, metres. At most
+                       ///< `clearance` + 2 m is measured.
 };
 
-/// A shortest path touches the mesh's corners; this one is drawn away from them, as an elastic band
-/// (Quinlan and Khatib, 1993) that edges within `clearance` push. Its ends stay, every leg of it lies on
-/// the surface, and it goes round obstacles on the same side as before. `points`: metres, as find_path
-/// gives them. Errors: invalid_argument (an option, fewer than two points, one that is not finite);
-/// nothing_navigable (a point off the mesh, or two on different islands).
+/// Moves a shortest path away from the corners that it touches. The path is treated as an elastic band
+/// (Quinlan and Khatib, 1993) that edges within `clearance` push away. Its ends stay in place, every leg
+/// lies on the surface, and it passes obstacles on the same side as before.
+/// @param mesh Mesh that the path lies on.
+/// @param points Points of the path, metres, as returned by find_path.
+/// @param options Clearance and limits.
+/// @return invalid_argument for an option out of range, fewer than two points or a value that is not
+/// finite; nothing_navigable if a point is off the mesh or two are on different islands.
 Result<ClearPath> keep_clear(const NavMesh& mesh, std::span<const Vec3d> points,
                              const ClearanceOptions& options = {});
 

@@ -14,12 +14,13 @@
 
 namespace gsnav {
 
-/// Agents that step at the same time.
+/// Steps of several agents.
 struct StepBatch {
-  std::span<const AgentState> agents;  ///< [N]
-  std::span<const Vec3d> desired;      ///< [N], metres
-  std::span<StepResult> results;       ///< [N], written
+  std::span<const AgentState> agents;  ///< Shape [N].
+  std::span<const Vec3d> desired;      ///< Requested displacements, shape [N], metres.
+  std::span<StepResult> results;       ///< Output, shape [N].
 
+  /// Checks that all spans have the same size.
   Status check() const {
     for (const auto& [size, name] :
          {std::pair{desired.size(), "desired"}, std::pair{results.size(), "results"}}) {
@@ -31,9 +32,9 @@ struct StepBatch {
   }
 };
 
-/// step() of many agents among the same bodies, none of whom meets another agent, on the threads of a
-/// host's backend. The results are those of step(), bit for bit, with any number of threads. Errors:
-/// invalid_argument naming the span of another size than the agents.
+/// Performs step() for many agents among the same bodies, on the threads of a host backend. Agents do
+/// not collide with each other. Results are bit-identical to step(), for any number of threads.
+/// @return invalid_argument, with the span whose size differs from that of `agents`.
 template <Backend B>
 requires is_host_backend<B> Status step_all(B& backend, const NavMesh& mesh, const StepBatch& batch,
                                             const CapsuleSet& bodies, const StepOptions& options = {}) {
@@ -44,9 +45,10 @@ requires is_host_backend<B> Status step_all(B& backend, const NavMesh& mesh, con
   return backend.synchronize();
 }
 
-/// The same with a device for the bodies: `host` walks the agents, `device` sweeps all legs of their
-/// ways against all bodies by the same kernel, and who meets nobody is done; `host` steps the others.
-/// The same bits.
+/// Performs step() for many agents with a device for the collision tests. `host` walks the agents
+/// without bodies, `device` sweeps all legs against all bodies, and `host` repeats the step of agents
+/// that meet a body. Results are bit-identical to step().
+/// @return the errors of the other overload.
 template <Backend H, Backend D>
 requires is_host_backend<H> Status step_all(H& host, D& device, const NavMesh& mesh,
                                             const StepBatch& batch, const CapsuleSet& bodies,
@@ -56,7 +58,7 @@ requires is_host_backend<H> Status step_all(H& host, D& device, const NavMesh& m
   static const CapsuleSet nobody;
   if (Status s = step_all(host, mesh, batch, nobody, options); !s) return s;
 
-  // The legs of each way, and standing for what is left of the tick, as step() sweeps them.
+  // Legs of each walk, and standing for the rest of the tick, as step() sweeps them.
   std::vector<SweptLeg> legs;
   std::vector<std::size_t> first{0};
   for (std::size_t i = 0; i < batch.agents.size(); ++i) {

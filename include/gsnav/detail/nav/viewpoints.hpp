@@ -9,10 +9,11 @@
 
 namespace gsnav {
 
-/// Places where sensors of agents on a NavMesh may be, `heights` (metres) above its surface, at most
-/// about `spacing` metres from one another: of each cube of that side that has such places, the one
-/// nearest to its middle, seen from above. World, metres, in a fixed order. Errors: invalid_argument (a
-/// spacing below 1 cm or not finite; a height that is not finite; none).
+/// Possible sensor positions `heights` (metres) above a NavMesh, about `spacing` metres apart. In each
+/// cube of that size that contains candidates, the one nearest to its middle, seen from above, is
+/// returned. World coordinates, metres, in a fixed order.
+/// @return invalid_argument if the spacing is below 1 cm or not finite, or if there are no heights or
+/// one is not finite.
 Result<std::vector<Vec3d>> navmesh_viewpoints(const NavMesh& mesh, std::span<const double> heights,
                                               double spacing = 0.25);
 

@@ -16,21 +16,24 @@
 
 namespace gsnav {
 
-/// A view into one of a batch's scenes at a time. BatchScenes fills what the scene gives to the view.
+/// View into one scene of a batch at one time. BatchScenes fills in the members of `view` that depend on
+/// the scene.
 struct SceneView {
-  std::size_t scene = 0;
-  double time = 0.0;  ///< seconds on the scene's clock
-  SensorView view{};
+  std::size_t scene = 0;  ///< Index of the scene.
+  double time = 0.0;      ///< Time on the scene's clock, seconds.
+  SensorView view{};      ///< Position and orientation of the sensors, and row of the output.
 };
 
-/// The scenes of a batch in a backend's memory, and their avatars posed for the views of a step.
+/// Scenes of a batch in the memory of a backend, with avatars posed for the views of a step.
 template <Backend B>
 class BatchScenes {
  public:
+  /// Returns a scene by its index.
   using SceneOf = std::function<Result<std::shared_ptr<const SimulatorScene>>(std::size_t)>;
 
-  /// `scene_of` gives a scene when a view first needs it; it can be drawn by `render` and `detail`.
-  /// `pose_slots`: for how many times of a scene avatars are held posed at once.
+  /// Creates an empty store. Scenes are fetched when a view first needs them.
+  /// @param scene_of Returns a scene. It must be compatible with `render` and `detail`.
+  /// @param pose_slots Number of times per scene for which posed avatars are held at once.
   BatchScenes(B& backend, SceneOf scene_of, std::size_t count, const RenderConfig& render,
               const DetailChoice& detail, std::size_t pose_slots)
       : backend_(&backend),
@@ -41,7 +44,7 @@ class BatchScenes {
         scenes_(count),
         configs_(count) {}
 
-  /// Frees scenes that are not in use.
+  /// Frees the scenes s with in_use[s] == 0.
   void keep(std::span<const std::uint8_t> in_use) {
     for (std::size_t s = 0; s < scenes_.size(); ++s) {
       if (in_use[s] != 0 || scenes_[s] == nullptr) continue;
@@ -49,22 +52,23 @@ class BatchScenes {
       scenes_[s].reset();
     }
   }
-  /// How many times an avatar was posed so far.
+  /// Number of times that an avatar was posed so far.
   std::size_t pose_count() const noexcept {
     std::size_t sum = left_poses_;
     for (const auto& s : scenes_) sum += s != nullptr ? s->pose_count() : 0;
     return sum;
   }
 
-  /// Poses the scenes for `views` and calls draw(span of SensorView) for them, for as many at a time as
-  /// there are slots. Sorts `views`. `run(n, f)` calls f(i) for i in [0, n) on several threads. Errors:
-  /// what `scene_of`, skinning and `draw` report.
+  /// Poses the scenes for `views` and calls draw(span of SensorView), once for as many views as fit the
+  /// pose slots. Reorders `views`.
+  /// @param run run(n, f) calls f(i) for i in [0, n) on several threads.
+  /// @return the errors of `scene_of`, of skinning or of `draw`.
   template <class Run, class Draw>
   Status draw(std::span<SceneView> views, const SensorPlan& plan, const Run& run, const Draw& draw) {
     for (const SceneView& v : views) {
       if (Status s = place(v.scene); !s) return s;
     }
-    // Without avatars a scene is the same at all times.
+    // A scene without avatars looks the same at all times.
     const auto key = [this](const SceneView& v) {
       return std::pair(v.scene, scenes_[v.scene]->scene().avatars.empty() ? 0.0 : v.time);
     };
@@ -86,7 +90,7 @@ class BatchScenes {
   }
 
  private:
-  /// Views that share a scene and a time, and so a slot that the scene's avatars are posed in.
+  /// Views with the same scene and time. They share a pose slot.
   struct Posed {
     std::span<SceneView> views;
     std::size_t slot;
@@ -94,7 +98,7 @@ class BatchScenes {
     Status status;
   };
 
-  /// Puts a scene into the backend's memory, where it is not there yet.
+  /// Uploads a scene unless it is in the backend's memory already.
   Status place(std::size_t scene) {
     if (scenes_[scene] != nullptr) return {};
     auto held = scene_of_(scene);
@@ -104,8 +108,8 @@ class BatchScenes {
     return {};
   }
 
-  /// Poses posed_ and lists its views. Joints are found by all threads, Gaussians skinned by the
-  /// backend.
+  /// Poses the avatars of posed_ and lists its views in ready_. Joints are computed on all threads,
+  /// Gaussians are skinned by the backend.
   template <class Run>
   Status pose(const SensorPlan& plan, const Run& run) {
     for (const Posed& p : posed_) scenes_[p.views[0].scene]->make_slots(p.slot + 1);
@@ -140,11 +144,11 @@ class BatchScenes {
   RenderConfig render_;
   DetailChoice detail_;
   std::size_t pose_slots_;
-  std::vector<std::unique_ptr<SceneOnBackend<B>>> scenes_;  // null where no view is
-  std::vector<RenderConfig> configs_;                       // of each scene
-  std::size_t left_poses_ = 0;                              // of scenes that were freed
+  std::vector<std::unique_ptr<SceneOnBackend<B>>> scenes_;  // Null for scenes that no view has needed.
+  std::vector<RenderConfig> configs_;                       // One per scene.
+  std::size_t left_poses_ = 0;                              // Poses of scenes that were freed.
   std::vector<Posed> posed_;
-  std::vector<std::size_t> used_;  // slots of each scene
+  std::vector<std::size_t> used_;  // Number of slots used per scene.
   std::vector<SensorView> ready_;
 };
 

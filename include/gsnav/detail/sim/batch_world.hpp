@@ -16,95 +16,112 @@
 
 namespace gsnav {
 
-/// What happens to an environment whose episode has ended: Gymnasium's AutoresetMode.
+/// Treatment of an environment whose episode has ended. Equivalent to Gymnasium's AutoresetMode.
 enum class AutoReset : std::uint8_t {
-  next_step,  ///< the next step ignores its action and begins an episode: reward 0, neither terminated
-              ///< nor truncated
-  same_step,  ///< an episode begins in the step that ended one; BatchInfo::finished has the last metrics
-  disabled,   ///< it waits for reset(mask)
+  next_step,  ///< The next step ignores its action and begins an episode. Its reward is 0, and it is
+              ///< neither terminated nor truncated.
+  same_step,  ///< The step that ends an episode begins the next one. BatchInfo has the metrics of the
+              ///< finished one.
+  disabled,   ///< The environment waits for reset(mask).
 };
 
-/// An episode and the number of the scene that it takes place in.
+/// An episode and the scene in which it takes place.
 struct BatchEpisode {
-  std::size_t scene = 0;
-  PointNavEpisode episode;
+  std::size_t scene = 0;    ///< Index of the scene.
+  PointNavEpisode episode;  ///< The episode.
 };
 
-/// Gives environment `environment` its `count`-th episode, from 0. Called by one thread, in order of
-/// environments.
+/// Function that returns episode number `count` (from 0) of an environment. It is called from one
+/// thread, in the order of environments.
 using EpisodeSource = std::function<Result<BatchEpisode>(std::size_t environment, std::size_t count)>;
 
-/// What one step did in all environments, [N] each. Valid until the next call.
+/// Results of one step for all environments. Spans have shape [N] unless stated otherwise and are valid
+/// until the next call.
 struct BatchInfo {
-  std::span<const double> rewards;
-  std::span<const std::uint8_t> terminated;  ///< stop ended the episode
-  std::span<const std::uint8_t> truncated;   ///< it was cut off
-  std::span<const StepInfo>
-      infos;  ///< of the action; with AutoReset::same_step also where it was the last
-  std::span<const PointGoal> point_goals;  ///< as now observed, so of a new episode where one has begun
-  std::span<const double> times;           ///< seconds on the scenes' clocks
-  std::span<const std::size_t> finished;   ///< environments whose episode ended in this step, rising
-  std::span<const EpisodeMetrics> final_metrics;  ///< of each of `finished`
+  std::span<const double> rewards;           ///< Reward of the action.
+  std::span<const std::uint8_t> terminated;  ///< 1 if `stop` ended the episode.
+  std::span<const std::uint8_t> truncated;   ///< 1 if the episode reached its limit of actions.
+  std::span<const StepInfo> infos;  ///< Outcome of the action. With AutoReset::same_step, this includes
+                                    ///< the last action of a finished episode.
+  std::span<const PointGoal> point_goals;  ///< Goal as observed now. In a new episode, its own goal.
+  std::span<const double> times;           ///< Time on the clock of the environment's scene, seconds.
+  std::span<const std::size_t> finished;   ///< Environments whose episode ended in this step, in
+                                           ///< increasing order.
+  std::span<const EpisodeMetrics> final_metrics;  ///< Metrics of those episodes, one per entry of
+                                                  ///< `finished`.
 };
 
-/// A scene without pictures, shared by environments.
+/// Scene of a BatchWorld: NavMesh and bodies, without anything to render.
 struct BatchScene {
-  /// World::BodySource that is given what an interval that ended at t0 had, or null: nobody need be
-  /// posed for t0 again.
+  /// Like World::BodySource, but also receives the bodies of the interval that ended at t0, or null. It
+  /// then need not pose avatars for t0 again.
   using BodySourceAfter = std::function<void(double t0, double t1, const CapsuleSet* before,
                                              std::vector<DynamicCapsule>& out)>;
 
-  std::shared_ptr<const NavMesh> navmesh;
-  World::BodySource bodies;
+  std::shared_ptr<const NavMesh> navmesh;  ///< Surface that agents walk on.
+  World::BodySource bodies;                ///< Moving bodies.
   BodySourceAfter
-      bodies_after{};  ///< where it is set, used in place of `bodies` during steps, and the same
+      bodies_after{};  ///< If set, replaces `bodies` during steps. It must append the same capsules.
 };
 
-/// Scenes by number, fetched when an episode begins in them and let go when no environment is in them.
+/// Source of scenes, by index. A scene is fetched when an episode begins in it and released when no
+/// environment uses it.
 struct BatchPlaces {
-  std::size_t count = 0;
-  std::function<Result<BatchScene>(std::size_t scene)> get;
-  /// Called for scenes that will be needed; where it is set, the source of episodes is asked for each
-  /// environment's next episode already when one begins.
+  std::size_t count = 0;                                     ///< Number of scenes.
+  std::function<Result<BatchScene>(std::size_t scene)> get;  ///< Returns a scene.
+  /// Called for a scene that will be needed soon. If set, the next episode of an environment is
+  /// requested one episode ahead.
   std::function<void(std::size_t scene)> prefetch;
 };
 
-/// Worlds that step together. Those in one scene over one interval share the bodies of that interval,
-/// which are made once and kept for a while; all else is what each World does, bit for bit, for any
+/// Worlds that step together. Worlds in the same scene and interval share the bodies of that interval,
+/// which are computed once and cached. Each world returns the same bits as a World of its own, for any
 /// number of threads.
 class BatchWorld {
  public:
-  /// Runs f(i) for i in [0, n), in any order and by any threads.
+  /// Function that calls f(i) for each i in [0, n), in any order, on any threads.
   using ParallelFor = std::function<void(std::size_t n, const std::function<void(std::size_t)>& f)>;
 
-  /// Errors: invalid_argument (a setting; no scene; no environment; no source).
+  /// Creates the worlds.
+  /// @return invalid_argument for a setting out of range, or if there are no scenes, environments or
+  /// source of episodes.
   static Result<BatchWorld> create(std::vector<BatchScene> scenes, const TaskConfig& config,
                                    AutoReset auto_reset, std::size_t environments,
                                    EpisodeSource next_episode);
+  /// Creates worlds over scenes that are fetched when needed. Same errors.
   static Result<BatchWorld> create(BatchPlaces places, const TaskConfig& config, AutoReset auto_reset,
                                    std::size_t environments, EpisodeSource next_episode);
 
+  /// Number of environments.
   std::size_t size() const noexcept { return environments_.size(); }
+  /// When finished environments begin their next episode.
   AutoReset auto_reset() const noexcept { return auto_reset_; }
+  /// World of environment e.
   const World& world(std::size_t e) const noexcept { return *environments_[e].world; }
+  /// Index of the scene that environment e is in.
   std::size_t scene_of(std::size_t e) const noexcept { return environments_[e].scene; }
-  /// How many intervals' bodies are held for whoever comes by there later; at most `most` after each
-  /// step.
+  /// Number of intervals whose bodies are cached.
   std::size_t held_bodies() const noexcept { return bodies_.size(); }
+  /// Sets the largest number of intervals that stay cached after a step.
   void keep_bodies(std::size_t most) noexcept { most_bodies_ = most; }
-  /// Whether the last call stepped or reset environment e.
+  /// True if the last call stepped or reset environment e.
   bool moved(std::size_t e) const noexcept { return environments_[e].moved; }
+  /// Results of the last call.
   const BatchInfo& info() const noexcept { return info_; }
 
-  /// Begins the next episode everywhere or where mask[e] is not 0. Errors name the environment: what the
-  /// source and World::reset report; invalid_argument (a mask of another size, or one before the first
-  /// reset).
+  /// Begins the next episode in all environments, or in those where mask[e] is not 0.
+  /// @return errors of the episode source or of World::reset, with the environment; invalid_argument for
+  /// a mask of the wrong size or a mask before the first reset.
   Status reset(const ParallelFor& run, std::span<const std::uint8_t> mask = {});
-  /// One action for each. With same_step, `before_reset` is called where episodes ended, when
-  /// info().finished is known and their worlds are still as they ended. Errors name the environment:
-  /// invalid_argument; what World::step reports; what the callback does.
+  /// Performs one action per environment.
+  /// @param run Runs the environments in parallel.
+  /// @param actions One action per environment.
+  /// @param before_reset With AutoReset::same_step, called when episodes have ended. info().finished is
+  /// then set and the worlds still show the end of their episodes.
+  /// @return invalid_argument, or errors of World::step or of the callback, with the environment.
   Status step(const ParallelFor& run, std::span<const Action> actions,
               const std::function<Status()>& before_reset = {});
+  /// Drives each environment by a velocity for one control period. Same parameters and errors.
   Status step(const ParallelFor& run, std::span<const VelocityCommand> commands,
               const std::function<Status()>& before_reset = {});
 
@@ -114,9 +131,9 @@ class BatchWorld {
     std::size_t scene = 0, episodes = 0;
     World::BodySource source;
     BatchScene::BodySourceAfter source_after;
-    BodyCache::Key last;                       // the interval of the last substep
-    std::optional<Result<BatchEpisode>> next;  // where it was asked for already
-    std::vector<const CapsuleSet*> bodies;     // [substeps]
+    BodyCache::Key last;                       // Interval of the last substep.
+    std::optional<Result<BatchEpisode>> next;  // Next episode if it was requested ahead.
+    std::vector<const CapsuleSet*> bodies;     // Shape [substeps].
     Status status;
     bool moved = false;
   };

@@ -11,24 +11,24 @@
 
 namespace gsnav {
 
-/// Bodies of scenes over intervals of time, kept for whoever comes by there later: episodes that begin
-/// at multiples of the control period meet the same intervals over and over. What was not used for
-/// longest leaves first.
+/// Least-recently-used cache of the bodies of scenes during intervals of time. Episodes that begin at
+/// multiples of the control period meet the same intervals again and again.
 class BodyCache {
  public:
+  /// A scene and an interval.
   struct Key {
-    std::size_t scene = 0;
-    double t0 = 0.0, t1 = 0.0;  ///< seconds
+    std::size_t scene = 0;      ///< Index of the scene.
+    double t0 = 0.0, t1 = 0.0;  ///< Interval, seconds.
     bool operator==(const Key&) const = default;
   };
+  /// Bodies of one key.
   struct Entry {
-    CapsuleSet bodies;
-    bool made = false;                 ///< set by whoever makes the bodies
-    std::list<Key>::iterator place{};  ///< the cache's own
+    CapsuleSet bodies;                 ///< The bodies during the interval.
+    bool made = false;                 ///< Set by the caller once `bodies` is filled in.
+    std::list<Key>::iterator place{};  ///< Position in the list of use.
   };
 
-  /// The entry of `key`, which stays where it is until trim(), and whether its bodies have yet to be
-  /// made.
+  /// Returns the entry of `key`, and true if it is new. The pointer stays valid until trim() or erase().
   std::pair<Entry*, bool> find(const Key& key) {
     const auto [at, fresh] = entries_.try_emplace(key);
     Entry& entry = at->second;
@@ -39,21 +39,23 @@ class BodyCache {
     }
     return {&entry, fresh};
   }
-  /// The bodies of `key` where they are there and made, else null.
+  /// The bodies of `key`, or null if they are not cached or not filled in yet.
   const CapsuleSet* peek(const Key& key) const {
     const auto at = entries_.find(key);
     return at != entries_.end() && at->second.made ? &at->second.bodies : nullptr;
   }
+  /// Removes an entry if it exists.
   void erase(const Key& key) {
     const auto at = entries_.find(key);
     if (at == entries_.end()) return;
     order_.erase(at->second.place);
     entries_.erase(at);
   }
-  /// Forgets the oldest entries where there are more than `most`.
+  /// Removes the least recently used entries until at most `most` remain.
   void trim(std::size_t most) {
     while (entries_.size() > most) erase(Key(order_.front()));
   }
+  /// Number of entries.
   std::size_t size() const noexcept { return entries_.size(); }
 
  private:
@@ -64,7 +66,7 @@ class BodyCache {
     }
   };
   std::unordered_map<Key, Entry, Hash> entries_;
-  std::list<Key> order_;  // the one used last at the end
+  std::list<Key> order_;  // Most recently used last.
 };
 
 }  // namespace gsnav

@@ -18,9 +18,9 @@
 
 namespace gsnav {
 
-/// Backends that draw many cameras in one call, each with sets of its own, into images in their own
-/// memory. Before a call their renderer is asked what it supports and how many cameras one call can draw
-/// (CudaBatchRenderer says what is asked of it).
+/// Backends whose `batch_renderer` draws many cameras in one call, each with its own sets, into images
+/// in the backend's memory. `supports` says whether it can draw a frame, `capacity` how many cameras one
+/// call can draw. CudaBatchRenderer documents the members.
 template <class B>
 concept BatchBackend = Backend<B> && !is_host_backend<B> &&
                        requires(const typename B::batch_renderer& batch, const FrameJob<float>& job,
@@ -29,8 +29,9 @@ concept BatchBackend = Backend<B> && !is_host_backend<B> &&
   { batch.capacity(job.sets, cameras) } -> std::same_as<std::size_t>;
 };
 
-/// Draws frames that share nothing by a backend's batched renderer: all frames of one size, rules and
-/// images by one call, or by as few as it has the capacity for. The bits are those of BasicRenderer.
+/// Draws independent frames with a backend's batched renderer. All frames of one size, configuration and
+/// kind of images are drawn by one call, or by the fewest calls that its capacity allows. Images have
+/// the same bits as those of BasicRenderer.
 template <BatchBackend B>
 class FrameBatch {
  public:
@@ -41,13 +42,15 @@ class FrameBatch {
     return Batch::supports(*job.config, job.sets, job.meshes).ok();
   }
 
-  /// Draws frames that are all supported; their images are in host memory or the backend's, as `to` has
-  /// it. Errors: what rendering reports. Throws gsnav::Error (out_of_memory).
+  /// Draws frames, all of which must be supported. `to` says whether their images are in host memory or
+  /// in backend memory. Waits for the backend. Errors: those of rendering. Throws gsnav::Error
+  /// (out_of_memory).
   Status render(std::span<const FrameJob<float>> jobs, CopyKind to) {
     for (Known& k : known_) k.jobs.clear();
     for (std::size_t j = 0; j < jobs.size(); ++j) group(kind_of(jobs[j])).jobs.push_back(j);
     for (Known& k : known_) {
-      // By where images go, so that they can be drawn there, or copied, together.
+      // Sorted by the addresses of their images, so that neighbours can be drawn in place or copied
+      // together.
       const auto first = [&](std::size_t j) {
         for (const ImageKind<float>& image : kImages<float>) {
           if (float* const p = jobs[j].images.*image.image; p != nullptr) return p;
@@ -70,23 +73,23 @@ class FrameBatch {
  private:
   using Batch = typename B::batch_renderer;
 
-  /// What frames of one call have in common.
+  /// Properties that are equal for all frames of one call.
   struct Kind {
     RenderConfig config;
     int width = 0, height = 0;
     unsigned images = 0;  // Output
-    bool meshes = false;  // among which `fast` has the exponential of `exact`
+    bool meshes = false;  // with meshes, `fast` uses the exponential of `exact`
     bool operator==(const Kind&) const = default;
   };
   struct Known {
     Kind kind;
     std::unique_ptr<Batch> batch;
-    std::vector<std::size_t> jobs;  // of the present call
+    std::vector<std::size_t> jobs;  // of the current call
   };
 
   static Kind kind_of(const FrameJob<float>& job) noexcept {
     Kind k{*job.config, job.camera->width, job.camera->height, 0, !job.meshes.instances.empty()};
-    k.config.outputs = kRgb;  // pointers say which images
+    k.config.outputs = kRgb;  // so that it compares equal; `images` has the outputs
     for (const ImageKind<float>& i : kImages<float>) {
       k.images |= job.images.*i.image != nullptr ? i.output : 0u;
     }
@@ -100,7 +103,8 @@ class FrameBatch {
     return known_.emplace_back(Known{kind, std::make_unique<Batch>(*backend_, kind.config), {}});
   }
 
-  /// Draws frames [begin, begin + count) of a group, whose sets and cameras are listed, by one call.
+  /// Draws the frames [begin, begin + count) of a group by one call. list_sets() has listed the group's
+  /// sets and cameras.
   Status draw(Known& known, std::size_t begin, std::size_t count, std::span<const FrameJob<float>> jobs,
               CopyKind to) {
     const std::span<const std::size_t> which = std::span(known.jobs).subspan(begin, count);
@@ -121,7 +125,8 @@ class FrameBatch {
         if (images.floats.*k.image != nullptr) copy(k, images.floats.*k.image, which, jobs, pixels, to);
       }
     };
-    // At once, so that nothing waits for the host in between; once more where scratch had to grow.
+    // The copies are enqueued before finish(), so that the device does not wait for the host. If scratch
+    // had to grow, finish() has drawn the images again, and they are copied again.
     constexpr bool kSaysReruns = requires(const Batch& b) { b.stats().reruns; };
     if constexpr (kSaysReruns) hand_out();
     if (Status s = known.batch->finish(); !s) return s;
@@ -132,7 +137,8 @@ class FrameBatch {
     return {};
   }
 
-  /// Fills sets_ and cameras_. A set that many look at, a scene's, is listed once.
+  /// Fills sets_ and cameras_ and the lists that the cameras refer to. A set that several frames share
+  /// is listed once.
   void list_sets(std::span<const std::size_t> which, std::span<const FrameJob<float>> jobs) {
     sets_.clear();
     places_.clear();
@@ -143,7 +149,7 @@ class FrameBatch {
       for (const GaussianSet& set : jobs[j].sets) {
         if (set.gaussians.size() != 0) list(set);
       }
-      // A list of no sets stands for all of them.
+      // An empty list would mean all sets, so that a frame without sets gets one empty set.
       if (lists_.size() == first_of(cameras_.size())) list({});
       cameras_.push_back({*jobs[j].camera, {}, jobs[j].meshes});
       ends_.resize(cameras_.size());
@@ -156,14 +162,15 @@ class FrameBatch {
   }
   std::size_t first_of(std::size_t camera) const noexcept { return camera == 0 ? 0 : ends_[camera - 1]; }
 
-  /// Appends to a camera's list: what it sees of the set is its own, the set is all cameras'.
+  /// Appends a set to the list of the last camera. The visible rows of a set are kept per camera, so
+  /// that cameras can share the set.
   void list(GaussianSet set) {
     seen_.push_back(set.selection.seen);
     set.selection.seen = {};
     lists_.push_back(place_of(set));
   }
   std::uint32_t place_of(const GaussianSet& set) {
-    // All of it, bit for bit: where padding differs a set is listed twice, and no image changes.
+    // Compares all bytes. A set whose padding differs is listed twice, which changes no image.
     const auto same = [](const GaussianSet& a, const GaussianSet& b) {
       return std::memcmp(&a, &b, sizeof a) == 0;
     };
@@ -177,7 +184,7 @@ class FrameBatch {
     return place;
   }
 
-  /// Whether all images lie one behind the other, so that a batch may be drawn where they are.
+  /// Whether the images of all frames are contiguous in memory, so that a batch can be drawn in place.
   static bool in_rows(std::span<const std::size_t> which, std::span<const FrameJob<float>> jobs,
                       std::size_t pixels) {
     const FrameImages<float>& first = jobs[which.front()].images;
@@ -204,11 +211,11 @@ class FrameBatch {
   B* backend_;
   std::vector<Known> known_;
   Buffer<float, B> scratch_;
-  // Of the present group.
+  // Data of the current group:
   std::vector<GaussianSet> sets_;
-  std::unordered_multimap<const float*, std::uint32_t> places_;  // in sets_, by their means
+  std::unordered_multimap<const float*, std::uint32_t> places_;  // index in sets_ by address of means
   std::vector<std::uint32_t> lists_;
-  std::vector<View<const std::uint32_t>> seen_;  // of each in these lists
+  std::vector<View<const std::uint32_t>> seen_;  // visible rows of each entry of lists_
   std::vector<std::size_t> ends_;
   std::vector<typename Batch::camera_type> cameras_;
 };

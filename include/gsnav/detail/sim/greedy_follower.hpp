@@ -10,21 +10,24 @@
 
 namespace gsnav {
 
+/// Settings of GreedyGeodesicFollower.
 struct GreedyFollowerOptions {
-  double goal_radius = 0.0;  ///< metres: stop nearer than this; 0: three quarters of a forward step
-  std::size_t thrashing =
-      16;  ///< turns to and fro in a row after which a whole turn is carried out; 0: never
+  double goal_radius = 0.0;    ///< Distance to the goal at which to stop, metres. 0: three quarters of a
+                               ///< forward step.
+  std::size_t thrashing = 16;  ///< Number of alternating turns in a row after which the follower
+                               ///< completes a whole turn. 0: never.
 };
 
-/// A baseline in the manner of Habitat's GreedyGeodesicFollower: sees walls, never people.
+/// Baseline policy modelled on Habitat's GreedyGeodesicFollower. It avoids walls and ignores people.
 ///
-/// At each place it tries "turn k times to one side, then one step" for all k up to half a turn and
-/// takes the first action of the one that brings it nearest to the goal along the surface, in steps,
-/// less a little for every action and for running into a wall. A field of distances makes a trial one
-/// walk and one lookup.
+/// At each step it evaluates "turn k times to one side, then move forward" for all k up to half a turn.
+/// It returns the first action of the candidate with the best score: the distance to the goal along the
+/// surface in steps, with a small penalty per action and for running into a wall. A GeodesicField makes
+/// each evaluation one walk and one lookup.
 class GreedyGeodesicFollower {
  public:
-  /// The mesh must outlive it. Errors: what GeodesicField::make and validate(TaskConfig) report.
+  /// Creates a follower for one goal. The mesh must outlive it.
+  /// @return the errors of GeodesicField::make and validate(TaskConfig).
   static Result<GreedyGeodesicFollower> make(const NavMesh& mesh, const Vec3d& goal,
                                              const TaskConfig& task = {},
                                              const GreedyFollowerOptions& options = {});
@@ -32,13 +35,13 @@ class GreedyGeodesicFollower {
                                              const TaskConfig& task = {},
                                              const GreedyFollowerOptions& options = {}) = delete;
 
-  /// The next action; stop within the goal's radius. Errors: nothing_navigable where the agent is off
-  /// the mesh or the goal cannot be reached from it.
+  /// Returns the next action, or Action::stop within the goal radius.
+  /// @return nothing_navigable if the agent is off the mesh or cannot reach the goal.
   Result<Action> next(const AgentPose& agent);
-  /// All actions from a pose to the goal, stop at the end, where nothing else moves. Errors: as next;
-  /// invalid_argument where `most` actions do not lead there.
+  /// Returns all actions from a pose to the goal, including the final `stop`, if nothing else moves.
+  /// @return the errors of next(); invalid_argument if more than `most` actions are needed.
   Result<std::vector<Action>> all(AgentPose agent, std::size_t most = 5000);
-  /// Forgets the actions so far.
+  /// Forgets the previous actions.
   void reset() { recent_.clear(), pending_.clear(); }
 
  private:
@@ -51,8 +54,8 @@ class GreedyGeodesicFollower {
   GeodesicField field_;
   TaskConfig task_;
   GreedyFollowerOptions options_;
-  std::vector<Action> recent_;   ///< turns since the last step
-  std::vector<Action> pending_;  ///< to be carried out, the last first
+  std::vector<Action> recent_;   ///< Turns since the last forward step.
+  std::vector<Action> pending_;  ///< Remaining actions of a whole turn, the next one last.
 };
 
 }  // namespace gsnav

@@ -12,7 +12,7 @@
 
 namespace gsnav {
 
-/// f(i) for i in [0, n): by the threads of a host backend, else by this one.
+/// Calls f(i) for i in [0, n): in parallel on a host backend, else on the calling thread.
 template <Backend B, class F>
 void for_each_on_host(B& backend, std::size_t n, const F& f) {
   if constexpr (is_host_backend<B>) {
@@ -22,23 +22,24 @@ void for_each_on_host(B& backend, std::size_t n, const F& f) {
   }
 }
 
-/// A frame to draw: camera, sets, meshes, rules, and where its images go.
+/// One image to render: camera, sets, meshes, rules and output.
 struct ImageRequest : FrameJob<float> {
-  const SceneDetail* detail = nullptr;  ///< levels of detail of the first of `sets`; null: whole
+  const SceneDetail* detail = nullptr;  ///< Levels of detail and visible sets of the assets, which are
+                                        ///< the first of `sets`. Null: draw everything.
 };
 
-/// Draws frames that share nothing: chooses what each shows of its assets, then draws what a batched
-/// renderer of the backend supports by that, and everything else by BasicRenderer. The bits are the
-/// same.
+/// Renders independent images. It selects the visible part of the assets for each, renders what the
+/// backend's batch renderer supports in one batch, and renders the rest one by one with BasicRenderer.
+/// Both return the same bits.
 template <Backend B>
 class ImageRenderer {
  public:
   explicit ImageRenderer(B& backend)
       : backend_(&backend), renderer_(backend), batches_(backend), chosen_(backend) {}
 
-  /// Draws all of them into images that are in `memory`; writes the sets and rules that were drawn into
-  /// the requests, valid until the next call. Errors: what rendering reports. Throws gsnav::Error
-  /// (out_of_memory).
+  /// Renders all requests into images in `memory`. Replaces the sets and rules in the requests by those
+  /// that were drawn; they are valid until the next call. Throws gsnav::Error (out_of_memory).
+  /// @return an error of rendering.
   Status render(std::span<ImageRequest> requests, ImageMemory memory) {
     choose_detail(requests);
     jobs_.clear();
@@ -58,8 +59,8 @@ class ImageRenderer {
     }
   }
 
-  /// The same of one request into frames that are made as large as they have to be; request.images is
-  /// not read, request.config->outputs says which.
+  /// Renders one request into `out`, which is resized. `request.config->outputs` selects the images;
+  /// `request.images` is ignored.
   Status render(ImageRequest request, Frames<float>& out) {
     choose_detail(std::span(&request, 1));
     renderer_.set_config(*request.config);
@@ -67,7 +68,7 @@ class ImageRenderer {
     return renderer_.render(request.sets, std::span(request.camera, 1), out);
   }
 
-  /// Of each request of the last call, on host backends; else empty.
+  /// Statistics of each request of the last call. Empty except on host backends.
   std::span<const RenderStats> stats() const noexcept { return stats_; }
 
  private:
@@ -112,7 +113,7 @@ class ImageRenderer {
   BasicRenderer<float, B> renderer_;
   [[no_unique_address]] typename BatchesOf<B>::type batches_;
   ChosenChunks<B> chosen_;
-  std::vector<DetailSets> cuts_;  // of each of these
+  std::vector<DetailSets> cuts_;  // One per element of detailed_.
   std::vector<ImageRequest*> detailed_;
   std::vector<FrameJob<float>> jobs_, single_;
   std::vector<RenderStats> stats_;

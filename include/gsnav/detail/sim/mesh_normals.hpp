@@ -12,16 +12,18 @@
 
 namespace gsnav {
 
-/// Images of a sensor of normals: those of the scene's meshes where a frame's median depth is a mesh's
-/// own.
+/// Renders normal images: normals of the scene's meshes at pixels whose median depth is that of a mesh.
 template <Backend B>
 class MeshNormals {
  public:
   explicit MeshNormals(B& backend) : backend_(&backend), workspace_(backend), normals_(backend) {}
 
-  /// Writes `out` [height][width][3] as SensorKind::normal has it. `seen` [height][width] is the median
-  /// depth of the same camera's frame with the same meshes, in host memory as `out`. Errors: what
-  /// draw_meshes reports.
+  /// Writes the image of a normal sensor (SensorKind::normal).
+  /// @param seen Median depth of the same camera with the same meshes, shape [height][width], host
+  /// memory.
+  /// @param far_plane Surfaces beyond it get no normal, metres.
+  /// @param out Shape [height][width][3], host memory.
+  /// @return the errors of draw_meshes.
   Status draw(const MeshFrame& meshes, const Camera& camera, const float* seen, double far_plane,
               std::span<float> out) {
     if (meshes.instances.empty()) {
@@ -35,7 +37,7 @@ class MeshNormals {
       normals_.resize_discard(out.size());
       images.normal = normals_.data();
     }
-    constexpr int kTile = 16;  // no image depends on it
+    constexpr int kTile = 16;  // The tile size does not affect the image.
     if (Status s = draw_meshes<float>(*backend_, workspace_, meshes.instances, camera, meshes.light,
                                       kTile, false, images);
         !s) {
@@ -52,7 +54,7 @@ class MeshNormals {
     for (std::size_t i = 0; i < out.size() / 3; ++i) {
       float* const n = out.data() + 3 * i;
       const bool shown = seen[i] == depth[i] && static_cast<double>(depth[i]) <= far_plane;
-      const Vec3f v = turn * Vec3f{n[0], n[1], n[2]};  // y down, looking along +z
+      const Vec3f v = turn * Vec3f{n[0], n[1], n[2]};  // The camera has y down and looks along +z.
       n[0] = shown ? v.x : 0.0f;
       n[1] = shown ? -v.y : 0.0f;
       n[2] = shown ? -v.z : 0.0f;
@@ -63,8 +65,8 @@ class MeshNormals {
  private:
   B* backend_;
   MeshWorkspace<float, B> workspace_;
-  Buffer<float, B> normals_;  // in the backend's memory, where that is its own
-  std::vector<float> depth_;  // of the meshes, likewise
+  Buffer<float, B> normals_;  // Normals in the backend's memory, if that differs from host memory.
+  std::vector<float> depth_;  // Host copy of the meshes' depth, if the backend has its own memory.
 };
 
 }  // namespace gsnav

@@ -8,13 +8,16 @@
 
 namespace gsnav {
 
-/// Smallest distance during a tick from an agent that goes along `path` (StepResult::path; it stands
-/// still after the last point) to each avatar among `bodies`: surface to surface, metres, negative in
-/// overlap. `out[k]` belongs to bodies.groups()[k]. Of avatars that stay outside the agent's personal
-/// space and farther away than another one it is a lower bound: no metric asks for more.
+/// Computes the smallest distance from an agent to each avatar during a tick. Distances are between
+/// surfaces, in metres, negative in overlap.
 ///
-/// At any speed it is at most 1e-6 m, and 1e-4 of what the agent and the body move in the tick, more
-/// than the truth.
+/// Errors: at most 1e-6 m plus 1e-4 of the motion of agent and body in the tick above the true value.
+/// For an avatar that stays outside the agent's personal space and farther away than another avatar, the
+/// result is only a lower bound, which is all that the metrics need.
+/// @param path Path of the agent (StepResult::path). It stands still after the last point.
+/// @param radius, height Size of the agent, metres.
+/// @param bodies Motion of the avatars during the tick, one group per avatar.
+/// @param out Resized to bodies.groups().size(). Element k belongs to group k.
 void closest_approach(std::span<const WalkPoint> path, double radius, double height,
                       const CapsuleSet& bodies, std::vector<double>& out);
 

@@ -6,31 +6,35 @@
 
 namespace gsnav {
 
-/// Weights of the reward of one action,
-///     r = progress (g_before - g_after) + slack + success S - proximity i - collision C - wall W,
-/// where g is the distance to the goal along the surface (metres), S is 1 where stop ends the episode in
-/// success, i the intrusion (0 to 1) into the space of the avatar that came nearest, C is 1 where an
-/// avatar was touched or stopped the move, and W where a wall did. The first three are Habitat's for
-/// PointNav, the others are zero there.
+/// Weights of the reward of one action:
+///
+///     r = progress (g_before - g_after) + slack + success S - proximity i - collision C - wall W
+///
+/// g is the distance to the goal along the surface in metres. S is 1 if `stop` ends the episode with
+/// success. i is the intrusion (0 to 1) into the personal space of the nearest avatar. C is 1 if an
+/// avatar was touched or stopped the move, W is 1 if a wall did. The first three weights have Habitat's
+/// PointNav values; Habitat has no others.
 struct RewardConfig {
-  double progress = 1.0;   ///< a metre
-  double slack = -0.01;    ///< an action
-  double success = 2.5;    ///< once
-  double proximity = 0.0;  ///< an action wholly inside somebody's space
-  double collision = 0.0;  ///< an action that meets somebody
-  double wall = 0.0;       ///< an action that runs into a wall
+  double progress = 1.0;   ///< Per metre of progress.
+  double slack = -0.01;    ///< Per action.
+  double success = 2.5;    ///< Once, for success.
+  double proximity = 0.0;  ///< Per action completely inside a person's space.
+  double collision = 0.0;  ///< Per action that collides with a person.
+  double wall = 0.0;       ///< Per action that runs into a wall.
 };
 
-/// What an action did, as far as the reward goes.
+/// Input of the reward for one action.
 struct RewardInput {
-  double before = 0.0, after = 0.0;  ///< distance to the goal along the surface, metres
-  bool success = false;
+  double before = 0.0, after = 0.0;  ///< Distance to the goal along the surface before and after the
+                                     ///< action, metres.
+  bool success = false;              ///< The episode ended with success.
   double avatar_clearance =
-      0.0;  ///< least distance to any avatar during the action, metres; infinity with none
-  bool human_collision = false, wall_collision = false;
+      0.0;  ///< Smallest distance to any avatar during the action, metres. Infinity if there are none.
+  bool human_collision = false, wall_collision = false;  ///< An avatar, or a wall, was touched or
+                                                         ///< stopped the move.
 };
 
-/// Formula above. A goal that is cut off gives no progress.
+/// Computes the reward by the formula of RewardConfig. An unreachable goal gives no progress.
 inline double step_reward(const RewardConfig& w, const RewardInput& in) noexcept {
   const double progress = is_finite(in.before) && is_finite(in.after) ? in.before - in.after : 0.0;
   return w.progress * progress + w.slack + (in.success ? w.success : 0.0) -

@@ -13,29 +13,31 @@
 
 namespace gsnav {
 
-/// How a scene's assets are drawn by levels of detail (docs/concepts/scene.md), by what is seen from
-/// where the camera is, or both.
+/// Selects which part of a scene's assets is drawn: by level of detail (docs/concepts/scene.md), by
+/// visibility from the camera's cell, or both.
 struct SceneDetail {
+  /// Data of one asset.
   struct Asset {
-    const LodTree* tree;  ///< null: all of the cloud, or what of it is seen
-    const GaussianCloud* cloud;
-    Similarity world_from_asset;
-    GaussianRows cloud_there{},
-        merged_there{};  ///< cloud's and tree's arrays in a backend's own memory; empty: the host's
-    const VisibleSets* visible = nullptr;  ///< null: anything may be seen
+    const LodTree* tree;                         ///< Level-of-detail tree. Null: no levels of detail.
+    const GaussianCloud* cloud;                  ///< The Gaussians.
+    Similarity world_from_asset;                 ///< Transform from the asset's frame to the world.
+    GaussianRows cloud_there{}, merged_there{};  ///< Arrays of `cloud` and of the tree in the backend's
+                                                 ///< own memory. Empty if it uses host memory.
+    const VisibleSets* visible = nullptr;        ///< Visible sets. Null: everything may be visible.
     const std::uint32_t* visible_there =
-        nullptr;  ///< visible->bits in a backend's own memory; null: the host's
+        nullptr;  ///< `visible->bits` in the backend's own memory. Null if it uses host memory.
   };
-  std::vector<Asset> assets;  ///< in the order of the scene's sets; empty: all are drawn whole
-  LodChoice choice{};
+  std::vector<Asset> assets;  ///< In the order of the scene's sets. Empty: draw all assets whole.
+  LodChoice choice{};         ///< Settings of the levels of detail.
 };
 
-/// What one camera draws of a scene by levels of detail and visible sets. It depends on the camera
-/// alone, not on what was seen before: a simulator that is set back to a state, or is one of a batch,
-/// sees the same bits.
+/// The sets that one camera draws with levels of detail and visible sets. They depend only on the
+/// camera, not on earlier views. A simulator that was restored to a state, or is part of a batch,
+/// therefore renders the same bits.
 class DetailSets {
  public:
-  /// `sets`: the scene's, assets first, then avatars, which stay as they are. Valid until the next call.
+  /// Selects the sets for a camera. The result is valid until the next call.
+  /// @param sets Sets of the scene: assets first, then avatars, which are not changed.
   std::span<const GaussianSet> select(const SceneDetail& detail, std::span<const GaussianSet> sets,
                                       const Camera& camera) {
     LodChoice choice = detail.choice;
@@ -81,27 +83,28 @@ class DetailSets {
     return sets_;
   }
 
-  /// The last choice, its chunks where place_chunks() put them.
+  /// Result of the last select(), with chunk lists where place_chunks() put them.
   std::span<const GaussianSet> sets() const noexcept { return sets_; }
-  /// The rules by which to draw them; valid until the next call.
+  /// Render settings for these sets. Valid until the next call.
   const RenderConfig& rules(const RenderConfig& config) {
     rules_ = lod_config(config, stats_);
     return rules_;
   }
 
-  /// How asset `a`, which has a tree, was cut by the last choice; its sets are of the host's arrays.
+  /// How the last select() cut asset `a`. The asset must have a tree. The sets of the cut refer to host
+  /// arrays.
   const LodCut& cut(std::size_t a) const noexcept { return *cuts_[a].cut; }
-  /// Gaussians of the assets that the last choice left out since nothing of them is seen from the
-  /// camera's cell; where sets know of whole chunks only, less than a chunk too few.
+  /// Number of Gaussians that the last select() left out because they are invisible from the camera's
+  /// cell. If visibility is known only per chunk, it may be less than a chunk too low.
   std::uint64_t unseen() const noexcept {
     std::uint64_t sum = 0;
     for (const auto& [sets, cell, rows] : looked_from_) sum += rows - sets->count_seen_rows(cell, rows);
     return sum;
   }
 
-  /// Chunks of the last choice that a backend with a memory of its own has to be given, and where they
-  /// are there.
+  /// Chunk lists of the last select() that a backend with its own memory needs.
   std::span<const std::uint32_t> chunks() const noexcept { return chunks_; }
+  /// Sets where the chunk lists are in the backend's memory.
   void place_chunks(const std::uint32_t* there) noexcept {
     for (const std::size_t s : to_place_) {
       View<const std::uint32_t>& drawn = sets_[s].selection.drawn_chunks;
@@ -111,7 +114,7 @@ class DetailSets {
   }
 
  private:
-  /// From the host's arrays to the backend's.
+  /// Changes a set from host arrays to the backend's arrays.
   void move(const SceneDetail::Asset& asset, GaussianSet& set, std::optional<std::size_t> cell) {
     const View<const std::uint32_t> drawn = set.selection.drawn_chunks;
     chunks_.insert(chunks_.end(), drawn.data, drawn.data + drawn.size);
@@ -129,23 +132,24 @@ class DetailSets {
   std::vector<Cut> cuts_;
   std::vector<GaussianSet> sets_;
   std::vector<std::uint32_t> chunks_;
-  std::vector<std::size_t> to_place_;  // sets whose chunks these are
-  LodStats stats_;                     // shown and merged of all
+  std::vector<std::size_t> to_place_;  // Indices of the sets that own chunks_.
+  LodStats stats_;                     // Totals of all cuts.
   struct LookedFrom {
     const VisibleSets* sets;
-    std::size_t cell, rows;  // of the asset's cloud
+    std::size_t cell, rows;  // Cell, and number of rows of the asset's cloud.
   };
   std::vector<LookedFrom> looked_from_;
   RenderConfig rules_;
 };
 
-/// Takes what cuts chose to where a backend reads it: for a memory of its own, in one copy.
+/// Makes chosen chunk lists readable for the backend. If it has its own memory, all lists are uploaded
+/// in one copy.
 template <Backend B>
 class ChosenChunks {
  public:
   explicit ChosenChunks(B& backend) : there_(backend) {}
 
-  /// The sets of these cuts can be drawn until the next call.
+  /// Uploads the lists of these cuts. Their sets can be drawn until the next call.
   void place(std::span<DetailSets> cuts) {
     if constexpr (!is_host_backend<B>) {
       all_.clear();

@@ -16,39 +16,46 @@
 
 namespace gsnav {
 
-/// Bytes that a scene's Gaussians, its people and their capsules take on the host; a NavMesh is small
-/// beside them.
+/// Bytes of host memory that the Gaussians, avatars and capsules of a scene take. The NavMesh is not
+/// counted; it is small in comparison.
 std::size_t scene_bytes(const SimulatorScene& scene) noexcept;
 
-/// A scene that is loaded when somebody needs it.
+/// A scene that is loaded on demand.
 struct SceneEntry {
-  std::string name;                              ///< for messages, a file's path say
-  std::function<Result<SimulatorScene>()> load;  ///< by another thread; gives the same scene each time
+  std::string name;                              ///< Name in messages, for example the path of a file.
+  std::function<Result<SimulatorScene>()> load;  ///< Loads the scene, on another thread. It must return
+                                                 ///< the same scene each time.
 };
 
-/// Scenes by number, loaded in the background by one thread and kept while they fit a budget. Where they
-/// do not, the one that was used least recently leaves first; one that somebody holds stays. Any thread
-/// may use it.
+/// Cache of scenes, by index. One background thread loads scenes. When the memory budget is exceeded,
+/// the least recently used scene that is not in use is freed. Thread-safe.
 class SceneLibrary {
  public:
-  /// `budget` is in bytes, as scene_bytes counts; what is in use may exceed it. Errors: invalid_argument
-  /// (no scene; one without a way to load it).
+  /// Creates a library.
+  /// @param scenes Names of the scenes, with the functions that load them.
+  /// @param budget Memory budget in bytes, as counted by scene_bytes(). Scenes in use may exceed it.
+  /// @return invalid_argument if there are no scenes or one has no load function.
   static Result<std::shared_ptr<SceneLibrary>> create(std::vector<SceneEntry> scenes,
                                                       std::size_t budget);
-  ~SceneLibrary();  ///< waits for the scene that is being loaded
+  /// Waits for the scene that is being loaded.
+  ~SceneLibrary();
   SceneLibrary(const SceneLibrary&) = delete;
   SceneLibrary& operator=(const SceneLibrary&) = delete;
 
+  /// Number of scenes.
   std::size_t size() const noexcept { return slots_.size(); }
-  /// Begins to load scene `index`, unless it is there.
+  /// Starts loading scene `index` unless it is in memory.
   void prefetch(std::size_t index);
-  /// Scene `index`, when it has been loaded. Errors: invalid_argument (there is none); what loading
-  /// reports, with the scene's name. What failed is tried again the next time.
+  /// Returns scene `index`, after waiting for it to load. A load that failed is repeated at the next
+  /// call.
+  /// @return invalid_argument if there is no such scene; an error of loading, with the scene's name.
   Result<std::shared_ptr<const SimulatorScene>> get(std::size_t index);
 
-  /// What is held now, and how many scenes were loaded so far.
+  /// Memory of the scenes held, in bytes.
   std::size_t bytes() const;
+  /// Number of loads so far.
   std::size_t loads() const;
+  /// True if scene `index` is in memory.
   bool holds(std::size_t index) const;
 
  private:

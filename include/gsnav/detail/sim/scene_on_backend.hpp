@@ -17,13 +17,14 @@
 
 namespace gsnav {
 
-/// A scene in a backend's memory, its avatars posed for one or a few times at once. Each time that is
-/// held needs the avatars' means and orientations once more, so what this takes grows with `slots`, not
-/// with who looks.
+/// A scene in a backend's memory, with avatars posed for one or more times. Each pose slot holds the
+/// means and orientations of all avatars, so memory grows with the number of slots, not with the number
+/// of views.
 template <Backend B>
 class SceneOnBackend {
  public:
-  /// `choice`: of levels of detail and visible sets, which the scene has (validate_detail).
+  /// Uploads a scene.
+  /// @param choice Levels of detail and visible sets to use. The scene must have them (validate_detail).
   SceneOnBackend(B& backend, std::shared_ptr<const SimulatorScene> scene,
                  const DetailChoice& choice = {})
       : backend_(&backend), scene_(std::move(scene)) {
@@ -47,7 +48,7 @@ class SceneOnBackend {
       }
     }
     for (std::size_t m = 0; m < scene_->meshes.size(); ++m) place(m);
-    // People of one body share it.
+    // Avatars with the same asset share its arrays.
     for (const AvatarActor& actor : scene_->avatars) {
       std::shared_ptr<const AvatarArrays<B>> body;
       for (const auto& known : bodies_) body = known->asset() == actor.asset() ? known : body;
@@ -56,33 +57,36 @@ class SceneOnBackend {
     }
   }
 
+  /// The scene.
   const SimulatorScene& scene() const noexcept { return *scene_; }
-  /// `config` with the sort order of the scene's assets, and the rules of levels of detail, or of
-  /// visible sets, where it has them.
+  /// `config` with the sort order of the scene's assets and, if used, the rules of levels of detail or
+  /// visible sets.
   RenderConfig render_config(RenderConfig config) const noexcept {
     if (detail() != nullptr) config = lod_config(config);
     if (!scene_->assets.empty()) config.sort_order = scene_->assets.front().sort_order();
     return config;
   }
-  /// The scene without its avatars.
+  /// Sets of the assets, without avatars.
   std::span<const GaussianSet> assets() const noexcept { return sets_; }
-  /// The scene's meshes; an instance's id is the number of the SceneMesh that it is of.
+  /// Meshes of the scene. The id of an instance is the index of its SceneMesh.
   MeshFrame meshes() const noexcept { return {instances_, scene_->light}; }
-  /// What its assets are drawn by, each camera by its own cut; null: whole.
+  /// How the assets are selected per camera. Null: draw them whole.
   const SceneDetail* detail() const noexcept { return detail_.assets.empty() ? nullptr : &detail_; }
-  /// How many times an avatar was posed so far.
+  /// Number of times that an avatar was posed so far.
   std::size_t pose_count() const noexcept { return pose_count_; }
 
-  /// Poses slot `slot` for time t (seconds on the scene's clock), for whoever looks; nothing is done
-  /// where it is so already. Errors: what skinning reports.
+  /// Poses slot `slot` for time t (seconds on the scene's clock), for any camera. Does nothing if the
+  /// slot has this pose.
+  /// @return an error of skinning.
   Status pose(std::size_t slot, double t) {
     Slot& s = at(slot);
     if (s.whole && s.time == t) return {};
     return posed(s, t, true, [&] { return s.people.pose(scene_->avatars, t); });
   }
-  /// The same for what these cameras see, in two steps: avatars that none of them can see cost little.
-  /// The first is the host's alone: several threads may take it, each for another slot, once there are
-  /// so many (make_slots). Errors: as of pose.
+  /// Poses slot `slot` for certain cameras, in two steps: prepare(), then pose_prepared(). Avatars that
+  /// no camera can see cost little. prepare() runs on the host only; several threads may call it for
+  /// different slots after make_slots().
+  /// @return an error of skinning.
   Status prepare(std::size_t slot, double t, std::span<const Camera> cameras,
                  const RenderConfig& config) {
     Slot& s = *slots_[slot];
@@ -90,14 +94,16 @@ class SceneOnBackend {
     s.time = t;
     return s.people.prepare(scene_->avatars, t, cameras, config);
   }
+  /// Second step of prepare(): skins the Gaussians.
   Status pose_prepared(std::size_t slot) {
     Slot& s = *slots_[slot];
     return posed(s, s.time, false, [&] { return s.people.skin_prepared(); });
   }
+  /// Creates slots 0 to count - 1.
   void make_slots(std::size_t count) {
     if (count > 0) at(count - 1);
   }
-  /// Assets, then avatars, as last posed. Valid until the slot is posed again.
+  /// Sets of a slot, assets first, then avatars. Valid until the slot is posed again.
   std::span<const GaussianSet> sets(std::size_t slot) const noexcept { return slots_[slot]->sets; }
 
  private:
@@ -106,7 +112,7 @@ class SceneOnBackend {
     SkinnedCrowd<B> people;
     std::vector<GaussianSet> sets;
     double time = 0.0;
-    bool whole = false;  // posed for any camera
+    bool whole = false;  // True if posed for any camera.
   };
 
   Slot& at(std::size_t slot) {
@@ -154,13 +160,14 @@ class SceneOnBackend {
   B* backend_;
   std::shared_ptr<const SimulatorScene> scene_;
   std::vector<GaussianArrays<B>> arrays_;
-  std::vector<GaussianSet> sets_;          // of the assets
-  std::vector<GaussianArrays<B>> merged_;  // of their trees, where the backend has a memory of its own
-  std::vector<Buffer<std::uint32_t, B>> visible_;  // their visible sets, likewise
+  std::vector<GaussianSet> sets_;          // Assets.
+  std::vector<GaussianArrays<B>> merged_;  // Merged Gaussians of the trees, if the backend has its own
+                                           // memory.
+  std::vector<Buffer<std::uint32_t, B>> visible_;  // Bits of the visible sets, likewise.
   SceneDetail detail_;
   std::vector<MeshArrays<B>> mesh_arrays_;
   std::vector<MeshInstance> instances_;
-  std::vector<std::shared_ptr<const AvatarArrays<B>>> bodies_;  // of each avatar
+  std::vector<std::shared_ptr<const AvatarArrays<B>>> bodies_;  // One per avatar.
   std::vector<std::unique_ptr<Slot>> slots_;
   std::size_t pose_count_ = 0;
 };

@@ -13,22 +13,23 @@
 
 namespace gsnav {
 
-/// Which set of Gaussians, or which of a scene's meshes, a pixel shows: each is rendered white in one
-/// channel, three to a render, and black in the others, so that a channel is how much of the pixel it
-/// is. Exact: the same list, order and alphas as in colour. Meshes are numbered behind the sets, by
-/// MeshInstance::id.
+/// Render passes for a semantic image: each shows which sets and meshes cover a pixel. A pass draws
+/// three of them white in one colour channel each, and everything else black. A channel then is the
+/// fraction of the pixel that its object covers. It is exact, because sorting and alphas are those of
+/// the colour image. Meshes are numbered after the sets, by MeshInstance::id.
 template <Backend B>
 class SemanticPasses {
  public:
+  /// Objects per pass.
   static constexpr std::size_t kChannels = 3;
 
   explicit SemanticPasses(B& backend)
       : shades_{Floats(backend), Floats(backend), Floats(backend), Floats(backend)} {}
 
-  /// Passes for so many sets and meshes.
+  /// Number of passes for a number of sets and meshes.
   static std::size_t count(std::size_t things) noexcept { return (things + kChannels - 1) / kChannels; }
 
-  /// Makes room for sets of so many Gaussians; what recolored() returned before is then void.
+  /// Allocates for sets of up to `gaussians` Gaussians. Invalidates earlier results of recolored().
   void reserve(std::size_t gaussians) {
     if (gaussians <= size_) return;
     size_ = gaussians;
@@ -39,27 +40,27 @@ class SemanticPasses {
     }
   }
 
-  /// The sets as pass `pass` draws them; they point into this object.
+  /// The sets, coloured for pass `pass`. They point into this object.
   std::vector<GaussianSet> recolored(std::span<const GaussianSet> sets, std::size_t pass) const {
     std::vector<GaussianSet> out(sets.begin(), sets.end());
     for (std::size_t i = 0; i < out.size(); ++i) {
       const std::size_t channel = i / kChannels == pass ? i % kChannels : kChannels;
       GaussianRows& g = out[i].gaussians;
       g.color = {};
-      // 0 and 1 are the same in every colour space.
+      // 0 and 1 have the same value in every colour space.
       g.color.sh0 = {shades_[channel].data(), kChannels * g.size()};
     }
     return out;
   }
 
-  /// The meshes as pass `pass` draws them, where there are so many sets.
+  /// The meshes, coloured for pass `pass`. `sets` is the number of sets.
   static std::vector<MeshInstance> recolored(std::span<const MeshInstance> meshes, std::size_t sets,
                                              std::size_t pass) {
     std::vector<MeshInstance> out(meshes.begin(), meshes.end());
     for (MeshInstance& m : out) {
       const std::size_t thing = sets + m.id,
                         channel = thing / kChannels == pass ? thing % kChannels : kChannels;
-      m.mesh.base_color_only = true;  // holes and what is seen through stay
+      m.mesh.base_color_only = true;  // Keep cut-outs and transparency.
       m.mesh.unlit = true;
       m.mesh.base_color = {channel == 0 ? 1.0f : 0.0f, channel == 1 ? 1.0f : 0.0f,
                            channel == 2 ? 1.0f : 0.0f};
@@ -70,13 +71,15 @@ class SemanticPasses {
  private:
   using Floats = Buffer<float, B>;
   static constexpr float kWhite =
-      0.5f / 0.28209479177387814f;            // the coefficient whose colour is 1; its negative, 0
-  std::array<Floats, kChannels + 1> shades_;  // red, green, blue, black
+      0.5f / 0.28209479177387814f;            // SH coefficient of colour 1. Its negative gives 0.
+  std::array<Floats, kChannels + 1> shades_;  // Red, green, blue, black.
   std::size_t size_ = 0;
 };
 
-/// One plus the set or mesh with the largest share in each pixel, 0 where all together cover less than
-/// half of it. `shares[p]` is pass p's image, [pixels][3]; of equal sets the first counts.
+/// Writes the label of each pixel: 1 + the index of the set or mesh that covers most of it, or 0 if all
+/// together cover less than half. The first of equal shares wins.
+/// @param shares shares[p] is the image of pass p, shape [pixels][3].
+/// @param things Number of sets and meshes.
 inline void label_pixels(std::span<const std::vector<float>> shares, std::size_t things,
                          std::span<float> labels) noexcept {
   for (std::size_t i = 0; i < labels.size(); ++i) {

@@ -12,18 +12,19 @@
 
 namespace gsnav {
 
-/// What each pixel of a camera mostly shows: a set of Gaussians, or a mesh among them.
+/// Semantic image of one camera: which set of Gaussians or mesh covers most of each pixel.
 struct SemanticFrame {
-  /// [H][W]: 0 where sets and meshes together cover less than half of the pixel. Otherwise what covers
-  /// most of it: 1 + the index of the set, or 1 + the number of sets + the index of the mesh instance.
-  /// Of equals the first.
+  /// Shape [height][width]. 0 if sets and meshes together cover less than half of the pixel. Otherwise
+  /// the object that covers most of it: 1 + the index of the set, or 1 + the number of sets + the index
+  /// of the mesh instance. The first of equal shares wins.
   std::vector<std::uint32_t> labels;
-  std::vector<float> weights;  ///< [H][W], the share of the pixel that it covers; 0 where the label is 0
+  std::vector<float> weights;  ///< Shape [height][width]. Fraction of the pixel that the object covers,
+                               ///< 0 if the label is 0.
 };
 
-/// Renders semantic ids of frames in which meshes stand among Gaussians. Each render marks three sets
-/// with a colour channel each and draws all the others black, so that the weights are those with which
-/// the colours of the same frame were blended. Ids are never mixed.
+/// Renders semantic images of meshes among Gaussians. Each pass draws three sets with one colour channel
+/// each and the others black. The weights are therefore those with which the colours of the image are
+/// blended. Labels are never interpolated.
 template <class S, Backend B>
 class SemanticFrames {
  public:
@@ -35,8 +36,9 @@ class SemanticFrames {
         alpha_(backend),
         instance_(backend) {}
 
-  /// Sets and meshes as for draw_frame, arrays in the backend's memory. Errors: those of
-  /// draw_frame.
+  /// Renders the labels of one camera. Sets and meshes are those of draw_frame, with arrays in the
+  /// backend's memory.
+  /// @return the errors of draw_frame.
   Status render(std::span<const GaussianSet> sets, std::span<const MeshInstance> meshes,
                 const Camera& camera, const RenderConfig& config, SemanticFrame& out) {
     if (Status s = validate(camera); !s) return s;
@@ -74,8 +76,8 @@ class SemanticFrames {
     return {};
   }
 
-  /// Makes all meshes black and unlit. An opaque one has of a pixel what the others leave of its alpha.
-  /// Those that are seen through are marked in passes, after the sets.
+  /// Makes all meshes black and unlit. An opaque mesh gets the part of the pixel's alpha that the other
+  /// objects leave. Transparent meshes are marked in passes, after the sets.
   Status blacken(std::span<const MeshInstance> meshes) {
     black_.assign(meshes.begin(), meshes.end());
     through_.clear();
@@ -105,7 +107,7 @@ class SemanticFrames {
     return {};
   }
 
-  /// Renders with the things of a pass marked, on black.
+  /// Renders with the objects of pass `pass` marked, on a black background.
   Status draw_pass(std::span<const GaussianSet> sets, const Camera& camera, const RenderConfig& config,
                    std::size_t pass) {
     RenderConfig plain = config;
@@ -141,7 +143,7 @@ class SemanticFrames {
     }
   }
 
-  /// An opaque mesh closes its pixels, whose alpha then is 1.
+  /// Adds opaque meshes. An opaque mesh closes its pixels, so their alpha is 1.
   void take_nearest_meshes(std::size_t sets, SemanticFrame& out) {
     for (std::size_t p = 0; p < pixels_; ++p) {
       const S rest = host_alpha_[p] - covered_[p];
@@ -165,7 +167,7 @@ class SemanticFrames {
   Buffer<std::uint32_t, B> instance_;
   std::size_t pixels_ = 0;
   std::vector<MeshInstance> black_;
-  std::vector<std::size_t> through_;  ///< meshes that are seen through
+  std::vector<std::size_t> through_;  ///< Indices of transparent meshes.
   std::vector<std::uint32_t> host_instance_;
   std::vector<S> host_rgb_, host_alpha_, covered_;
 };

@@ -14,82 +14,93 @@
 
 namespace gsnav {
 
+/// Kind of image that a sensor produces.
 enum class SensorKind : std::uint8_t {
-  rgb,    ///< [H][W][3] float32, display-referred, 0 to 1 and above
-  depth,  ///< [H][W] float32, metres (median), 0: no return; planar z, along the ray where not pinhole
-  alpha,  ///< [H][W] float32, how much of the pixel is covered
-  /// [H][W] float32, whose most of the pixel is: 1, 2, ... the scene's assets, its avatars, its meshes;
-  /// 0: nobody's
+  rgb,    ///< Colour, float32 [height][width][3], display-referred, 0 to 1 and above.
+  depth,  ///< Median depth, float32 [height][width], metres. 0: no return. Planar z for pinholes,
+          ///< distance along the ray for other models.
+  alpha,  ///< Covered fraction of the pixel, float32 [height][width].
+  /// Id of the object that covers most of the pixel, float32 [height][width]. 1 to n in the order
+  /// assets, avatars, meshes; 0 is background.
   semantic,
-  /// [H][W][3] float32, where the depth sensor would see a mesh that surface's normal, unit, on the
-  /// camera's side, in the sensor's axes (x right, y up, looking along -z); 0 elsewhere. Host backends.
+  /// Unit normal of the mesh that the depth sensor would see, float32 [height][width][3], towards the
+  /// camera, in the sensor's axes (x right, y up, looking along -z). 0 elsewhere. Host backends only.
   normal,
 };
 
-/// How directions become pixels.
+/// Camera model of a sensor.
 enum class SensorModel : std::uint8_t {
+  /// Perspective projection.
   pinhole,
-  equirectangular,  ///< all around: columns are longitude from -180 to 180 degrees, rows latitude from
-                    ///< 90 to -90
-  fisheye,  ///< double sphere (Usenko et al. 2018); directions that it does not see are black, depth 0
+  equirectangular,  ///< Full sphere. Columns are longitude from -180 to 180 degrees, rows are latitude
+                    ///< from 90 to -90 degrees.
+  fisheye,  ///< Double sphere model (Usenko et al. 2018). Pixels outside its field of view are black
+            ///< with depth 0.
 };
 
-/// The double sphere model. The defaults are Habitat's.
+/// Parameters of the double sphere model. The defaults are those of Habitat.
 struct FisheyeLens {
-  double alpha = 0.59, xi = -0.18;
-  /// Pixels; 0: such that the middle row spans the sensor's hfov, which the lens must see.
+  double alpha = 0.59, xi = -0.18;  ///< Parameters of the model.
+  /// Focal lengths in pixels. 0: chosen so that the middle row spans the sensor's hfov, which the lens
+  /// must cover.
   std::array<double, 2> focal_length{0.0, 0.0};
-  std::array<double, 2> principal_point_offset{0.0, 0.0};  ///< from the image's centre, pixels
+  std::array<double, 2> principal_point_offset{0.0, 0.0};  ///< Offset from the image centre, pixels.
 };
 
-/// A sensor fixed to the agent, with Habitat's conventions and defaults.
+/// A camera fixed to the agent. Conventions and defaults are those of Habitat.
 struct SensorSpec {
-  std::string uuid = "rgb";  ///< names the observation; unique
-  SensorKind kind = SensorKind::rgb;
-  SensorModel model = SensorModel::pinhole;
-  std::array<int, 2> resolution{256, 256};  ///< height, width in pixels
-  double hfov = 90.0;                       ///< horizontal field of view, degrees; square pixels
-  Vec3d position{0.0, 1.5, 0.0};            ///< from the agent's base, agent frame, metres
-  Vec3d orientation{};                      ///< Euler angles about X, then Y, then Z, radians
-  double near_plane = 0.01;                 ///< metres
-  double near_sigma = 1.0;                  ///< see Camera::near_sigma
-  double far_plane = 1000.0;                ///< metres; depth beyond it is no return
-  FisheyeLens fisheye{};
-  /// Pixels along the edge of the cube of pinhole images that other models are sampled from; 0: half the
-  /// width.
+  std::string uuid = "rgb";                  ///< Name of the observation, unique per agent.
+  SensorKind kind = SensorKind::rgb;         ///< Quantity that the sensor measures.
+  SensorModel model = SensorModel::pinhole;  ///< Camera model.
+  std::array<int, 2> resolution{256, 256};   ///< Height and width in pixels.
+  double hfov = 90.0;                        ///< Horizontal field of view, degrees. Pixels are square.
+  Vec3d position{0.0, 1.5, 0.0};             ///< Position relative to the agent's base, agent frame,
+                                             ///< metres.
+  Vec3d orientation{};                       ///< Euler angles about X, then Y, then Z, radians.
+  double near_plane = 0.01;                  ///< Near plane, metres.
+  double near_sigma = 1.0;                   ///< See Camera::near_sigma.
+  double far_plane = 1000.0;                 ///< Far plane, metres. Depth beyond it is no return.
+  FisheyeLens fisheye{};                     ///< Lens of SensorModel::fisheye.
+  /// Edge of the cube of pinhole images that other models are resampled from, in pixels. 0: half the
+  /// image width.
   int cube_size = 0;
-  NoiseModel noise{};
+  NoiseModel noise{};  ///< Noise that is added to the image.
 };
 
-/// An RGB and a depth sensor ("rgb", "depth") at one place: they share one render.
+/// An RGB and a depth sensor ("rgb", "depth") at the same position. They share one render.
 std::vector<SensorSpec> rgbd_sensors(int height = 256, int width = 256, double hfov = 90.0,
                                      const Vec3d& position = {0.0, 1.5, 0.0});
 
-/// The sensors of the PointNav v2 challenge: 360x640, 70 degrees, 0.88 m high, looking down by 20
+/// Sensors of the PointNav v2 challenge: 360 x 640 pixels, 70 degrees, 0.88 m high, tilted down by 20
 /// degrees, with noise.
 std::vector<SensorSpec> pointnav_v2_sensors();
 
-/// Channels of a sensor's image.
+/// Number of channels of a sensor's image.
 inline int channels_of(SensorKind kind) noexcept {
   return kind == SensorKind::rgb || kind == SensorKind::normal ? 3 : 1;
 }
 
-/// invalid_argument, naming the sensor and its field, where a value is impossible.
+/// Checks a sensor.
+/// @return invalid_argument, with the sensor and the field that is out of range.
 Status validate(const SensorSpec& spec);
 
-/// The same of each of a body's sensors; also where two have one name.
+/// Checks all sensors of an agent, and that their names are unique.
+/// @return invalid_argument, with the sensor and the field.
 Status validate(std::span<const SensorSpec> sensors);
 
-/// True where both sensors see through one camera, so that one render serves them.
+/// Returns true if both sensors have the same camera, so that one render serves both.
 bool same_camera(const SensorSpec& a, const SensorSpec& b) noexcept;
 
-/// The camera of a pinhole sensor on an agent at `base` (world, metres), turned by `rotation`, the
-/// sensor tilted by `pitch` (radians, positive upwards). Here, and nowhere else, Habitat's camera (x
-/// right, y up, looking along -z) becomes the library's (x right, y down, looking along +z).
+/// Camera of a pinhole sensor on an agent. This is the only place where Habitat's camera (x right, y up,
+/// looking along -z) becomes the library's (x right, y down, looking along +z).
+/// @param spec Sensor with SensorModel::pinhole.
+/// @param base World position of the agent's base, metres.
+/// @param rotation Orientation of the agent.
+/// @param pitch Tilt of the sensor, radians, positive upwards.
 Camera sensor_camera(const SensorSpec& spec, const Vec3d& base, const Quatd& rotation,
                      double pitch = 0.0) noexcept;
 
-/// Converts display-referred colour to 8 bit: round(255 clamp(c, 0, 1)). `out` has room for rgb.size().
+/// Converts display-referred colours to 8 bit: round(255 clamp(c, 0, 1)). @pre out.size() >= rgb.size().
 void to_bytes(std::span<const float> rgb, std::span<std::uint8_t> out) noexcept;
 
 }  // namespace gsnav

@@ -14,14 +14,15 @@
 
 namespace gsnav {
 
-/// From the frames that were drawn for sensors to the sensors' images: normals, samples of cubes, depth
-/// cut at the far plane, noise, labels.
+/// Turns rendered frames into sensor images: normals, resampling of cubes, the far plane of depth,
+/// noise, and semantic labels.
 template <Backend B>
 class SensorFinish {
  public:
   explicit SensorFinish(B& backend) : backend_(&backend), normals_(backend) {}
 
-  /// `requests` were made of `plan` and `views`, and have been drawn. Errors: what draw_meshes reports.
+  /// Processes frames that were rendered for `requests`, which were made from `plan` and `views`.
+  /// @return the errors of draw_meshes.
   Status run(const SensorPlan& plan, const SensorRequests<B>& requests,
              std::span<const SensorView> views, SensorImages<B>& images) {
     if (!images.in_host_memory()) return cut_on_backend(plan, views, images);
@@ -46,7 +47,8 @@ class SensorFinish {
   }
 
  private:
-  /// Far planes of depths that stay in the backend's memory; other sensors than pinholes do not.
+  /// Applies the far plane to depth images in the backend's memory. Only pinhole sensors are supported
+  /// there.
   Status cut_on_backend(const SensorPlan& plan, std::span<const SensorView> views,
                         SensorImages<B>& images) {
     rows_.clear();
@@ -94,7 +96,7 @@ class SensorFinish {
       if (sensor.noise.kind == NoiseKind::none) continue;
       const std::span<const float> clean = images.row(plan, plan.output(i).clean, view.row);
       const std::span<float> out = images.row(plan, plan.output(i).noisy, view.row);
-      // Hashed: seeds a step of the generator apart would give one stream, shifted.
+      // Seeds that differ by one step of the generator would give the same stream, shifted. Hash them.
       const std::uint64_t seed = Rng(view.noise + 0xd6e8feb86659fd93ull * (i + 1)).next();
       if (sensor.noise.kind == NoiseKind::redwood_depth) {
         redwood_depth(sensor.noise, seed, sensor.resolution[0], sensor.resolution[1], clean, out);

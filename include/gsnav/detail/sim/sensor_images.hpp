@@ -12,13 +12,13 @@
 
 namespace gsnav {
 
-/// The images of all sensors of a plan for a number of rows: one row a view.
+/// Images of all sensors of a plan, with one row per view.
 template <Backend B>
 struct SensorImages {
   ImageMemory memory = ImageMemory::host;
   std::size_t rows = 0;
   std::vector<HostArray<float, B>> buffers;
-  std::vector<Buffer<float, B>> on_backend;  // in place of buffers where images are not in host memory
+  std::vector<Buffer<float, B>> on_backend;  // Replaces `buffers` if images are not in host memory.
 
   bool in_host_memory() const noexcept { return is_host_backend<B> || memory == ImageMemory::host; }
 
@@ -32,24 +32,24 @@ struct SensorImages {
     buffers.resize(plan.buffers());
     for (std::size_t b = 0; b < plan.buffers(); ++b) buffers[b].resize(rows * plan.size(b));
   }
-  /// One row of a buffer, wherever it is.
+  /// One row of a buffer, in whichever memory it is.
   std::span<float> row(const SensorPlan& plan, std::size_t buffer, std::size_t r) noexcept {
     float* const first = in_host_memory() ? buffers[buffer].data() : on_backend[buffer].data();
     return {first + r * plan.size(buffer), plan.size(buffer)};
   }
-  /// The image of a sensor in one row, [height][width][channels], in host memory.
+  /// Image of a sensor in one row, shape [height][width][channels]. Host memory only.
   std::span<const float> image(const SensorPlan& plan, std::size_t sensor,
                                std::size_t r) const noexcept {
     const std::size_t buffer = plan.output(sensor).noisy, n = plan.size(buffer);
     return {buffers[buffer].data() + r * n, n};
   }
-  /// All rows of a sensor, [rows][height][width][channels], where they are in host memory.
+  /// All rows of a sensor, shape [rows][height][width][channels]. Empty if they are not in host memory.
   std::span<const float> all(const SensorPlan& plan, std::size_t sensor) const noexcept {
     if (!in_host_memory()) return {};
     const HostArray<float, B>& buffer = buffers[plan.output(sensor).noisy];
     return {buffer.data(), buffer.size()};
   }
-  /// The same where they are in the backend's.
+  /// All rows of a sensor in the backend's memory. Null if they are in host memory.
   const float* all_on_backend(const SensorPlan& plan, std::size_t sensor) const noexcept {
     return in_host_memory() ? nullptr : on_backend[plan.output(sensor).clean].data();
   }

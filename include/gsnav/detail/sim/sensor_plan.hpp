@@ -13,8 +13,8 @@
 
 namespace gsnav {
 
-/// Which cameras and which image buffers the sensors of a body need. Sensors at one place with one field
-/// of view share a camera; those of one kind on one camera share a buffer.
+/// Cameras and image buffers that the sensors of an agent need. Sensors with the same position and field
+/// of view share a camera. Sensors of the same kind on one camera share a buffer.
 class SensorPlan {
  public:
   static constexpr std::size_t kNone = ~std::size_t{0};
@@ -24,18 +24,18 @@ class SensorPlan {
 
   /// Sensors that share a camera.
   struct Group {
-    std::size_t sensor = 0;  ///< one of them
+    std::size_t sensor = 0;  ///< Index of one of them.
     std::array<std::size_t, kKinds> buffer{kNone, kNone, kNone, kNone, kNone};
-    std::shared_ptr<const CubeMap> cube;  ///< null: a pinhole
+    std::shared_ptr<const CubeMap> cube;  ///< Null for a pinhole.
 
     bool has(std::size_t kind) const noexcept { return buffer[kind] != kNone; }
   };
-  /// Buffers of a sensor; the same one without noise.
+  /// Buffers of a sensor without and with noise. Equal if the sensor has no noise.
   struct Output {
     std::size_t clean, noisy;
   };
 
-  /// `sensors` are valid.
+  /// Plans for sensors, which must be valid.
   explicit SensorPlan(std::vector<SensorSpec> sensors) : sensors_(std::move(sensors)) {
     for (std::size_t i = 0; i < sensors_.size(); ++i) {
       Group& group = group_of(i);
@@ -51,7 +51,7 @@ class SensorPlan {
   const std::vector<Group>& groups() const noexcept { return groups_; }
   const Output& output(std::size_t sensor) const noexcept { return outputs_[sensor]; }
   std::size_t buffers() const noexcept { return sizes_.size(); }
-  /// Values of one row of a buffer.
+  /// Number of values per row of a buffer.
   std::size_t size(std::size_t buffer) const noexcept { return sizes_[buffer]; }
   static std::size_t channels(std::size_t kind) noexcept {
     return static_cast<std::size_t>(channels_of(static_cast<SensorKind>(kind)));
@@ -59,13 +59,14 @@ class SensorPlan {
   bool any(std::size_t kind) const noexcept {
     return std::any_of(groups_.begin(), groups_.end(), [kind](const Group& g) { return g.has(kind); });
   }
-  /// Whether drawing needs images besides those of the sensors: faces of cubes, shares of sets, depths.
+  /// True if rendering needs images other than those of the sensors: faces of cubes, coverage of sets,
+  /// or depths.
   bool needs_scratch() const noexcept {
     return any(kSemantic) || any(kNormal) ||
            std::any_of(groups_.begin(), groups_.end(), [](const Group& g) { return g.cube != nullptr; });
   }
 
-  /// Appends every camera that a view from there needs, group by group.
+  /// Appends all cameras of a view, group by group.
   void append_cameras(const Vec3d& base, const Quatd& rotation, double pitch,
                       std::vector<Camera>& out) const {
     for (const Group& g : groups_) {
@@ -99,8 +100,8 @@ class SensorPlan {
 
   std::vector<SensorSpec> sensors_;
   std::vector<Group> groups_;
-  std::vector<Output> outputs_;     // of each sensor
-  std::vector<std::size_t> sizes_;  // of each buffer
+  std::vector<Output> outputs_;     // One per sensor.
+  std::vector<std::size_t> sizes_;  // One per buffer.
 };
 
 }  // namespace gsnav

@@ -17,21 +17,22 @@
 
 namespace gsnav {
 
-/// What a body's sensors look at: where it stands, what there is to see, and which row of the images is
-/// its own.
+/// Input of one agent's sensors: its pose, the scene, and its row in the images.
 struct SensorView {
-  Vec3d base{};  ///< world, metres
-  Quatd rotation{};
-  double pitch = 0.0;       ///< radians
-  std::uint64_t noise = 0;  ///< decides what noise models draw
-  std::span<const GaussianSet> sets;
-  const RenderConfig* config = nullptr;  ///< outputs are chosen by the sensors
-  std::size_t row = 0;
-  MeshFrame meshes{};                   ///< ids are their numbers for semantic sensors
-  const SceneDetail* detail = nullptr;  ///< levels of detail of the first of `sets`; null: whole.
-                                        ///< Semantic sensors see all sets whole
+  Vec3d base{};                          ///< World position, metres.
+  Quatd rotation{};                      ///< Orientation of the agent.
+  double pitch = 0.0;                    ///< Tilt of the sensors, radians.
+  std::uint64_t noise = 0;               ///< Seed of the noise.
+  std::span<const GaussianSet> sets;     ///< Gaussians to draw.
+  const RenderConfig* config = nullptr;  ///< Render settings. The sensors choose `outputs`.
+  std::size_t row = 0;                   ///< Row of the images.
+  MeshFrame meshes{};                    ///< Meshes to draw. Their ids are their numbers in semantic
+                                         ///< images.
+  const SceneDetail* detail = nullptr;   ///< Levels of detail and visible sets of the assets, which are
+                                        ///< the first of `sets`. Null: draw everything. Semantic sensors
+                                        ///< always draw everything.
 
-  /// Sets and meshes, as semantic sensors count them.
+  /// Number of sets and meshes that a semantic sensor distinguishes.
   std::size_t things() const noexcept {
     std::size_t count = 0;
     for (const MeshInstance& m : meshes.instances) count = std::max(count, std::size_t{m.id} + 1);
@@ -39,28 +40,29 @@ struct SensorView {
   }
 };
 
-/// From views to the frames that their sensors need: each writes an image of a sensor, or scratch that
-/// SensorFinish makes the image from.
+/// Turns views into requests for the renderer. Each request writes an image of a sensor, or scratch from
+/// which SensorFinish makes the image.
 template <Backend B>
 class SensorRequests {
  public:
   using Plan = SensorPlan;
-  /// A sensor of normals, which needs the median depth of the same camera.
+  /// A normal sensor, which needs the median depth of its camera.
   struct Normals {
     std::size_t view, group, camera;
     const float* seen;
   };
-  /// How much each set and mesh is of each pixel of one view.
+  /// Coverage of each pixel of one view by each set and mesh.
   struct Shares {
     std::size_t view, buffer;
-    std::vector<std::vector<GaussianSet>> sets;  // of each pass
+    std::vector<std::vector<GaussianSet>> sets;  // One per pass.
     std::vector<std::vector<MeshInstance>> meshes;
     std::vector<std::vector<float>> images;
   };
 
   explicit SensorRequests(B& backend) : semantic_(backend) {}
 
-  /// The requests of all sensors of all views, into `images` and scratch. Valid until the next call.
+  /// Makes the requests for all sensors of all views. They write to `images` and to scratch. Valid until
+  /// the next call.
   std::span<ImageRequest> make(const Plan& plan, std::span<const SensorView> views,
                                SensorImages<B>& images) {
     cameras_.clear();
@@ -69,7 +71,7 @@ class SensorRequests {
     normals_.clear();
     size_scratch(plan, views.size());
     prepare_shares(plan, views);
-    std::size_t camera = 0;  // the first of the next group
+    std::size_t camera = 0;  // First camera of the next group.
     for (std::size_t v = 0; v < views.size(); ++v) {
       for (std::size_t g = 0; g < plan.groups().size(); ++g) {
         if (plan.groups()[g].cube == nullptr) {
@@ -82,15 +84,15 @@ class SensorRequests {
     return requests_;
   }
 
-  /// Renders asked for so far: one for each view and camera (a cube counts one), and one for every three
-  /// sets that a semantic sensor tells apart.
+  /// Number of renders requested so far: one per view and camera (a cube counts as one), and one per
+  /// three objects for semantic sensors.
   std::size_t render_count() const noexcept { return render_count_; }
 
-  // Of the last make().
+  // The following are results of the last make().
   const Camera& camera(std::size_t i) const noexcept { return cameras_[i]; }
   std::span<const Normals> normals() const noexcept { return normals_; }
   std::span<const Shares> shares() const noexcept { return shares_; }
-  /// Images of a cube's faces.
+  /// Images of the faces of a cube.
   std::array<const float*, CubeMap::kFaces> faces(const Plan& plan, std::size_t group, std::size_t kind,
                                                   std::size_t view) const noexcept {
     std::array<const float*, CubeMap::kFaces> at{};
@@ -118,7 +120,7 @@ class SensorRequests {
     }
   }
 
-  /// Scratch for the passes of semantic sensors.
+  /// Allocates scratch for the passes of semantic sensors.
   void prepare_shares(const Plan& plan, std::span<const SensorView> views) {
     shares_.clear();
     share_configs_.clear();
@@ -140,7 +142,7 @@ class SensorRequests {
     requests_.push_back({{view.sets, &camera, view.config, images, view.meshes}, view.detail});
   }
 
-  /// `v` is the number of the view.
+  /// `v` is the index of the view.
   void add_pinhole(const Plan& plan, const SensorView& view, std::size_t v, std::size_t g,
                    SensorImages<B>& images, std::size_t camera) {
     const Plan::Group& group = plan.groups()[g];
@@ -194,9 +196,11 @@ class SensorRequests {
   std::vector<ImageRequest> requests_;
   std::vector<Normals> normals_;
   std::vector<Shares> shares_;
-  std::vector<RenderConfig> share_configs_;                           // of each view
-  std::vector<std::array<HostArray<float, B>, Plan::kKinds>> faces_;  // [group][kind][view][face]
-  std::vector<HostArray<float, B>> seen_;  // [group][view][pixels], where no sensor has that depth
+  std::vector<RenderConfig> share_configs_;                           // One per view.
+  std::vector<std::array<HostArray<float, B>, Plan::kKinds>> faces_;  // Indexed
+                                                                      // [group][kind][view][face].
+  std::vector<HostArray<float, B>> seen_;  // Indexed [group][view][pixel], if no sensor of the group has
+                                           // depth.
   std::size_t render_count_ = 0;
 };
 

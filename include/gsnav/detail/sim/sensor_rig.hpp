@@ -15,12 +15,12 @@
 
 namespace gsnav {
 
-/// The sensors of a body. Bodies with the same sensors are drawn together: views become requests, the
-/// requests are drawn, and what was drawn becomes the sensors' images.
+/// Sensors of one or more agents with the same set of sensors. Renders views: it turns them into
+/// requests, renders these, and turns the frames into sensor images.
 template <Backend B>
 class SensorRig {
  public:
-  /// `sensors` are valid.
+  /// Plans for sensors, which must be valid.
   SensorRig(B& backend, std::vector<SensorSpec> sensors)
       : backend_(&backend),
         plan_(std::move(sensors)),
@@ -28,9 +28,10 @@ class SensorRig {
         renderer_(backend),
         finish_(backend) {}
 
+  /// Cameras and buffers of the sensors.
   const SensorPlan& plan() const noexcept { return plan_; }
-  /// Whether images of such sensors can be left in a backend's memory. Errors: unsupported, naming the
-  /// sensor.
+  /// Checks that images of these sensors can stay in the memory of the backend.
+  /// @return unsupported, with the sensor.
   static Status check_memory(std::span<const SensorSpec> sensors, ImageMemory memory) {
     if (memory == ImageMemory::host || is_host_backend<B>) return {};
     for (const SensorSpec& s : sensors) {
@@ -45,11 +46,13 @@ class SensorRig {
     }
     return {};
   }
+  /// Allocates images for `rows` views.
   void resize(SensorImages<B>& images, std::size_t rows) const { images.resize(*backend_, plan_, rows); }
 
-  /// Draws all sensors of all views into their rows. Errors: what rendering reports.
+  /// Renders all sensors of all views into their rows.
+  /// @return an error of rendering.
   Status render(std::span<const SensorView> views, SensorImages<B>& images) {
-    // Scratch is for so many views at a time that it stays small.
+    // Process a limited number of views at a time to keep scratch memory small.
     const std::size_t most = plan_.needs_scratch() ? kScratchViews : views.size();
     for (std::size_t first = 0; first < views.size(); first += most) {
       const auto some = views.subspan(first, std::min(most, views.size() - first));
@@ -58,7 +61,9 @@ class SensorRig {
     }
     return {};
   }
+  /// Number of renders so far.
   std::size_t render_count() const noexcept { return requests_.render_count(); }
+  /// Renderer that the sensors use.
   ImageRenderer<B>& renderer() noexcept { return renderer_; }
 
  private:

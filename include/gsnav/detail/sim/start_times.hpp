@@ -11,9 +11,9 @@
 
 namespace gsnav {
 
-/// Gives each episode a start time, a multiple of the control period in [0, 600) s, at which no avatar
-/// is within 0.6 m of its start (the last of a hundred tries where there is none). Errors: what
-/// CapsuleSet::create reports.
+/// Sets a start time for each episode: a random multiple of the control period in [0, 600) s at which no
+/// avatar is within 0.6 m of the start. After a hundred attempts, the last one is used.
+/// @return the errors of CapsuleSet::create.
 Status draw_start_times(std::span<PointNavEpisode> episodes, const SimulatorScene& scene,
                         const TaskConfig& task, std::uint64_t seed);
 

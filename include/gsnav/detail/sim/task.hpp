@@ -8,40 +8,49 @@
 
 namespace gsnav {
 
-/// What an agent can do in one control period. Numbers are Habitat's.
+/// Discrete action of the agent in one control period. Values are those of Habitat.
 enum class Action : std::uint8_t {
+  /// Ends the episode.
   stop = 0,
+  /// Moves forward by TaskConfig::forward_step.
   move_forward = 1,
+  /// Turns left by TaskConfig::turn_angle.
   turn_left = 2,
+  /// Turns right by TaskConfig::turn_angle.
   turn_right = 3,
-  look_up = 4,  ///< tilts the sensors, not the body
-  look_down = 5,
+  look_up = 4,    ///< Tilts the sensors up, not the body.
+  look_down = 5,  ///< Tilts the sensors down, not the body.
 };
 
-/// The other way to act: velocities held for one control period.
+/// Continuous action: velocities for one control period.
 struct VelocityCommand {
-  double linear = 0.0;   ///< metres a second, forward
-  double angular = 0.0;  ///< radians a second, positive to the left
-  bool stop = false;     ///< ends the episode, as Action::stop does
-  double lateral = 0.0;  ///< metres a second, to the left
+  double linear = 0.0;   ///< Forward velocity, m/s.
+  double angular = 0.0;  ///< Turn rate, rad/s, positive to the left.
+  bool stop = false;     ///< Ends the episode, like Action::stop.
+  double lateral = 0.0;  ///< Sideways velocity, m/s, positive to the left.
 };
 
-/// The agent's body and motion, and when an episode ends. Defaults are PointNav v1's.
+/// Body of the agent, effects of its actions, and when an episode ends. The defaults are those of
+/// PointNav v1.
 struct TaskConfig {
-  double agent_radius = 0.1;      ///< metres
-  double agent_height = 1.5;      ///< metres
-  double forward_step = 0.25;     ///< metres a move_forward
-  double turn_angle = 10.0;       ///< degrees a turn
-  double tilt_angle = 15.0;       ///< degrees a look; sensors tilt by 90 degrees at most
-  bool allow_sliding = true;      ///< along walls and avatars; otherwise a move stops at the first
-  double control_period = 0.25;   ///< seconds an action takes: avatars walk on meanwhile
-  int substeps = 1;               ///< parts of a control period in each of which bodies move along lines
-  int max_steps = 500;            ///< actions, stop excluded, after which the episode is cut off
-  double success_distance = 0.2;  ///< metres: stop nearer than this succeeds
-  double skin = 1e-4;             ///< metres that a stopped move keeps from an avatar
-  RewardConfig reward{};
+  double agent_radius = 0.1;      ///< Radius of the agent, metres.
+  double agent_height = 1.5;      ///< Height of the agent, metres.
+  double forward_step = 0.25;     ///< Length of one move_forward, metres.
+  double turn_angle = 10.0;       ///< Angle of one turn, degrees.
+  double tilt_angle = 15.0;       ///< Angle of one look_up or look_down, degrees. The total tilt is
+                                  ///< limited to 90 degrees.
+  bool allow_sliding = true;      ///< Slide along walls and avatars. False: a move stops at the first
+                                  ///< contact.
+  double control_period = 0.25;   ///< Duration of an action, seconds. Avatars keep moving during it.
+  int substeps = 1;               ///< Parts of a control period. In each, bodies move linearly.
+  int max_steps = 500;            ///< Number of actions, without `stop`, after which the episode is cut
+                                  ///< off.
+  double success_distance = 0.2;  ///< Largest distance to the goal at which `stop` is a success
+                                  ///< (exclusive), metres.
+  double skin = 1e-4;             ///< Gap that a stopped move keeps from an avatar, metres.
+  RewardConfig reward{};          ///< Weights of the reward.
 
-  /// The settings of Habitat's PointNav v2 challenge (2020 to 2021) that do not concern noise of motion.
+  /// Settings of Habitat's PointNav v2 challenge (2020 and 2021), without its actuation noise.
   static TaskConfig pointnav_v2() noexcept {
     TaskConfig c;
     c.agent_radius = 0.18;
@@ -52,8 +61,8 @@ struct TaskConfig {
     return c;
   }
 
-  /// PointNav among people: whoever comes near is charged. An action wholly inside somebody's space
-  /// costs what a step forward earns, meeting somebody twice that.
+  /// PointNav among people, with penalties for coming near them. An action completely inside a person's
+  /// space costs 0.25, the reward of a forward step. A collision costs twice that.
   static TaskConfig avatar_pointnav() noexcept {
     TaskConfig c;
     c.reward.proximity = 0.25;
@@ -62,7 +71,8 @@ struct TaskConfig {
   }
 };
 
-/// invalid_argument, naming the field, where a value is impossible.
+/// Checks the values.
+/// @return invalid_argument, with the field that is out of range.
 Status validate(const TaskConfig& config);
 
 }  // namespace gsnav

@@ -13,18 +13,21 @@
 
 namespace gsnav {
 
-/// Where agents that share a scene stand, so that each can be a body to the others.
+/// Positions of agents that share a scene. Each agent is a body for the others.
 class TeamBodies {
  public:
+  /// Body of one agent.
   struct Body {
-    Vec3d base{};  ///< world, metres
-    double radius = 0.1, height = 1.5;
-    bool present = false;
+    Vec3d base{};                       ///< World position of its base, metres.
+    double radius = 0.1, height = 1.5;  ///< Radius and height, metres.
+    bool present = false;               ///< False until the agent takes part.
   };
+  /// Creates bodies for a number of agents, none of them present.
   explicit TeamBodies(std::size_t agents) : bodies_(agents) {}
+  /// Body of an agent.
   Body& operator[](std::size_t agent) noexcept { return bodies_[agent]; }
 
-  /// Appends all but `self`, numbered from `first` on.
+  /// Appends the bodies of all agents except `self`. They are numbered from `first`.
   void append(std::size_t self, std::uint32_t first, std::vector<DynamicCapsule>& out) const {
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
       const Body& b = bodies_[i];
@@ -38,19 +41,23 @@ class TeamBodies {
   std::vector<Body> bodies_;
 };
 
-/// Several agents, each with its own body, sensors and episode, in one scene at one time.
+/// Several agents in one scene at one time, each with its own body, sensors and episode.
 ///
-/// They act one after the other within a tick, each while the others stand: the earlier ones where they
-/// have gone, the later ones where they were. So no agent ever enters another. (Were they to move at
-/// once, one that stops at another's flank could be run over by a motion that was checked against its
-/// old place.) To an agent the others are avatars: they count in CR and PSI and are numbered behind the
-/// scene's. An agent whose episode is over stays where it is. Other agents are bodies, not pictures:
-/// cameras see the scene and its avatars.
+/// Within a tick the agents act one after the other, while the others stand still: earlier agents at
+/// their new position, later ones at their old one. Therefore no agent ever enters another. If all moved
+/// at once, an agent that stops next to another could be hit by a motion that was tested against its old
+/// position.
+///
+/// To an agent, the others are avatars: they count in CR and PSI and are numbered after the avatars of
+/// the scene. An agent whose episode has ended stays in place. Cameras do not show agents, only the
+/// scene and its avatars.
 template <Backend B>
 class Team {
  public:
-  /// One config for each agent; their control periods must be one. Errors: what BasicSimulator::create
-  /// reports, with the agent's number; invalid_argument (no agent, other control periods).
+  /// Creates a team.
+  /// @param agents One configuration per agent. All must have the same control period.
+  /// @return the errors of BasicSimulator::create, with the index of the agent; invalid_argument if
+  /// there are no agents or their control periods differ.
   static Result<Team> create(B& backend, SimulatorScene scene, std::vector<SimulatorConfig> agents) {
     if (agents.empty()) return {Errc::invalid_argument, "Team: no agent"};
     Team team;
@@ -72,8 +79,11 @@ class Team {
     return team;
   }
 
+  /// Number of agents.
   std::size_t size() const noexcept { return agents_.size(); }
+  /// Simulator of an agent.
   BasicSimulator<B>& operator[](std::size_t agent) noexcept { return agents_[agent]; }
+  /// True if the episodes of all agents have ended.
   bool done() const noexcept {
     for (const BasicSimulator<B>& a : agents_) {
       if (!a.done()) return false;
@@ -81,8 +91,9 @@ class Team {
     return true;
   }
 
-  /// Begins an episode for each agent, at one start time. Errors: invalid_argument (another number of
-  /// episodes, other start times); what BasicSimulator::reset reports.
+  /// Starts an episode for each agent, all with the same start time.
+  /// @return invalid_argument for a wrong number of episodes or different start times; the errors of
+  /// BasicSimulator::reset.
   Result<std::vector<Observations>> reset(std::span<const PointNavEpisode> episodes) {
     if (episodes.size() != size()) return wrong_number("episodes", episodes.size());
     for (std::size_t i = 0; i < size(); ++i) {
@@ -92,7 +103,7 @@ class Team {
       }
       (*bodies_)[i].present = false;
     }
-    // All take their places before anybody looks or is measured against.
+    // Place all agents first, so that each is measured against the others.
     for (std::size_t i = 0; i < size(); ++i) {
       if (Result<Observations> r = quietly(i, [&] { return agents_[i].reset(episodes[i]); }); !r)
         return r.status();
@@ -105,8 +116,8 @@ class Team {
     return observe();
   }
 
-  /// One action for each agent; of those whose episode is over none is taken. Errors: invalid_argument
-  /// (another number of actions); what BasicSimulator::step reports.
+  /// Performs one action per agent. Agents whose episode has ended are skipped.
+  /// @return invalid_argument for a wrong number of actions; the errors of BasicSimulator::step.
   Result<std::vector<Observations>> step(std::span<const Action> actions) {
     if (actions.size() != size()) return wrong_number("actions", actions.size());
     for (std::size_t i = 0; i < size(); ++i) {
@@ -126,7 +137,7 @@ class Team {
             "Team: " + std::to_string(n) + " " + what + " for " + std::to_string(size()) + " agents"};
   }
 
-  /// Runs f without pictures of agent i: they are made once all have moved.
+  /// Calls f with rendering of agent i turned off. Images are rendered after all agents have moved.
   template <class F>
   Result<Observations> quietly(std::size_t i, const F& f) {
     const bool rendering = agents_[i].config().rendering;

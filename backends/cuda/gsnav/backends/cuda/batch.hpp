@@ -10,93 +10,104 @@
 
 namespace gsnav {
 
-/// One camera of a batch and what it sees.
+/// One camera of a batch and the sets that it sees.
 struct BatchCamera {
+  /// The camera.
   Camera camera;
-  /// Indices into the call's sets, each at most once; blended as one list, ties by place in this list.
-  /// Empty: all sets, in order. Read during the call only.
+  /// Indices into the sets of the call, each at most once. They are blended in one depth order; equal
+  /// depths are ordered by position in this list. Empty: all sets in order. Read during the call only.
   std::span<const std::uint32_t> sets;
-  /// Meshes among these Gaussians (docs/reference/composition.md), arrays on the device.
+  /// Meshes to composite with these Gaussians (docs/reference/composition.md). Arrays are in device
+  /// memory.
   MeshFrame meshes{};
-  /// Selection::seen of each of `sets` (of all sets, where that is empty) for this camera:
-  /// cameras that look at one set from several places still share it. Empty: those of the sets. Read
-  /// during the call, the bits by the device.
+  /// Selection::seen of each of `sets` (of all sets if that is empty) for this camera. It lets cameras
+  /// at different positions share one set. Empty: use the sets' own. Read during the call; the bits are
+  /// in device memory.
   std::span<const View<const std::uint32_t>> seen{};
 };
 
-/// Images of a batch in device memory, [C][H][W] row-major; null: not asked for. They stay on the
-/// device: a learner on the same stream reads them without a copy.
+/// Output images of a batch in device memory, shape [cameras][height][width], row-major. Null pointers
+/// are not written. A learner on the same stream can read the images without a copy.
 struct BatchImages {
-  FrameImages<float> floats;  ///< rgb is [C][H][W][3], unclamped
-  std::uint8_t* rgb8 =
-      nullptr;  ///< [C][H][W][3], round(255 clamp(c, 0, 1)); may stand beside floats.rgb
+  FrameImages<float> floats;  ///< Float images. `rgb` has shape [cameras][height][width][3] and is not
+                              ///< clamped.
+  std::uint8_t* rgb8 = nullptr;  ///< Shape [cameras][height][width][3]: round(255 clamp(c, 0, 1)). May
+                                 ///< be combined with floats.rgb.
 };
 
-/// What a batch was made of; all cameras together.
+/// Statistics of a batch, summed over all cameras.
 struct BatchStats {
   std::uint64_t tile_intersections =
-      0;  ///< (tile, Gaussian) pairs; docs/notes/cuda.md says how large tiles are
+      0;  ///< Number of (tile, Gaussian) pairs. See docs/notes/cuda.md for the size of tiles.
   std::uint64_t parts_read =
-      0;  ///< kChunkPart rows each, that may be in view, counted once for 32 cameras
-  std::uint64_t scratch_bytes = 0;  ///< held on the device, without scene and images
-  int reruns = 0;                   ///< how often the batch was drawn again because scratch had to grow
-  bool replayed = false;  ///< by a recorded CUDA graph: calls that differ in their cameras alone are
-  MeshStats meshes;
+      0;  ///< Number of parts (kChunkPart rows) that may be in view, counted once per 32 cameras.
+  std::uint64_t scratch_bytes = 0;  ///< Device memory for scratch, in bytes, without scene and images.
+  int reruns = 0;                   ///< How often the batch was drawn again because scratch had to grow.
+  bool replayed = false;  ///< True if a recorded CUDA graph was replayed. Calls that differ only in
+                          ///< their cameras are replayed.
+  MeshStats meshes;       ///< Statistics of the meshes.
 };
 
-/// Draws many cameras in one call on one GPU; docs/notes/cuda.md says how. Images have the bits that
-/// `BasicRenderer<float, CudaBackend>` gives each camera alone, whatever the batch.
+/// Renders many cameras in one call on one GPU (docs/notes/cuda.md). Images are bit-identical to those
+/// of `BasicRenderer<float, CudaBackend>` for each camera alone, whatever the batch.
 ///
-///     gsnav::CudaBatchRenderer batch(cuda, config);
-///     batch.render(sets, cameras, images).throw_if_error();   // returns at once
-///     ...                                                      // work on cuda.stream() may follow
-///     batch.finish().throw_if_error();                         // images are there, and whole
+/// @code
+/// gsnav::CudaBatchRenderer batch(cuda, config);
+/// batch.render(sets, cameras, images).throw_if_error();  // returns at once
+/// // more work on cuda.stream() may follow
+/// batch.finish().throw_if_error();                       // images are complete
+/// @endcode
 ///
-/// `RenderConfig::outputs` and `RenderConfig::tuning` are not read: pointers say which images, and
-/// tiles are of 8 or 16 pixels, as the number of cameras has it.
+/// `RenderConfig::outputs` and `RenderConfig::tuning` are ignored. The pointers in BatchImages select
+/// the images. Tiles are 8 or 16 pixels wide, depending on the number of cameras.
 ///
-/// Meshes are drawn into a layer for each camera, over which the batch is then blended. As everywhere,
-/// `fast` has the exponential of `exact` where there are meshes: in a call with any, for all of its
-/// cameras. `supports` tells which frames it can draw, and `capacity` how many at once; `render` refuses
-/// the others as unsupported.
+/// Meshes are drawn into a layer per camera, and the batch is then blended over it. If any camera of a
+/// call has meshes, `fast` uses the exponential of `exact` for all its cameras. `supports` tells which
+/// frames can be part of a batch, and `capacity` how many fit into one call. `render` rejects other
+/// frames as unsupported.
 class CudaBatchRenderer {
  public:
+  /// Type of a camera of a batch.
   using camera_type = BatchCamera;
+  /// Type of the output images.
   using images_type = BatchImages;
 
-  /// The backend must outlive it; work goes to its stream.
+  /// Creates a renderer. The backend must outlive it. Work goes to the backend's stream.
   explicit CudaBatchRenderer(CudaBackend& backend, const RenderConfig& config = {});
+  /// Waits for the work and frees the resources.
   ~CudaBatchRenderer();
   CudaBatchRenderer(const CudaBatchRenderer&) = delete;
   CudaBatchRenderer& operator=(const CudaBatchRenderer&) = delete;
 
-  /// Whether a frame of these sets and meshes can be one of a batch: unsupported, saying why, where a
-  /// set has another colour space than the frame, where it has more than 2^32 Gaussians, and of meshes
-  /// with Composite::hard_depth, a Response other than ewa, a Compat, or MeshAlpha::blend.
+  /// Checks whether a frame with these sets and meshes can be part of a batch.
+  /// @return unsupported, with the reason, if a set has another colour space than the frame or more than
+  /// 2^32 Gaussians, or, with meshes, for Composite::hard_depth, a Response other than ewa, a Compat, or
+  /// MeshAlpha::blend.
   static Status supports(const RenderConfig& config, std::span<const GaussianSet> sets,
                          const MeshFrame& meshes = {});
 
-  /// How many of `cameras`, from the first on, one call should draw: what counts of 32 bits have room
-  /// for and, where each camera takes what those of the last call took, the device's free memory. At
-  /// least 1 where there is a camera. `sets` and `cameras` are as for `render`, which draws more where
-  /// it can.
+  /// Number of cameras, from the first on, that one call should render. It is limited by 32-bit counts
+  /// and by the free device memory, assuming the mean consumption of the last call's cameras.
+  /// At least 1 if there are cameras. `render` accepts more if it can.
   std::size_t capacity(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras) const;
 
-  /// Draws the sets (arrays on the device) from all cameras, which have one size. Enqueues and returns;
-  /// images are whole once `finish()` has said ok. Errors: invalid_argument naming camera, set or field,
-  /// or where more than three calls would be under way without `finish()`; unsupported; backend_failure.
-  /// Throws gsnav::Error (out_of_memory) where scratch cannot be allocated.
+  /// Renders the sets from all cameras, which must have one size. Arrays are in device memory. Enqueues
+  /// the work and returns; images are complete when finish() has returned ok.
+  /// @return invalid_argument, with camera, set or field, or if more than three calls are in progress
+  /// without finish(); unsupported; backend_failure.
+  /// Throws gsnav::Error (out_of_memory) if scratch cannot be allocated.
   Status render(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                 const BatchImages& images);
 
-  /// Waits for every `render` since the last `finish`. Where scratch was too small for the last of them,
-  /// grows it and draws that batch again: arrays and images of that call must still be there. Errors:
-  /// out_of_memory where it was too small for an earlier one, or for the last and `render` has failed
-  /// since: those images are not whole, and there is room for them now; backend_failure; unsupported
-  /// naming counts that 32 bits do not hold. Throws as `render` does.
+  /// Waits for all render() calls since the last finish(). If scratch was too small for the last of
+  /// them, it grows and that batch is rendered again, so its arrays and images must still exist.
+  /// @return out_of_memory if scratch was too small for an earlier call, or for the last one and a later
+  /// render() failed. Those images are incomplete; scratch is large enough now. Also backend_failure, or
+  /// unsupported if a count exceeds 32 bits.
+  /// Throws like render().
   Status finish();
 
-  /// Of the last batch that `finish()` saw.
+  /// Statistics of the last batch that finish() has completed.
   const BatchStats& stats() const noexcept;
 
  private:

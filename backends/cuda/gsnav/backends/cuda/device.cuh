@@ -8,7 +8,7 @@
 #include "gsnav/backends/cuda.hpp"
 #include "gsnav/backends/cuda/policy.hpp"
 
-// Device code of gsnav::cuda: the library's kernels in loop nests that suit a GPU.
+// Device code of gsnav::cuda: the library's kernels in loops that suit a GPU.
 
 namespace gsnav {
 namespace cuda {
@@ -21,7 +21,8 @@ __global__ void for_each(std::size_t n, const F f) {
 
 inline constexpr int kProjectThreads = policy::Stages::kProjectThreads;
 
-/// One block a chunk: Gaussians are projected side by side, survivors packed in order by a block scan.
+/// Projects one chunk per block. Gaussians are projected in parallel, and visible ones are packed in
+/// order by a block scan.
 static __global__ void __launch_bounds__(kProjectThreads)
     project_kernel(const ViewedSet<float> args, const ProjectOutputs<float> out) {
   using Scan = cub::BlockScan<std::uint32_t, kProjectThreads>;
@@ -48,7 +49,7 @@ static __global__ void __launch_bounds__(kProjectThreads)
   if (threadIdx.x == 0) out.counts[args.first_chunk + chunk] = written;
 }
 
-/// Tile intersections of each visible splat, and of each tile.
+/// Counts the tiles that each visible splat intersects, and the splats of each tile.
 template <class Cull>
 struct CountSplatTiles {
   BinArgs<float> args;
@@ -61,14 +62,14 @@ struct CountSplatTiles {
     for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min,
                   args.elliptic, [&](std::size_t tile) {
                     if (cull.hides(tile, splat)) return;
-                    atomicAdd(per_tile + tile, 1u);  // a sum of ones: the order does not matter
+                    atomicAdd(per_tile + tile, 1u);  // Order does not matter for a sum of ones.
                     ++n;
                   });
     per_splat[i] = n;
   }
 };
 
-/// (tile, splat) pairs in depth order; a stable sort by tile then makes the lists.
+/// Writes (tile, splat) pairs in depth order. A stable sort by tile then gives the lists.
 template <class Cull>
 struct EmitSplatTiles {
   BinArgs<float> args;
@@ -90,8 +91,8 @@ struct EmitSplatTiles {
 
 inline constexpr int kRasterBatch = policy::Stages::kBlendChunk;
 
-/// One block a tile, one thread a pixel; splats come through shared memory in batches. `Mesh`: the frame
-/// has one.
+/// Blends one tile per block and one pixel per thread. Splats are staged in shared memory in batches.
+/// `Mesh`: the frame has a mesh.
 template <bool Color, DepthMode D, Exp2 M, bool General, bool Mesh>
 __global__ void __launch_bounds__(1024) rasterize_kernel(const RasterArgs<float> args) {
   __shared__ SplatGeometry<float> geometry[kRasterBatch];

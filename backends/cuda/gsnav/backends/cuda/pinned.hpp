@@ -13,19 +13,20 @@
 namespace gsnav {
 
 namespace cuda {
-/// Page-locked host memory, or null where there is none.
+/// Allocates page-locked host memory. Returns null if there is none.
 void* allocate_pinned(std::size_t bytes) noexcept;
+/// Frees memory from allocate_pinned().
 void free_pinned(void* p) noexcept;
 }  // namespace cuda
 
-/// Host memory that a GPU copies to and from by itself: `CudaBackend::copy` of images into it returns at
-/// once, and they are there after `synchronize()` or `finish()`. Elements are not initialised.
+/// Array in page-locked host memory. `CudaBackend::copy` of images into it returns at once; they are
+/// complete after `synchronize()` or `finish()`. Elements are not initialized.
 template <class T>
 class PinnedArray {
   static_assert(std::is_trivially_copyable_v<T>);
 
  public:
-  /// Throws gsnav::Error (out_of_memory).
+  /// Allocates n elements. Throws gsnav::Error (out_of_memory).
   explicit PinnedArray(std::size_t n) : size_(n) {
     if (n == 0) return;
     const bool countable = n <= std::numeric_limits<std::size_t>::max() / sizeof(T);
@@ -35,10 +36,15 @@ class PinnedArray {
                                             std::to_string(sizeof(T)) + " bytes of page-locked memory");
     }
   }
+  /// Pointer to the elements.
   T* data() noexcept { return data_.get(); }
+  /// Pointer to the elements.
   const T* data() const noexcept { return data_.get(); }
+  /// Number of elements.
   std::size_t size() const noexcept { return size_; }
+  /// View of all elements.
   View<T> view() noexcept { return {data(), size_}; }
+  /// View of all elements.
   View<const T> view() const noexcept { return {data(), size_}; }
 
  private:

@@ -18,7 +18,7 @@ class BlockRadixSort {
     Pair pair[Threads * Items];
   };
   explicit BlockRadixSort(TempStorage& storage) : s_(storage) {}
-  /// In place, thread by thread: stable in bits [begin, end) of the keys.
+  /// Sorts in place by bits [begin, end) of the keys, stable in the order of threads.
   void Sort(Key (&keys)[Items], Value (&values)[Items], int begin, int end) {
     const unsigned t = gsnav::emulated::thread_rank();
     for (unsigned i = 0; i < Items; ++i) s_.pair[t * Items + i] = {keys[i], values[i]};

@@ -10,7 +10,7 @@ class BlockReduce {
  public:
   using TempStorage = typename BlockScan<T, Threads>::TempStorage;
   explicit BlockReduce(TempStorage& storage) : scan_(storage) {}
-  /// The first thread's; others get what they gave.
+  /// Returns the sum in the first thread, and the thread's own value in the others.
   T Sum(T value) {
     T before, total;
     scan_.ExclusiveSum(value, before, total);

@@ -5,7 +5,7 @@
 
 namespace cub {
 
-/// As the toolkit's: storage may be used again behind a barrier, and not before.
+/// Like the toolkit's BlockScan, it requires a barrier before its storage is reused.
 template <class T, int Threads>
 class BlockScan {
  public:

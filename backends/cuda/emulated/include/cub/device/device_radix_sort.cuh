@@ -38,7 +38,7 @@ struct DeviceRadixSort {
       }
     });
   }
-  /// Ends in the other buffer, as the toolkit's may.
+  /// Leaves the result in the other buffer, which the toolkit may do too.
   template <class Key, class Value>
   static cudaError_t SortPairs(void* temp, std::size_t& bytes, DoubleBuffer<Key>& keys,
                                DoubleBuffer<Value>& values, std::size_t n, int begin, int end,
