@@ -115,8 +115,8 @@ def found(root, *patterns):
     """Files of the repository; of an archive, where git knows nothing, all that are there."""
     if is_source_tree(root):
         return tracked(root, *patterns)
-    files = (f for p in patterns for f in root.rglob(p) if not any(d.startswith("build") for d in f.relative_to(root).parts))
-    return sorted(set(files))
+    files = {f for p in patterns for f in root.rglob(p)}
+    return sorted(f for f in files if not any(d.startswith("build") for d in f.relative_to(root).parts))
 
 
 def check(root):
@@ -151,8 +151,8 @@ def self_test():
         (root / "README.md").write_text("[a](docs/a.md)\n[folder](docs)\n")
         wrong, count = check(root)
         assert not wrong and count == 8, (wrong, count)
-        faults = ["[x](none.md)", "[x](docs/b.md#nowhere)", "![x](docs/none.svg)", "[x](../outside.md)", "[x](/docs/a.md)",
-                  "<img src=\"none.png\">", "[x]: none.md", "[two\nlines](none.md)"]
+        faults = ["[x](none.md)", "[x](docs/b.md#nowhere)", "![x](docs/none.svg)", "[x](../outside.md)",
+                  "[x](/docs/a.md)", "<img src=\"none.png\">", "[x]: none.md", "[two\nlines](none.md)"]
         for fault in faults:
             (root / "README.md").write_text(fault + "\n")
             assert len(check(root)[0]) == 1, fault
