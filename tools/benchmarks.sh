@@ -48,7 +48,7 @@ if [[ -z $build ]]; then
   mkdir -p "$build"
   cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DGSNAV_BENCH=ON -DGSNAV_TESTS=OFF \
     -DGSNAV_EXAMPLES=OFF -DGSNAV_INSTALL=OFF > "$build/configure.log" 2>&1 ||
-    { cat "$build/configure.log" >&2; stop "configuring failed; tools/install_deps.sh tests installs what is missing"; }
+    { cat "$build/configure.log" >&2; stop "not configured; tools/install_deps.sh tests installs what is missing"; }
   targets=(gsnav-scene bench_render)
   targets_there=$(cmake --build "$build" --target help)
   [[ $targets_there != *bench_batch:* ]] || targets+=(bench_batch)
@@ -112,8 +112,8 @@ fi
   echo
   cat "$out/cpu.md"
   if [[ $gpu == 1 ]]; then
-    printf '\n## %s\n\nRGB, alpha and median depth. Errors are of the first four views, of one view with one camera.\n\n' \
-      "$device"
+    printf '\n## %s\n\n' "$device"
+    printf 'RGB, alpha and median depth. Errors are of the first four views, of one view with one camera.\n\n'
     cat "$out/gpu.md"
   else
     printf '\nNo rows of a GPU: bench_batch is not built (-DGSNAV_CUDA=ON), or --no-gpu was given.\n'

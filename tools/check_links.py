@@ -7,8 +7,8 @@
 
 A link is `[text](target)`, an image `![text](target)`, `<img src="target">`, `<a href="target">` or a definition
 `[name]: target`. Code is not read for links. Links with a scheme (https:, mailto:) are not followed. Anchors are
-those that GitHub makes of headings. Comments of sources, scripts and CMake files that name a page (docs/NAME.md) are
-checked as well.
+those that GitHub makes of headings. Sources, scripts and CMake files that name a page are checked as well, but for
+names that are a whole string.
 """
 import argparse
 import pathlib
@@ -26,7 +26,7 @@ DEFINITION = re.compile(r"^ {0,3}\[[^\]]+\]:\s*<?(\S+?)>?\s*$", re.MULTILINE)
 ATTRIBUTE = re.compile(r"<(?:img|a|source)\b[^>]*?\b(?:src|href|srcset)=\"([^\"]+)\"", re.DOTALL)
 HEADING = re.compile(r"^ {0,3}#{1,6}\s+(.*?)\s*#*\s*$")
 EXPLICIT_ANCHOR = re.compile(r"<a\s+(?:id|name)=\"([^\"]+)\"")
-PAGE = re.compile(r"\bdocs/[\w./-]+\.(?:md|svg|png)\b")
+PAGE = re.compile(r"(?<![\"'/\w])docs/[\w./-]+\.(?:md|svg|png)\b")
 SOURCES = ("*.hpp", "*.cpp", "*.cu", "*.cuh", "*.py", "*.sh", "*.cmake", "*.in", "*CMakeLists.txt", "*.txt", "*.yml")
 
 
