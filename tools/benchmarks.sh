@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# Measures gsnav's rows of docs/benchmarks.md on scenes that it makes itself: frame times on a processor and, where
-# gsnav was built with CUDA and there is a GPU, on that, each with its error against float64 beside it.
+# Measures the rows of gsnav in docs/benchmarks.md, on scenes that it makes itself: frame times on a
+# processor and, with CUDA and a GPU, on that. Each time has its error against float64 beside it.
 #
-#   tools/benchmarks.sh                  builds what it needs in build/benchmarks, measures, writes OUT/benchmarks.md
-#   tools/benchmarks.sh --build DIR      takes the programs of a build folder that has them (GSNAV_BENCH=ON)
-#   tools/benchmarks.sh --quick          one scene of 100,000 Gaussians at 256x256, one turn
+#   tools/benchmarks.sh                builds the programs in build/benchmarks, measures, writes
+#                                      OUT/benchmarks.md
+#   tools/benchmarks.sh --build DIR    takes the programs of a build folder made with GSNAV_BENCH=ON
+#   tools/benchmarks.sh --quick        one scene of 100,000 Gaussians at 256x256, one turn
 #
 #   --out DIR          folder for scenes, references and results (default: out/benchmarks)
 #   --gaussians LIST   sizes of the flat (default: 100000,300000,1000000)
@@ -14,8 +15,8 @@
 #   --cameras LIST     cameras per call on a GPU (default: 1,64,256)
 #   --no-gpu           processor alone
 #
-# The first run computes float64 references and keeps them in the folder; later runs take less time. Times are medians
-# over 64 views. They mean something only while no other program runs.
+# The first run computes float64 references and keeps them in the folder; later runs take less time.
+# Times are medians over 64 views. They mean something only while no other program runs.
 #
 # GSNAV_JOBS=N   compile N files at a time (default: see tools/build_jobs.sh)
 set -euo pipefail
@@ -23,7 +24,7 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 build="" out=$root/out/benchmarks gaussians=100000,300000,1000000 sizes=256x256,640x480,1920x1080 cameras=1,64,256
 rounds=2 gpu=1
-usage() { sed -n '4,20s/^# \{0,1\}//p' "$root/tools/benchmarks.sh"; }
+usage() { sed -n '4,21s/^# \{0,1\}//p' "$root/tools/benchmarks.sh"; }
 stop() { echo "benchmarks.sh: $*" >&2; exit 2; }
 while [[ $# -gt 0 ]]; do
   case $1 in

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the links of all Markdown files of the repository: files, folders and anchors that a link names must exist.
+"""Checks the links of all Markdown files: files, folders and anchors that a link names must exist.
 
-    tools/check_links.py               names each link that leads nowhere; exit status 1 where there is any
+    tools/check_links.py               names each link that leads nowhere; exit status 1 if there is any
     tools/check_links.py --self-test   checks the script itself
 
-A link is `[text](target)`, an image `![text](target)`, `<img src="target">`, `<a href="target">` or a definition
-`[name]: target`. Code is not read for links. Links with a scheme (https:, mailto:) are not followed. Anchors are
-those that GitHub makes of headings. Sources, scripts and CMake files that name a page are checked as well, but for
-names that are a whole string.
+A link is `[text](target)`, an image `![text](target)`, `<img src="target">`, `<a href="target">` or a
+definition `[name]: target`. Code is not read for links. Links with a scheme (https:, mailto:) are not
+followed. Anchors are those that GitHub makes of headings. Pages and pictures under docs/ that sources,
+scripts and CMake files name are checked too, except where a string is the whole name.
 """
 import argparse
 import pathlib
@@ -82,7 +82,7 @@ def links(text):
 
 
 def problem(page, target, root, known):
-    """What is wrong with a link of `page`, or None."""
+    """The fault of a link of `page`, or None."""
     if re.match(r"[a-zA-Z][\w+.-]*:", target) or target.startswith("//"):
         return None
     name, _, anchor = urllib.parse.unquote(target).partition("#")
@@ -112,7 +112,7 @@ def is_source_tree(root):
 
 
 def found(root, *patterns):
-    """Files of the repository; of an archive, where git knows nothing, all that are there."""
+    """Files of the repository; without git, in an archive, all files."""
     if is_source_tree(root):
         return tracked(root, *patterns)
     files = {f for p in patterns for f in root.rglob(p)}

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Makes docs/reference/command_lines.md of what the programs print for --help.
+"""Makes docs/reference/command_lines.md of the help texts of the programs.
 
     tools/make_command_lines.py --build build/dev           writes the page
-    tools/make_command_lines.py --build build/dev --check   names what differs; exit status 1 where anything does
+    tools/make_command_lines.py --build build/dev --check   names differences; exit status 1 if there are any
 
 A program that the build folder does not have keeps its section of the page; --check does not look at it.
 """
@@ -42,7 +42,7 @@ WIDTH = 105
 
 
 def helped(path, name, arguments):
-    """What a program prints for --help under its own name, whatever folder it is in."""
+    """The help text of a program under its own name, in any folder."""
     done = subprocess.run([name, *arguments, "--help"], executable=str(path), capture_output=True, text=True,
                           timeout=60, check=False)
     if done.returncode != 0:
