@@ -55,7 +55,7 @@ def emptied(match):
 
 
 def slug(heading):
-    """GitHub's anchor of a heading: its text in small letters, without punctuation, spaces as hyphens."""
+    """GitHub's anchor of a heading: small letters, no punctuation, hyphens for spaces."""
     text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", heading)  # the text of a link
     text = re.sub(r"<[^>]*>", "", text).replace("`", "").replace("*", "").replace("\\", "")
     return re.sub(r"[^\w\- ]", "", text.strip().lower()).replace(" ", "-")

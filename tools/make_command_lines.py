@@ -3,7 +3,7 @@
 """Makes docs/reference/command_lines.md of the help texts of the programs.
 
     tools/make_command_lines.py --build build/dev           writes the page
-    tools/make_command_lines.py --build build/dev --check   names differences; exit status 1 if there are any
+    tools/make_command_lines.py --build build/dev --check   names differences; exit status 1 if any
 
 A program that the build folder does not have keeps its section of the page; --check does not look at it.
 """
