@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 #
 # Checks the layout of text: C++ and CUDA sources are as clang-format 14 writes them (105 columns, literals may be
-# longer), no line of prose in Markdown is longer than 105 columns (tables, code and links may be;
-# docs/notes/approximations.md is generated), and no line of Python, shell or CMake, nor any of C++ with its literals,
-# is longer than 120. The wording of folders that tools/check_words.py names follows the rules in CONTRIBUTING.md.
+# longer), no line of prose in Markdown is longer than 105 columns (tables, code and links may be), and no line of
+# Python, shell or CMake, nor any of C++ with its literals, is longer than 120. The wording of folders that
+# tools/check_words.py names follows the rules in CONTRIBUTING.md.
 #
 #   tools/check_format.sh          names what is wrong; exit status 1 where anything is
 #   tools/check_format.sh --fix    formats the sources in place
@@ -15,7 +15,7 @@ case ${1:-} in
   "") options=(--dry-run -Werror) ;;
   --fix) options=(-i) ;;
   *)
-    sed -n '4,11s/^# \{0,1\}//p' tools/check_format.sh
+    sed -n '4,10s/^# \{0,1\}//p' tools/check_format.sh
     exit $([[ $1 == --help || $1 == -h ]] && echo 0 || echo 2)
     ;;
 esac
@@ -25,7 +25,7 @@ if ! command -v clang-format > /dev/null; then
 fi
 failed=0
 git ls-files -z '*.hpp' '*.cpp' '*.cu' '*.cuh' | xargs -0 -n 64 -P "$(nproc)" clang-format "${options[@]}" || failed=1
-git ls-files -z '*.md' | { grep -zvx docs/notes/approximations.md || true; } | xargs -0 awk '
+git ls-files -z '*.md' | xargs -0 awk '
   FNR == 1 { code = 0 }
   /^ *```/ { code = !code }
   length($0) > 105 && !code && !/^ *\|/ && !/^    / && !/^[^ ]*$/ {

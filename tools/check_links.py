@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the links of all Markdown files of the repository: files, folders and anchors that a link names must exist.
+"""Checks the links of all Markdown files: files, folders and anchors that a link names must exist.
 
-    tools/check_links.py               names each link that leads nowhere; exit status 1 where there is any
+    tools/check_links.py               names each link that leads nowhere; exit status 1 if there is any
     tools/check_links.py --self-test   checks the script itself
 
-A link is `[text](target)`, an image `![text](target)`, `<img src="target">`, `<a href="target">` or a definition
-`[name]: target`. Code is not read for links. Links with a scheme (https:, mailto:) are not followed. Anchors are
-those that GitHub makes of headings. Comments of sources, scripts and CMake files that name a page (docs/NAME.md) are
-checked as well.
+A link is `[text](target)`, an image `![text](target)`, `<img src="target">`, `<a href="target">` or a
+definition `[name]: target`. Code is not read for links. Links with a scheme (https:, mailto:) are not
+followed. Anchors are those that GitHub makes of headings. Pages and pictures under docs/ that sources,
+scripts and CMake files name are checked too, except where a string is the whole name.
 """
 import argparse
 import pathlib
@@ -26,7 +26,7 @@ DEFINITION = re.compile(r"^ {0,3}\[[^\]]+\]:\s*<?(\S+?)>?\s*$", re.MULTILINE)
 ATTRIBUTE = re.compile(r"<(?:img|a|source)\b[^>]*?\b(?:src|href|srcset)=\"([^\"]+)\"", re.DOTALL)
 HEADING = re.compile(r"^ {0,3}#{1,6}\s+(.*?)\s*#*\s*$")
 EXPLICIT_ANCHOR = re.compile(r"<a\s+(?:id|name)=\"([^\"]+)\"")
-PAGE = re.compile(r"\bdocs/[\w./-]+\.(?:md|svg|png)\b")
+PAGE = re.compile(r"(?<![\"'/\w])docs/[\w./-]+\.(?:md|svg|png)\b")
 SOURCES = ("*.hpp", "*.cpp", "*.cu", "*.cuh", "*.py", "*.sh", "*.cmake", "*.in", "*CMakeLists.txt", "*.txt", "*.yml")
 
 
@@ -55,7 +55,7 @@ def emptied(match):
 
 
 def slug(heading):
-    """GitHub's anchor of a heading: its text in small letters, without punctuation, spaces as hyphens."""
+    """GitHub's anchor of a heading: small letters, no punctuation, hyphens for spaces."""
     text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", heading)  # the text of a link
     text = re.sub(r"<[^>]*>", "", text).replace("`", "").replace("*", "").replace("\\", "")
     return re.sub(r"[^\w\- ]", "", text.strip().lower()).replace(" ", "-")
@@ -82,7 +82,7 @@ def links(text):
 
 
 def problem(page, target, root, known):
-    """What is wrong with a link of `page`, or None."""
+    """The fault of a link of `page`, or None."""
     if re.match(r"[a-zA-Z][\w+.-]*:", target) or target.startswith("//"):
         return None
     name, _, anchor = urllib.parse.unquote(target).partition("#")
@@ -112,12 +112,11 @@ def is_source_tree(root):
 
 
 def found(root, *patterns):
-    """Files of the repository; of an archive, where git knows nothing, all that are there."""
+    """Files of the repository; without git, in an archive, all files."""
     if is_source_tree(root):
         return tracked(root, *patterns)
-    files = (f for p in patterns for f in root.rglob(p)
-             if not any(d.startswith("build") for d in f.relative_to(root).parts))
-    return sorted(set(files))
+    files = {f for p in patterns for f in root.rglob(p)}
+    return sorted(f for f in files if not any(d.startswith("build") for d in f.relative_to(root).parts))
 
 
 def check(root):
@@ -153,8 +152,7 @@ def self_test():
         wrong, count = check(root)
         assert not wrong and count == 8, (wrong, count)
         faults = ["[x](none.md)", "[x](docs/b.md#nowhere)", "![x](docs/none.svg)", "[x](../outside.md)",
-                  "[x](/docs/a.md)",
-                  "<img src=\"none.png\">", "[x]: none.md", "[two\nlines](none.md)"]
+                  "[x](/docs/a.md)", "<img src=\"none.png\">", "[x]: none.md", "[two\nlines](none.md)"]
         for fault in faults:
             (root / "README.md").write_text(fault + "\n")
             assert len(check(root)[0]) == 1, fault
