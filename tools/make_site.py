@@ -20,6 +20,10 @@ from xml.sax.saxutils import quoteattr
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 SITE = ROOT / "docs/site"
 # Group, its title, the module header that has it (or none) and the folders whose other headers belong to it.
+ABOUT_GROUPS = {"core": "Errors, random numbers, arrays in the memory of a backend, and the concept of a backend.",
+                "math": "Vectors, quaternions, matrices, boxes and capsules.",
+                "backends": "Backends by their own names, for the templates that take one.",
+                "interop": "Views and copies of the types of other libraries."}
 GROUPS = (("render", "Scenes and rendering", "render", ("render", "image", "frame", "scene", "device")),
           ("avatar", "Avatars", "avatar", ("avatar", "skin")),
           ("rigging", "Making avatars", "rigging", ("rigging",)),
@@ -41,7 +45,7 @@ SECTIONS = (("Guide", "docs/guide"), ("Concepts", "docs/concepts"), ("Reference"
 ABOUT = ("CONTRIBUTING.md", "CHANGELOG.md")
 FENCE = re.compile(r"\s*(```|~~~)")
 REFERENCE = re.compile(r"\[([^\]]*)\]\(@ref [^)]*\)")
-SPAN = re.compile(r"`[^`\n]+\n[^`\n]+`")  # Doxygen takes the second line for a list where it begins with + or -
+SPAN = re.compile(r"`(?:[^`\n]|\n(?!\n))+`")  # on one line, because Doxygen may take a second one for a list
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s]+)\)")
 
 
@@ -105,6 +109,8 @@ def page_text(name, known):
         return f"[{text}](@ref {label(linked, anchor)})"
 
     source = (ROOT / name).read_text(encoding="utf-8")
+    title = re.search(r"^# .*\n", source, re.MULTILINE)  # Doxygen takes it for the title where it is first
+    source = title.group() + source[:title.start()] + source[title.end():] if title else source
     parts = re.split(r"(^ *```.*?^ *```|^    [^\n]*)", source, flags=re.DOTALL | re.MULTILINE)
     parts[::2] = (SPAN.sub(lambda m: m.group().replace("\n", " "), LINK.sub(link, part)) for part in parts[::2])
     source = "".join(parts)
@@ -189,7 +195,7 @@ def document_the_obvious(text):
             else:
                 function = FUNCTION.match(line)
                 if function and function.group(1) == documented and "///" not in line:
-                    line = f"/** @overload */ {line}"
+                    line = f"/** As above, with other arguments. */ {line}"
         function = FUNCTION.match(line.split("*/ ", 1)[-1])
         if function and (commented or "/**" in line or "///<" in line):
             documented = function.group(1)
@@ -224,7 +230,7 @@ def module_comment(module):
 def write_groups(out):
     lines = []
     for group, title, module, _ in GROUPS:
-        text = f"`#include \"gsnav/{module}.hpp\"`\n\n{module_comment(module)}" if module else ""
+        text = (f"{module_comment(module)}\n\n`#include \"gsnav/{module}.hpp\"`" if module else ABOUT_GROUPS[group])
         lines.append(f"/** @defgroup {group} {title}\n{text}\n*/")
     for name, text in (("gsnav", "All names of the library."), ("gsnav::io", "Files: readers and writers."),
                        ("gsnav::interop", "Types of other libraries.")):
