@@ -289,7 +289,9 @@ def make(out, doxygen):
     write_groups(out)
     write_layout(out)
     inputs = [*write_inputs(out), out / "groups.dox"]
-    values = {"OUT": out, "ROOT": ROOT, "SITE": SITE, "VERSION": version(),
+    images = {p.parent for p in (ROOT / "docs").rglob("*") if p.suffix in {".png", ".svg", ".webp"}}
+    values = {"OUT": out, "IMAGES": " ".join(f'"{p}"' for p in sorted(images)),
+              "ROOT": ROOT, "SITE": SITE, "VERSION": version(),
               "INPUT": " \\\n  ".join(f'"{p}"' for p in inputs)}
     text = (SITE / "Doxyfile.in").read_text(encoding="utf-8")
     (out / "Doxyfile").write_text(re.sub(r"@([A-Z]+)@", lambda m: str(values[m.group(1)]), text), encoding="utf-8")
