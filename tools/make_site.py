@@ -166,7 +166,7 @@ def header_text(path, name, group):
     return document_the_obvious(plain_comments(text))
 
 
-NO_MARKUP = re.compile(r"<(?=/?[A-Za-z])|\\(?=x)|(?<=\w)@(?=\w)|(?<=[\w>])::(?=create\b)")
+NO_MARKUP = re.compile(r"<(?=/?[A-Za-z])|(?<!\\)\\(?=x)|(?<=\w)@(?=\w)|(?<=[\w>])::(?=create\b)")
 
 
 def plain_comments(text):

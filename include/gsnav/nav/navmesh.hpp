@@ -21,27 +21,28 @@ namespace gsnav {
 
 /// Index of a polygon of a NavMesh.
 using PolyId = std::uint32_t;
-inline constexpr PolyId kNoPoly = 0xffffffffu;
+inline constexpr PolyId kNoPoly = 0xffffffffu;  ///< No polygon.
 /// The island of no polygon.
 inline constexpr std::size_t kNoIsland = static_cast<std::size_t>(-1);
 
 /// A point on the surface of a NavMesh: world position (metres, Y up) and the polygon it lies on.
 /// Kept from one step to the next, the polygon saves the search for it.
 struct NavPoint {
-  Vec3d position{};
-  PolyId poly = kNoPoly;
+  Vec3d position{};       ///< Place, metres.
+  PolyId poly = kNoPoly;  ///< Polygon of the NavMesh below it, or kNoPoly if it is not known.
 };
 
 /// How far a point may lie from the surface to be snapped to it: half extents of a box, metres. The
 /// defaults are Habitat's, and generous: two metres beside the mesh or four above it still snap.
 struct SnapOptions {
+  /// Half the box in which the nearest surface is looked up, metres.
   Vec3d half_extents{2.0, 4.0, 2.0};
   std::optional<std::size_t> island{};  ///< only to this island, where one is named
 };
 
 /// Triangles by index, metres, Y up; counter-clockwise seen from above can be walked on.
 struct NavMeshTriangles {
-  std::vector<Vec3d> vertices;
+  std::vector<Vec3d> vertices;                          ///< Corners, metres.
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< three of `vertices` each
 };
 
@@ -49,7 +50,7 @@ struct NavMeshTriangles {
 struct NavMeshPart {
   std::span<const Vec3d> vertices;                          ///< its own coordinates
   std::span<const std::array<std::uint32_t, 3>> triangles;  ///< three of its own vertices each
-  Similarity world_from_part{};
+  Similarity world_from_part{};                             ///< Takes the part's frame to the world.
   /// An object that never moves. It is part of the mesh only where
   /// NavMeshSettings::include_static_objects says so.
   bool static_object = false;
@@ -79,14 +80,15 @@ enum class TopDownLayout : std::uint8_t {
 
 /// The walkable surface near one height, seen from above.
 struct TopDownMap {
-  Vec3d low{};  ///< world corner of cell (0, 0)
-  double metres_per_cell = 0.0;
+  Vec3d low{};                   ///< world corner of cell (0, 0)
+  double metres_per_cell = 0.0;  ///< Side of a cell, metres.
   double at = 0.5;  ///< where in a cell the surface was looked up, in cells from its corner: 0.5 at the
                     ///< centre, or 0
   std::size_t columns = 0, rows = 0;  ///< along x and z
   std::vector<std::int32_t>
       islands;  ///< columns * row + column: island, or -1 where nothing is walkable
 
+  /// Whether a cell is walkable.
   bool walkable(std::size_t column, std::size_t row) const noexcept {
     return islands[columns * row + column] >= 0;
   }
@@ -96,17 +98,18 @@ struct TopDownMap {
 /// straight line would leave the surface by more than a centimetre, and its length on the surface,
 /// metres.
 struct NavPath {
-  std::vector<Vec3d> points;
-  double length = 0.0;
+  std::vector<Vec3d> points;  ///< Points from start to goal, metres.
+  double length = 0.0;        ///< Length along the surface, metres.
 };
 
 /// A distance that is known to an error: `length` is at most `relative_error` times `at_least` above it,
 /// and the shortest path lies between it and 2 length - at_least, metres. Both infinite where there is
 /// no path.
 struct BoundedDistance {
-  double length = 0.0;
+  double length = 0.0;    ///< Length along the surface, metres.
   double at_least = 0.0;  ///< no path is shorter
 };
+/// How exact a distance is.
 struct DistanceOptions {
   double relative_error = 1e-3;  ///< 0 (exact) to 0.1
 };
@@ -123,14 +126,14 @@ enum class PathStatus : std::uint8_t {
 /// The shortest of the paths to several goals.
 struct GoalPath {
   std::size_t goal = 0;  ///< index of the goal reached
-  NavPath path;
+  NavPath path;          ///< The path.
 };
 
 /// A point of a walk and when it is reached, as a fraction of the displacement asked for.
 struct WalkPoint {
-  Vec3d position{};
-  PolyId poly = kNoPoly;
-  double fraction = 0.0;
+  Vec3d position{};       ///< Place, metres.
+  PolyId poly = kNoPoly;  ///< Polygon of the NavMesh below it, or kNoPoly if it is not known.
+  double fraction = 0.0;  ///< When it is reached, in [0, 1].
 };
 
 /// Points of a walk in order. Those of a usual step lie in the object: it allocates nothing.
@@ -150,7 +153,7 @@ struct SurfaceWalk {
 /// from may only be assigned to or destroyed.
 class NavMesh {
  public:
-  using Triangle = std::array<std::uint32_t, 3>;
+  using Triangle = std::array<std::uint32_t, 3>;  ///< Indices of three vertices.
 
   /// Builds from triangles (counter-clockwise seen from above is walkable; Y up, metres), at any
   /// distance from the world's origin. Errors: invalid_argument naming the setting, vertex or index
@@ -167,10 +170,10 @@ class NavMesh {
   NavMesh& operator=(NavMesh&&) noexcept;
   ~NavMesh();
 
-  const NavMeshSettings& settings() const noexcept;
+  const NavMeshSettings& settings() const noexcept;  ///< The settings that it was built with.
   /// Box around the navigable surface.
   Aabb<double> bounds() const noexcept;
-  std::size_t polygon_count() const noexcept;
+  std::size_t polygon_count() const noexcept;  ///< Number of polygons.
   /// Area of the surface, square metres.
   double navigable_area() const noexcept;
   /// The surface as triangles, for drawing.
@@ -181,7 +184,7 @@ class NavMesh {
   NavMeshTriangles surface(std::optional<std::size_t> island = {}) const;
 
   // ---- islands: connected pieces of the surface, numbered by falling area
-  std::size_t island_count() const noexcept;
+  std::size_t island_count() const noexcept;  ///< Number of connected pieces.
   /// Island of a polygon; island 0 is the largest. kNoIsland for kNoPoly and whatever is no polygon of
   /// this mesh.
   std::size_t island_of(PolyId poly) const noexcept;
@@ -249,6 +252,7 @@ class NavMesh {
   /// The same for points whose polygons are known, without a search for them. Errors: invalid_argument
   /// for no polygon of this mesh; nothing_navigable.
   Result<NavPath> path_between(const NavPoint& start, const NavPoint& goal) const;
+  /// Length of the shortest path along the surface, metres; infinity if there is none.
   double distance_between(const NavPoint& start, const NavPoint& goal) const;
   /// The same to a chosen error, with a proven lower bound: on hills, where exact distances are searched
   /// for. Elsewhere it is exact. Errors: invalid_argument for a relative error that is not in [0, 0.1].
@@ -264,8 +268,8 @@ class NavMesh {
   SurfaceWalk walk(const NavPoint& start, const Vec3d& displacement, bool slide) const;
 
   struct Impl;
-  explicit NavMesh(std::unique_ptr<Impl> impl) noexcept;
-  const Impl& impl() const noexcept { return *impl_; }  ///< for the library's own parts
+  explicit NavMesh(std::unique_ptr<Impl> impl) noexcept;  ///< For the library's own functions.
+  const Impl& impl() const noexcept { return *impl_; }    ///< for the library's own parts
 
  private:
   std::unique_ptr<Impl> impl_;

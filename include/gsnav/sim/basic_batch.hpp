@@ -68,8 +68,11 @@ class BasicBatchSimulator {
         environments, std::move(next_episode));
   }
 
+  /// Number of environments.
   std::size_t environments() const noexcept { return worlds_.size(); }
+  /// The world of one environment.
   const World& world(std::size_t environment) const noexcept { return worlds_.world(environment); }
+  /// Number of the scene that an environment is in.
   std::size_t scene_of(std::size_t environment) const noexcept { return worlds_.scene_of(environment); }
 
   /// Begins the next episode in every environment or, with a mask [N], in those where it is not 0.
@@ -90,7 +93,9 @@ class BasicBatchSimulator {
 
   /// Renders made so far, and how many times an avatar was skinned for them.
   std::size_t render_count() const noexcept { return rig_.render_count(); }
+  /// How often an avatar has been posed so far.
   std::size_t pose_count() const noexcept { return scenes_.pose_count(); }
+  /// Turns rendering on or off. Without it, steps give physics and metrics only.
   void set_rendering(bool on) noexcept { config_.rendering = on; }
 
  private:
@@ -283,6 +288,7 @@ Result<BasicBatchSimulator<B>> make_batch_simulator(
                                         std::move(next_episode));
 }
 
+/// Makes a batch over scenes that are loaded when they are needed.
 template <Backend B>
 Result<BasicBatchSimulator<B>> make_batch_simulator_from_library(B& backend,
                                                                  std::shared_ptr<SceneLibrary> library,

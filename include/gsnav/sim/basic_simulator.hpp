@@ -93,13 +93,21 @@ class BasicSimulator {
     return obs;
   }
 
+  /// Whether the episode has ended.
   bool done() const noexcept { return world_.done(); }
+  /// Metrics of the episode so far.
   EpisodeMetrics metrics() const { return world_.metrics(); }
+  /// Seconds on the scene's clock.
   double clock() const noexcept { return world_.time(); }
+  /// Where the agent is.
   const AgentPose& agent() const noexcept { return world_.agent(); }
+  /// Agent, episode and clock, without sensors.
   const World& world() const noexcept { return world_; }
+  /// The settings.
   const SimulatorConfig& config() const noexcept { return config_; }
+  /// The scene.
   const SimulatorScene& scene() const noexcept { return scene_.scene(); }
+  /// People of the scene.
   const std::vector<AvatarActor>& avatars() const noexcept { return scene_.scene().avatars; }
 
   /// Everything that changes while it runs, and the way back to it; observe() then sees what was seen

@@ -19,8 +19,9 @@
 
 namespace gsnav {
 
+/// Settings of a simulator.
 struct SimulatorConfig {
-  TaskConfig task{};
+  TaskConfig task{};  ///< Rules of the episode: actions, body, success and time.
   /// An RGB and a depth sensor ("rgb", "depth") of 256 x 256 pixels and 90 degrees, 1.5 m above the
   /// ground, unless others are given. Empty: nothing is rendered.
   std::vector<SensorSpec> sensors = rgbd_sensors();
@@ -100,8 +101,9 @@ const Image& image_named(std::span<const Image> images, std::string_view uuid) {
 
 }  // namespace detail
 
+/// Settings of a batch of simulators.
 struct BatchConfig : SimulatorConfig {
-  AutoReset auto_reset = AutoReset::next_step;
+  AutoReset auto_reset = AutoReset::next_step;  ///< What happens when an episode ends.
   /// Times of a scene for which its avatars are held posed at once; more are drawn one after the other.
   /// Memory grows with it.
   std::size_t pose_slots = 8;
@@ -112,17 +114,17 @@ struct BatchConfig : SimulatorConfig {
 
 /// One sensor's image. Valid until the next step or reset of its simulator.
 struct Observation {
-  std::string_view uuid;
-  SensorKind kind = SensorKind::rgb;
-  int height = 0, width = 0, channels = 0;
-  std::span<const float> data;  ///< [H][W][channels], row 0 on top
+  std::string_view uuid;                    ///< Sensor name from SensorSpec::uuid.
+  SensorKind kind = SensorKind::rgb;        ///< What the sensor measures.
+  int height = 0, width = 0, channels = 0;  ///< Size of the image.
+  std::span<const float> data;              ///< [H][W][channels], row 0 on top
 };
 
 /// What the agent perceives after a reset or an action, and what that action did.
 struct Observations : StepInfo {
   std::span<const Observation> images;  ///< in the sensors' order; empty without rendering
-  PointGoal point_goal{};
-  double time = 0.0;  ///< seconds on the scene's clock
+  PointGoal point_goal{};               ///< The goal as seen from the agent.
+  double time = 0.0;                    ///< seconds on the scene's clock
 
   /// The image of sensor `uuid`, [H][W][channels]. Throws gsnav::Error (aborts under -fno-exceptions)
   /// where there is no image of that name: it lists the sensors, or says that nothing was rendered.
@@ -138,11 +140,11 @@ struct Observations : StepInfo {
 /// One sensor's images of all environments, [environments][height][width][channels]. Valid until the
 /// next call. interop/dlpack.hpp makes tensors of them, wherever they are.
 struct BatchObservation {
-  std::string_view uuid;
-  SensorKind kind = SensorKind::rgb;
-  std::size_t environments = 0;
-  int height = 0, width = 0, channels = 0;
-  std::span<const float> data;  ///< in host memory; empty where images stay in the backend's
+  std::string_view uuid;                    ///< Sensor name from SensorSpec::uuid.
+  SensorKind kind = SensorKind::rgb;        ///< What the sensor measures.
+  std::size_t environments = 0;             ///< Number of environments.
+  int height = 0, width = 0, channels = 0;  ///< Size of the image.
+  std::span<const float> data;              ///< in host memory; empty where images stay in the backend's
   const float* on_backend =
       nullptr;  ///< there (BatchConfig::images), whole when the call that drew them returns
 
@@ -166,6 +168,7 @@ struct BatchStep : BatchInfo {
   const BatchObservation& operator[](std::string_view uuid) const {
     return detail::image_named(images, uuid);
   }
+  /// Images of one sensor, or null if there is none of this name.
   const BatchObservation* find(std::string_view uuid) const noexcept {
     return detail::find_image(images, uuid);
   }

@@ -5,6 +5,7 @@
 
 namespace gsnav {
 
+/// How the follower walks.
 struct FollowerOptions {
   int horizon = 12;             ///< actions looked ahead, >= 1
   double watch_distance = 4.0;  ///< avatars farther than this are not planned for, metres
@@ -22,6 +23,7 @@ struct FollowerOptions {
 /// rules hold for it as for any policy, and contacts count.
 class GeodesicFollower {
  public:
+  /// A follower with these settings.
   explicit GeodesicFollower(const FollowerOptions& options = {}) : options_(options) {}
 
   /// The next action; stop at the goal or where there is no way to it.

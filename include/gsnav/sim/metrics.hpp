@@ -81,9 +81,9 @@ struct StepRecord {
 
 /// The outcome of one episode.
 struct EpisodeMetrics {
-  bool success = false;
-  double spl = 0.0;
-  double soft_spl = 0.0;
+  bool success = false;                     ///< The agent stopped near enough to the goal.
+  double spl = 0.0;                         ///< SPL: success weighted by path length, in [0, 1].
+  double soft_spl = 0.0;                    ///< SoftSPL: progress weighted by path length, in [0, 1].
   double stl = 0.0;                         ///< success weighted by time
   double distance_to_goal = 0.0;            ///< geodesic, metres; infinity where cut off
   double euclidean_distance_to_goal = 0.0;  ///< straight, metres
@@ -99,7 +99,7 @@ struct EpisodeMetrics {
   double start_distance = 0.0;      ///< l, metres
   double path_length = 0.0;         ///< p, metres
   double min_clearance = std::numeric_limits<double>::infinity();  ///< to any avatar, metres
-  bool stop_called = false;
+  bool stop_called = false;  ///< The agent ended the episode by stopping.
 };
 
 /// Collects the steps of one episode.
@@ -113,6 +113,7 @@ class EpisodeTracker {
     forward_step_ = forward_step;
   }
 
+  /// Adds one step.
   void add(const StepRecord& r) noexcept {
     ++m_.steps;
     m_.path_length += r.moved;
@@ -158,26 +159,26 @@ class EpisodeTracker {
 
 /// Means over episodes, each episode counting once.
 struct MetricsSummary {
-  std::size_t episodes = 0;
-  double success_rate = 0.0;  ///< SR
-  double spl = 0.0;
-  double soft_spl = 0.0;
-  double stl = 0.0;
-  double distance_to_goal = 0.0;  ///< DTG, geodesic, metres
-  double euclidean_distance_to_goal = 0.0;
-  double collision_rate = 0.0;  ///< CR
-  double psi = 0.0;
-  double psc = 0.0;
-  double collisions = 0.0;  ///< wall hits an episode
+  std::size_t episodes = 0;                 ///< Number of episodes.
+  double success_rate = 0.0;                ///< SR
+  double spl = 0.0;                         ///< SPL: success weighted by path length, in [0, 1].
+  double soft_spl = 0.0;                    ///< SoftSPL: progress weighted by path length, in [0, 1].
+  double stl = 0.0;                         ///< STL: success weighted by time, in [0, 1].
+  double distance_to_goal = 0.0;            ///< DTG, geodesic, metres
+  double euclidean_distance_to_goal = 0.0;  ///< Straight distance to the goal, metres.
+  double collision_rate = 0.0;              ///< CR
+  double psi = 0.0;                         ///< PSI: mean intrusion into personal space.
+  double psc = 0.0;                         ///< PSC: share of steps that keep out of personal space.
+  double collisions = 0.0;                  ///< wall hits an episode
   /// H-Coll of the SocialNav benchmark (Falcon): episodes in which a person was touched / episodes, in
   /// [0, 1]. There nothing stops a robot short of a person; here the step filter does, and what it
   /// stopped is counted by the next two.
   double human_collision_episode_rate = 0.0;
   double human_blocked_episode_rate = 0.0;  ///< episodes in which a person stopped a move / episodes
   double disturbed_episode_rate =
-      0.0;  ///< episodes with any step counted by CR / episodes: either of both
-  double steps = 0.0;
-  double path_length = 0.0;
+      0.0;                   ///< episodes with any step counted by CR / episodes: either of both
+  double steps = 0.0;        ///< Actions per episode.
+  double path_length = 0.0;  ///< Metres walked per episode.
   double min_clearance = std::numeric_limits<double>::infinity();  ///< the least of all episodes
 };
 

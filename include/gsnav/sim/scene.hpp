@@ -23,7 +23,7 @@ struct VisibleSets;
 /// A cloud, as floats or packed, and how it stands in the world.
 struct SceneAsset {
   std::shared_ptr<const GaussianCloud> cloud;  ///< null where `packed` is set
-  Similarity world_from_asset{};
+  Similarity world_from_asset{};               ///< Takes the asset's frame to the world.
   /// Its levels of detail (build_lod, io::cached_lod); read where SimulatorConfig::lod is set.
   std::shared_ptr<const LodTree> lod{};
   /// What is seen of it from where agents go (build_visible_sets, io::cached_visible_sets); read where
@@ -42,17 +42,17 @@ struct SceneAsset {
 /// A surface of triangles and how it stands in the world; seen among the Gaussians
 /// (docs/reference/composition.md).
 struct SceneMesh {
-  std::shared_ptr<const PlacedMeshes> surface;
-  Similarity world_from_surface{};
+  std::shared_ptr<const PlacedMeshes> surface;  ///< The triangles.
+  Similarity world_from_surface{};              ///< Takes the surface's frame to the world.
 };
 
 /// What a simulator runs in. Shared, never changed: many simulators may use one.
 struct SimulatorScene {
-  std::vector<SceneAsset> assets;
-  std::vector<SceneMesh> meshes;
-  MeshLight light{};  ///< of the meshes
-  std::shared_ptr<const NavMesh> navmesh;
-  std::vector<AvatarActor> avatars;
+  std::vector<SceneAsset> assets;          ///< Clouds of Gaussians.
+  std::vector<SceneMesh> meshes;           ///< Surfaces of triangles.
+  MeshLight light{};                       ///< of the meshes
+  std::shared_ptr<const NavMesh> navmesh;  ///< The walkable surface.
+  std::vector<AvatarActor> avatars;        ///< People.
 };
 
 /// What of a scene's assets is drawn.

@@ -19,19 +19,21 @@ namespace gsnav {
 /// Where the agent stands and looks. World frame: metres, Y up; forward is -Z turned by `yaw`
 /// (radians about +Y, positive to the left).
 struct AgentPose {
-  Vec3d position{};
-  double yaw = 0.0;
-  PolyId poly = kNoPoly;
-  double pitch = 0.0;  ///< of the sensors, radians, positive upwards; the body stays upright
+  Vec3d position{};       ///< Base of the agent, metres.
+  double yaw = 0.0;       ///< Heading in radians, positive to the left.
+  PolyId poly = kNoPoly;  ///< Polygon of the NavMesh below it, or kNoPoly if it is not known.
+  double pitch = 0.0;     ///< of the sensors, radians, positive upwards; the body stays upright
 
+  /// Heading as a rotation about +Y.
   Quatd rotation() const noexcept { return yaw_rotation(yaw); }
+  /// Unit vector that the agent looks along.
   Vec3d forward() const noexcept { return {-std::sin(yaw), 0.0, -std::cos(yaw)}; }
 };
 
 /// What one action did.
 struct StepInfo {
-  bool collided = false;  ///< a wall or an avatar stopped or turned the move
-  bool wall_collision = false;
+  bool collided = false;         ///< a wall or an avatar stopped or turned the move
+  bool wall_collision = false;   ///< A wall stopped or turned the move.
   bool capsule_blocked = false;  ///< an avatar stopped or turned the move
   bool avatar_contact = false;   ///< counted by CR: an avatar was touched or stopped the move
   bool avatar_touched = false;   ///< counted by H-Coll: bodies touched, whoever's fault
@@ -50,15 +52,15 @@ struct PointGoal {
 
 /// All that changes while a World runs. A copy is a place to come back to.
 struct WorldState {
-  PointNavEpisode episode;
-  AgentPose agent;
-  NavPoint goal;  ///< the episode's, on the surface
-  StepInfo last;
-  EpisodeTracker tracker;
+  PointNavEpisode episode;                                            ///< The episode.
+  AgentPose agent;                                                    ///< Where the agent is.
+  NavPoint goal;                                                      ///< the episode's, on the surface
+  StepInfo last;                                                      ///< Results of the last action.
+  EpisodeTracker tracker;                                             ///< Metrics so far.
   double time = 0.0, start_time = 0.0;                                ///< seconds on the scene's clock
   double distance_to_goal = std::numeric_limits<double>::infinity();  ///< along the surface, metres
-  int steps = 0;
-  bool done = true, stop_called = false, running = false;
+  int steps = 0;                                                      ///< Actions so far.
+  bool done = true, stop_called = false, running = false;             ///< State of the episode.
 };
 
 /// The task without pictures: an agent on a NavMesh among moving bodies, one episode after the other.
@@ -87,6 +89,7 @@ class World {
   Result<StepInfo> step(Action action, std::span<const CapsuleSet* const> bodies);
   Result<StepInfo> step(const VelocityCommand& command, std::span<const CapsuleSet* const> bodies);
 
+  /// Whether the episode has ended.
   bool done() const noexcept { return s_.done; }
   /// The episode is over because stop was called; else, where done, because it was cut off.
   bool stop_called() const noexcept { return s_.stop_called; }
@@ -94,15 +97,21 @@ class World {
   EpisodeMetrics metrics() const;
   /// Metres to the goal along the surface; infinity where cut off.
   double distance_to_goal() const noexcept { return s_.distance_to_goal; }
-  PointGoal point_goal() const noexcept;
+  PointGoal point_goal() const noexcept;  ///< The goal as seen from the agent.
 
+  /// Seconds on the scene's clock.
   double time() const noexcept { return s_.time; }
   /// Where substep k of the next action begins, seconds; k = substeps: where the action ends.
   double tick(int k) const noexcept;
+  /// Where the agent is.
   const AgentPose& agent() const noexcept { return s_.agent; }
+  /// Results of the last action.
   const StepInfo& last_step() const noexcept { return s_.last; }
+  /// The episode.
   const PointNavEpisode& episode() const noexcept { return s_.episode; }
+  /// Rules of the task.
   const TaskConfig& config() const noexcept { return config_; }
+  /// The walkable surface.
   const NavMesh& navmesh() const noexcept { return *navmesh_; }
 
   /// What is needed to come back here: set_state() makes everything that follows happen again, bit for

@@ -47,7 +47,7 @@ struct CudaSpace {};
 /// for after it is not done.
 class CudaBackend {
  public:
-  using memory_space = CudaSpace;
+  using memory_space = CudaSpace;  ///< Where buffers of this backend are: memory of the GPU.
   /// What draws many cameras at once (optional member; gsnav/backends/cuda/batch.hpp, included below).
   using batch_renderer = CudaBatchRenderer;
 
@@ -61,32 +61,39 @@ class CudaBackend {
   CudaBackend(const CudaBackend&) = delete;
   CudaBackend& operator=(const CudaBackend&) = delete;
 
+  /// Allocates device memory. Throws std::bad_alloc if there is not enough.
   void* allocate(std::size_t bytes, std::size_t align);
-  void deallocate(void* p, std::size_t bytes) noexcept;
+  void deallocate(void* p, std::size_t bytes) noexcept;  ///< Frees memory of allocate().
   /// Page-locked host memory; null where there is none.
   static void* allocate_host(std::size_t bytes) noexcept;
-  static void deallocate_host(void* p) noexcept;
+  static void deallocate_host(void* p) noexcept;  ///< Frees memory of allocate_host().
   /// Copies to the device of up to 1 MiB never wait for the stream, and what is copied may change at
   /// once. Others return early only from and to pinned memory.
   void copy(void* dst, const void* src, std::size_t bytes, CopyKind kind);
+  /// Sets every byte of device memory, in order with the stream.
   void fill(void* p, unsigned char byte, std::size_t bytes);
   /// Defined where nvcc compiles (backends/cuda/device.cuh).
   template <class F>
   void parallel_for(std::size_t n, const F& f);
-  Status synchronize();
+  Status synchronize();  ///< Waits until all work of the backend is done. Errors: as of the device.
 
+  /// How many items the backend works on at a time.
   std::size_t concurrency() const noexcept { return 1; }
+  /// Number of the GPU.
   int device() const noexcept { return device_; }
+  /// The CUDA stream that all work goes to.
   CUstream_st* stream() const noexcept { return stream_; }
   /// What the consumer's stream is given from now on waits for what this one has been given so far; the
   /// host does not wait. For handing images over without a copy.
   void hand_over_to(CUstream_st* consumer);
-  std::string device_name() const;
+  std::string device_name() const;  ///< Name of the GPU, as its driver reports it.
 
+  /// Sorts pairs by key on the GPU, stably. Returns whether the result is in the alternative arrays.
   bool sort_pairs(std::uint32_t* keys, std::uint32_t* values, std::uint32_t* keys_alt,
                   std::uint32_t* values_alt, std::size_t n, int bits);
 
   // Stages by kernels of its own (core/stages.hpp).
+  /// Runs a stage on the GPU, in order with the stream.
   void run(stage::Project, const ViewedSet<float>& args, const ProjectOutputs<float>& out);
   void run(stage::CountTiles, const BinArgs<float>& args, const NoCull& cull);
   void run(stage::CountTiles, const BinArgs<float>& args, const MeshCull<float>& cull);

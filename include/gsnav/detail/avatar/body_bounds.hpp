@@ -14,7 +14,7 @@ namespace gsnav {
 /// the furthest Gaussian that the joint moves.
 class BodyBounds {
  public:
-  explicit BodyBounds(const AvatarAsset& asset);
+  explicit BodyBounds(const AvatarAsset& asset);  ///< Measures the avatar once, at each of its joints.
 
   /// The box for a pose. `joints` [J]: joint to root frame, metres.
   ChunkBounds at(const std::vector<Affine3<double>>& joints) const noexcept;

@@ -22,6 +22,7 @@ namespace gsnav {
 template <Backend B>
 class SkinnedCrowd {
  public:
+  /// An empty crowd in the backend's memory.
   explicit SkinnedCrowd(B& backend) : backend_(&backend), joints_(backend) {}
 
   /// Adds a place for an actor of this asset and returns the place's index.
@@ -63,6 +64,7 @@ class SkinnedCrowd {
     }
     return {};
   }
+  /// Skins what prepare() found visible. Errors: as of skin().
   Status skin_prepared() {
     host_joints_.clear();
     for (SkinnedGaussians<B>& a : actors_) {
@@ -83,6 +85,7 @@ class SkinnedCrowd {
     return skin_all<float, B, float>(*backend_, jobs_);
   }
 
+  /// Number of actors.
   std::size_t size() const noexcept { return actors_.size(); }
   /// The posed Gaussians of a place. Valid until the next pose().
   GaussianSet set(std::size_t place) const& noexcept { return actors_[place].set(); }

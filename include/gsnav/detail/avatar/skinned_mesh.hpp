@@ -16,8 +16,8 @@ namespace gsnav {
 
 /// A rigged surface in its bind pose, from which an avatar of Gaussians is made.
 struct SkinnedMesh {
-  std::string name;
-  Skeleton skeleton;
+  std::string name;              ///< Name of the mesh in its file.
+  Skeleton skeleton;             ///< Joints and their rest pose.
   std::vector<Vec3d> positions;  ///< [V] bind pose, root frame (Y up, facing -Z), metres.
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< Counter-clockwise seen from outside.
   /// k, the number of joints that move one vertex.
@@ -28,7 +28,7 @@ struct SkinnedMesh {
   std::vector<Vec3d> colors;                 ///< [V] linear light. Empty: white.
   std::vector<std::uint32_t> materials_of;   ///< [T] index into `materials`. Empty: the first.
   std::vector<SurfaceMaterial> materials;    ///< Empty: white.
-  std::vector<TextureImage> textures;
+  std::vector<TextureImage> textures;        ///< Images that materials refer to by index.
 
   /// Checks the arrays. Error: invalid_argument naming the array and the problem.
   Status validate() const;
@@ -36,18 +36,19 @@ struct SkinnedMesh {
 
 /// What reading a rigged surface changed. Every repair is counted here.
 struct SkinnedMeshReport {
-  std::size_t vertices = 0, triangles = 0;
+  std::size_t vertices = 0, triangles = 0;   ///< Size of the surface.
   std::size_t skins = 1, skins_in_file = 1;  ///< Skins whose meshes were read, and all skins of the file
                                              ///< (glTF).
   std::size_t unequal_weights =
       0;  ///< Vertices whose weights did not sum to 1 (within 1e-3); they were divided by the sum.
+  /// Range of the sums of weights per vertex, as stored.
   double least_weight_sum = 1.0, greatest_weight_sum = 1.0;
   std::size_t without_weights =
       0;  ///< Vertices without weights; the joints of the nearest weighted vertex move them.
   /// Greatest distance, metres, over the poses looked at, between a vertex posed by the file's own
   /// matrices and by rigid joints, which drop scales.
   double rigid_error = 0.0;
-  std::vector<std::string> warnings;
+  std::vector<std::string> warnings;  ///< Messages for people, one per problem.
 };
 
 }  // namespace gsnav

@@ -13,7 +13,7 @@ namespace gsnav {
 /// Where an actor is at one time. World frame: Y up, metres. The actor faces -Z turned by `yaw` about
 /// +Y.
 struct TrajectorySample {
-  Vec3d position{};
+  Vec3d position{};       ///< Place on the floor, metres.
   double yaw = 0.0;       ///< Radians, positive to the left.
   double distance = 0.0;  ///< Metres walked since time 0.
   /// Distance at which the present walk began, metres; -infinity if it had no start.
@@ -36,6 +36,7 @@ class Trajectory {
 /// Stands in one place.
 class StandingTrajectory final : public Trajectory {
  public:
+  /// Stands at `position` (metres), turned by `yaw` (radians).
   explicit StandingTrajectory(const Vec3d& position = {}, double yaw = 0.0);
   TrajectorySample at(double) const override { return sample_; }
 
@@ -43,6 +44,7 @@ class StandingTrajectory final : public Trajectory {
   TrajectorySample sample_;
 };
 
+/// How an actor walks along a path.
 struct WalkOptions {
   double speed = 1.2;            ///< Metres per second along the path, > 0.
   double acceleration = 2.0;     ///< Metres per second squared at stops, > 0.

@@ -8,6 +8,7 @@
 
 namespace gsnav {
 
+/// Settings of the estimate of weight gradients.
 struct WeightGradientOptions {
   std::size_t neighbours = 16;  ///< Number of Gaussians to whose weights a gradient is fitted, >= 4.
 };

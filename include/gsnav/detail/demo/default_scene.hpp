@@ -26,8 +26,8 @@ struct DefaultScene {
 
 /// A viewpoint in the flat that shows a room.
 struct DefaultView {
-  const char* name;
-  Vec3d eye, target;
+  const char* name;   ///< Name of the view.
+  Vec3d eye, target;  ///< Where the camera is and where it looks, metres.
 };
 
 /// Viewpoints at eye level, one for each room, the living room first.

@@ -13,10 +13,11 @@ namespace gsnav {
 
 /// An axis-aligned rectangle on the floor, metres.
 struct FloorRect {
-  double x0 = 0, z0 = 0, x1 = 0, z1 = 0;
+  double x0 = 0, z0 = 0, x1 = 0, z1 = 0;  ///< Edges of the rectangle, metres.
 
   double width() const noexcept { return x1 - x0; }  ///< Along x.
   double depth() const noexcept { return z1 - z0; }  ///< Along z.
+  /// Area in square metres.
   double area() const noexcept { return width() * depth(); }
 };
 
@@ -25,13 +26,14 @@ inline constexpr int kMostRooms = 12;
 
 /// Settings of make_floor_plan.
 struct FloorPlanOptions {
-  std::uint64_t seed = 1;
-  int rooms = 4;  ///< In [1, kMostRooms].
+  std::uint64_t seed = 1;  ///< Seed; equal seeds give equal results.
+  int rooms = 4;           ///< In [1, kMostRooms].
   /// Metres, in [0.1, 0.35]. A disc of this radius passes through every door and reaches the floor of
   /// every room between the furniture, except corners that are too narrow for it.
   double clearance = 0.3;
 };
 
+/// What a room is used for.
 enum class RoomKind { living_room, kitchen, bedroom, study, dining_room, hall };
 
 /// Name of a kind of room, for people.
@@ -42,8 +44,8 @@ enum class WallSide { x_low, x_high, z_low, z_high };
 
 /// A room: the floor between its walls.
 struct PlannedRoom {
-  RoomKind kind = RoomKind::hall;
-  FloorRect inside;
+  RoomKind kind = RoomKind::hall;  ///< What the room is used for.
+  FloorRect inside;                ///< The floor between its walls.
 };
 
 /// A doorway in the wall between two rooms. The floor continues through it.
@@ -60,12 +62,13 @@ struct PlannedDoor {
 
 /// A window in an outer wall.
 struct PlannedWindow {
-  std::size_t room = 0;
-  WallSide side{};
+  std::size_t room = 0;                          ///< Index of the room.
+  WallSide side{};                               ///< The wall of that room.
   double from = 0, to = 0, bottom = 0, top = 0;  ///< Ends along the wall, and heights; metres.
   bool curtains = false;                         ///< One on each side.
 };
 
+/// Kinds of furniture.
 enum class FurnitureKind {
   sofa,
   coffee_table,
@@ -87,8 +90,8 @@ enum class FurnitureKind {
 /// A piece of furniture. In its own frame the back is at z = 0, the front faces +z, and x = 0 is the
 /// middle. Tables, chairs, plants, lamps and rugs have their centre at the origin.
 struct PlannedFurniture {
-  FurnitureKind kind{};
-  std::size_t room = 0;
+  FurnitureKind kind{};          ///< What it is.
+  std::size_t room = 0;          ///< Index of the room.
   double x = 0, z = 0;           ///< Origin of its frame, metres.
   double yaw = 0;                ///< Rotation of its frame about +Y, radians.
   double width = 0, length = 0;  ///< Size along its x and z, metres, for kinds that come in several
@@ -100,12 +103,12 @@ struct PlannedFurniture {
 /// A furnished flat as a drawing, without surfaces. World frame: metres, Y up, floor at y = 0, ceiling
 /// at 2.7, outer walls at `outline`, which begins at x = z = 0.
 struct FloorPlan {
-  std::uint64_t seed = 0;
-  FloorRect outline;
-  std::vector<PlannedRoom> rooms;  ///< The largest, the living room, comes first.
-  std::vector<PlannedDoor> doors;
-  std::vector<PlannedWindow> windows;
-  std::vector<PlannedFurniture> furniture;
+  std::uint64_t seed = 0;                   ///< Seed; equal seeds give equal results.
+  FloorRect outline;                        ///< Outer edge of the flat, walls included.
+  std::vector<PlannedRoom> rooms;           ///< The largest, the living room, comes first.
+  std::vector<PlannedDoor> doors;           ///< Doors between rooms.
+  std::vector<PlannedWindow> windows;       ///< Windows in outer walls.
+  std::vector<PlannedFurniture> furniture;  ///< Furniture of all rooms.
 };
 
 /// Makes a floor plan. A rectangle is cut into rooms; doors join all of them, some by more than one way;

@@ -39,6 +39,7 @@ class WalkMotion final : public MotionSource {
   std::size_t joint_count() const noexcept override { return parents_.size(); }
   /// Metres from one footfall to the next of the same foot.
   double stride() const noexcept { return stride_; }
+  /// The settings.
   const GaitOptions& options() const noexcept { return options_; }
 
   void pose(const MotionInput& input, LocalPose& out) const override { pose_of(input, {}, out); }

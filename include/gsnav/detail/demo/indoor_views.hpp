@@ -16,7 +16,7 @@ struct IndoorViewOptions {
   int width = 640, height = 480;  ///< Pixels, in [1, 16384].
   double hfov = 75;               ///< Horizontal field of view, degrees, in [10, 150].
   double eye_height = 1.5;        ///< Metres above the floor, in [0.3, 2.2].
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;         ///< Seed; equal seeds give equal results.
 };
 
 /// Random cameras inside the rooms of a generated scene, spread over the rooms. A camera is at least 0.4

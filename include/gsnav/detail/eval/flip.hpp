@@ -16,7 +16,7 @@ inline constexpr double kFlipPixelsPerDegree = 67.0;
 
 /// What an observer who flips between two images sees: 0 nothing, 1 the largest difference.
 struct Flip {
-  double mean = 0.0;
+  double mean = 0.0;       ///< Mean over all pixels.
   double p99 = 0.0;        ///< 99 % of the pixels differ no more (nearest rank)
   std::vector<float> map;  ///< [height][width], in [0, 1]
 };

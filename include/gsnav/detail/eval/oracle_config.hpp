@@ -31,11 +31,15 @@ enum class OracleOrder : std::uint8_t {
 
 /// Half-open rectangle of pixels [x0, x1) x [y0, y1).
 struct PixelRect {
-  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;  ///< Corners in pixels.
 
+  /// Whether it has no pixels.
   bool empty() const noexcept { return x0 >= x1 || y0 >= y1; }
+  /// Width in pixels.
   std::size_t width() const noexcept { return empty() ? 0 : static_cast<std::size_t>(x1 - x0); }
+  /// Height in pixels.
   std::size_t height() const noexcept { return empty() ? 0 : static_cast<std::size_t>(y1 - y0); }
+  /// The pixels that are in both.
   PixelRect intersection(const PixelRect& o) const noexcept {
     return {max(x0, o.x0), max(y0, o.y0), min(x1, o.x1), min(y1, o.y1)};
   }
@@ -61,8 +65,8 @@ struct OracleConfig {
   /// made, in float64, without tiles. `response` and `compat` must be the contract's, and where there is
   /// a mesh `composite` and `blend_space` too.
   RenderConfig rules{};
-  OracleKind kind = OracleKind::contract;
-  OracleOrder order = OracleOrder::own;
+  OracleKind kind = OracleKind::contract;  ///< Definition of the image.
+  OracleOrder order = OracleOrder::own;    ///< Order of the Gaussians.
   /// true: each Gaussian is asked only at the pixels of the box where its alpha may pass; for `contract`
   /// and `ray` the image is that of false, bit for bit. false: every Gaussian at every pixel.
   /// `untruncated` with boxes leaves alpha < kNegligibleAlpha out.
@@ -77,11 +81,12 @@ struct OracleConfig {
 /// each alpha with a slope of at most c, the largest colour component (background included), so n
 /// Gaussians left out move it by less than n c 2^-40 and its alpha by n 2^-40: 9.1e-7 c for a million.
 inline constexpr double kLog2NegligibleAlpha = -40;
-inline constexpr double kNegligibleAlpha = 0x1p-40;
+inline constexpr double kNegligibleAlpha = 0x1p-40;  ///< 2 to the power of kLog2NegligibleAlpha.
 
 /// Where float32 may rightly take the other side of a comparison: relative distance of a float64 alpha
 /// from alpha_min and of T from the stop; absolute distance of T from a depth's crossing.
 inline constexpr double kUndecidedRelative = 1e-5;
+/// Absolute distance of a transmittance from a depth's crossing.
 inline constexpr double kUndecidedCrossing = 1e-3;
 /// And of a Gaussian's depth along the ray from the mesh's, metres.
 inline constexpr double kUndecidedMesh = 1e-4;
@@ -94,6 +99,7 @@ struct OracleCounts {
   std::uint64_t evaluations = 0;  ///< pairs blended: what a renderer cannot do without
   std::uint64_t order_flips = 0;  ///< pixels marked in order_flip
 
+  /// Adds the counts of another image.
   OracleCounts& operator+=(const OracleCounts& o) noexcept {
     gaussians += o.gaussians;
     visible += o.visible;
@@ -106,7 +112,7 @@ struct OracleCounts {
 
 /// Images of one camera (or its crop) in float64, row-major from the top-left pixel. Masks: 0 or 1.
 struct OracleFrames {
-  std::size_t width = 0, height = 0;
+  std::size_t width = 0, height = 0;      ///< Size in pixels.
   std::vector<double> rgb;                ///< [H][W][3], over the background, unclamped
   std::vector<double> alpha;              ///< [H][W], 1 - transmittance
   std::vector<double> median_depth;       ///< [H][W] metres, where T crosses 1/2; 0: no return
@@ -122,8 +128,9 @@ struct OracleFrames {
   /// key) or by the float32 key (where it is by anything else). Exact: a list is out of order if and
   /// only if two neighbours in it are.
   std::vector<std::uint8_t> order_flip;
-  OracleCounts counts;
+  OracleCounts counts;  ///< What the image was made of.
 
+  /// Sets the size and clears all images.
   void resize(std::size_t w, std::size_t h) {
     width = w;
     height = h;

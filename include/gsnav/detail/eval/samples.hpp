@@ -14,12 +14,15 @@ namespace gsnav::eval {
 class Samples {
  public:
   Samples() = default;
+  /// Views floats or doubles, which must outlive this.
   Samples(std::span<const float> v) noexcept : floats_(v.data()), size_(v.size()) {}
   Samples(std::span<const double> v) noexcept : doubles_(v.data()), size_(v.size()) {}
   Samples(const std::vector<float>& v) noexcept : Samples(std::span<const float>(v)) {}
   Samples(const std::vector<double>& v) noexcept : Samples(std::span<const double>(v)) {}
 
+  /// Number of samples.
   std::size_t size() const noexcept { return size_; }
+  /// Sample i as a double.
   double operator[](std::size_t i) const noexcept {
     return doubles_ != nullptr ? doubles_[i] : static_cast<double>(floats_[i]);
   }

@@ -10,8 +10,8 @@ namespace gsnav::eval {
 
 /// Structural similarity of two images: 1 where they are equal.
 struct Ssim {
-  double mean = 1.0;  ///< mean of the channels
-  std::array<double, 3> channel{1.0, 1.0, 1.0};
+  double mean = 1.0;                             ///< mean of the channels
+  std::array<double, 3> channel{1.0, 1.0, 1.0};  ///< SSIM of each colour channel.
 };
 
 /// SSIM of Wang, Bovik, Sheikh and Simoncelli (2004): a Gaussian window of 11 x 11 and sigma 1.5,

@@ -20,21 +20,22 @@ enum class AvatarColors : std::uint8_t {
   rgb,           ///< Display colours.
 };
 
+/// How an avatar is read.
 struct LoadAvatarOptions {
-  AvatarColors colors = AvatarColors::guess;
+  AvatarColors colors = AvatarColors::guess;  ///< What the colours in the file are.
   /// Names and parents of the joints. Empty: `joint_names` and `joint_parents` of the file, or else SMPL
   /// for 24 joints and SMPL-X for 55.
   std::vector<std::string> joint_names;
-  std::vector<std::int32_t> joint_parents;
+  std::vector<std::int32_t> joint_parents;  ///< Parent of each joint, or -1 for the root.
   WeightOptions weights;  ///< How many weights are kept, and the poses in which the error of dropping
                           ///< the others is measured.
 };
 
 /// A body that load_avatar read.
 struct LoadedAvatar {
-  AvatarAsset asset;
-  LoadReport report;
-  WeightReport weights;
+  AvatarAsset asset;     ///< The avatar.
+  LoadReport report;     ///< What the reader found, changed and left out.
+  WeightReport weights;  ///< What happened to the skinning weights.
 };
 
 /// Reads a canonical Gaussian avatar: `canonical_gs.npz` with Habitat-GS's keys. Arrays may have any

@@ -14,7 +14,7 @@ namespace gsnav::io {
 
 /// One avatar of a scene file. Paths are resolved: they can be opened as they are.
 struct SceneAvatar {
-  std::string name;
+  std::string name;                 ///< Name of the avatar.
   std::filesystem::path canonical;  ///< The file of `canonical_gaussians`.
   std::filesystem::path driver;     ///< A `.npz`. For a `.pkl` in the scene file, the `.npz` next to it.
   std::filesystem::path trajectory;  ///< [T,7] position and quaternion (x, y, z, w), applied before all
@@ -30,9 +30,9 @@ struct SceneAvatar {
 
 /// The avatars of a scene, and its clock.
 struct AvatarScene {
-  std::vector<SceneAvatar> avatars;
+  std::vector<SceneAvatar> avatars;  ///< Avatars in the order of the file.
   double time_max = 0.0;  ///< Length of the clock's period, seconds. 0: until the last avatar has left.
-  bool time_loop = true;
+  bool time_loop = true;  ///< The clock starts again after `time_max`.
   /// Least duration of the blend that a looping clock adds after `time_max`, seconds. During the blend,
   /// avatars that are present at both ends of the period move from where they stop to where they start.
   /// It lasts longer if an avatar would move faster than 1.4 m/s. 0: avatars jump, as in Habitat-GS.

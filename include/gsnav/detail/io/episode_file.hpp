@@ -14,8 +14,8 @@ namespace gsnav::io {
 
 /// The episodes that load_episodes read.
 struct EpisodeFile {
-  std::vector<PointNavEpisode> episodes;
-  std::vector<std::string> warnings;  ///< Keys and goals that were left out, each named once.
+  std::vector<PointNavEpisode> episodes;  ///< Episodes in the order of the file.
+  std::vector<std::string> warnings;      ///< Keys and goals that were left out, each named once.
 };
 
 /// Reads PointNav and ImageNav episodes of Habitat-Lab, `.json` or `.json.gz`. For a file without

@@ -15,12 +15,12 @@ namespace gsnav::io {
 /// A stage (`*.stage_config.json`): the assets of a scene. Paths are resolved: they can be opened as
 /// they are.
 struct StageConfig {
-  std::filesystem::path file;
-  std::filesystem::path render_asset;     ///< Gaussians or a mesh.
-  std::filesystem::path collision_asset;  ///< A mesh, or empty.
-  Vec3d up{0, 1, 0}, front{0, 0, -1}, origin{};
-  double units_to_meters = 1.0;
-  double scale = 1.0;
+  std::filesystem::path file;                    ///< The file to read.
+  std::filesystem::path render_asset;            ///< Gaussians or a mesh.
+  std::filesystem::path collision_asset;         ///< A mesh, or empty.
+  Vec3d up{0, 1, 0}, front{0, 0, -1}, origin{};  ///< Axes and origin of the stage's own frame.
+  double units_to_meters = 1.0;                  ///< Metres per unit of the file.
+  double scale = 1.0;                            ///< Factor on all lengths.
   bool norm_quaternion = true;  ///< Read for Habitat-GS, without effect: gsnav always normalises
                                 ///< quaternions.
 
@@ -31,16 +31,16 @@ struct StageConfig {
 
 /// A scene (`*.scene_instance.json`): a stage, a NavMesh and avatars.
 struct HabitatScene {
-  std::string name;  ///< Name of the file without `.scene_instance.json`.
-  std::filesystem::path file;
-  StageConfig stage;
+  std::string name;               ///< Name of the file without `.scene_instance.json`.
+  std::filesystem::path file;     ///< The file to read.
+  StageConfig stage;              ///< The stage of the scene.
   std::filesystem::path navmesh;  ///< Path of the NavMesh, or empty.
-  AvatarScene avatars;
+  AvatarScene avatars;            ///< The people of the scene.
 };
 
 /// A dataset (`*.scene_dataset_config.json`) with all its scenes, sorted by name.
 struct HabitatDataset {
-  std::vector<HabitatScene> scenes;
+  std::vector<HabitatScene> scenes;  ///< Scenes in the order of the dataset.
   std::vector<std::string>
       warnings;  ///< Keys that were left out, each once, with the first file that has it.
 

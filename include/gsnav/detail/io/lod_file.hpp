@@ -29,7 +29,7 @@ std::filesystem::path lod_path(const std::string& spec, const GaussianCloud& clo
 
 /// A tree, and how cached_lod got it.
 struct CachedLod {
-  LodTree tree;
+  LodTree tree;        ///< The levels of detail.
   bool built = false;  ///< Whether it was built now, rather than read.
   std::string
       warning;  ///< Why an existing file was not used, or why the tree could not be written; or empty.

@@ -15,11 +15,12 @@ namespace gsnav::io {
 
 /// A motion and its skeleton.
 struct LoadedMotion {
-  Skeleton skeleton;
-  MotionClip clip;
-  std::vector<std::string> warnings;
+  Skeleton skeleton;                  ///< Joints and their rest pose.
+  MotionClip clip;                    ///< The motion.
+  std::vector<std::string> warnings;  ///< Messages for people, one per problem.
 };
 
+/// How a BVH file is read.
 struct BvhOptions {
   double scale = 1.0;  ///< Metres for each unit of the file (0.01 for centimetres), > 0.
   bool z_up = false;   ///< Whether Z is up in the file. It is then turned by -90 degrees about X.
@@ -36,6 +37,7 @@ struct BvhOptions {
 /// joints with one name); invalid_argument (the options); out_of_memory. Never throws.
 Result<LoadedMotion> load_bvh(const std::filesystem::path& path, const BvhOptions& options = {});
 
+/// How an ASF/AMC pair is read.
 struct AmcOptions {
   double frame_rate = 120.0;  ///< Frames per second, > 0. The files do not say; CMU records at 120 or
                               ///< 60.
@@ -96,6 +98,7 @@ struct DriverFrames {
 /// invalid_argument naming the field; file_not_found; unsupported (4 GiB or more); out_of_memory.
 Status save_driver(const std::filesystem::path& path, const DriverFrames& frames);
 
+/// How a file of SMPL poses is read.
 struct SmplMotionOptions {
   bool z_up = true;  ///< Whether Z is up in the motion, as in AMASS. It is then turned by -90 degrees
                      ///< about X.

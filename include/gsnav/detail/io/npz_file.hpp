@@ -26,7 +26,7 @@ class NpzFile {
   const std::string& source() const noexcept;
   /// Names of the arrays without `.npy`, sorted.
   std::vector<std::string> names() const;
-  bool contains(const std::string& name) const;
+  bool contains(const std::string& name) const;  ///< Whether there is an array of this name.
 
   /// Reads one array, as load_npy does. An entry may expand to at most 256 MiB plus a hundred times its
   /// compressed size. Errors name the file and the array: invalid_file (also if there is no such array),
@@ -44,8 +44,8 @@ class NpzFile {
 
 /// One array for save_npz. It views the caller's values; their number must be the product of `shape`.
 struct NpzEntry {
-  std::string name;  ///< Name without `.npy`.
-  std::vector<std::size_t> shape;
+  std::string name;                ///< Name without `.npy`.
+  std::vector<std::size_t> shape;  ///< Lengths of the axes, outermost first.
   /// Values in C order, written as `<f4`, `<f8` or `<i8`; a text as `|S` with one element, whatever
   /// `shape` is.
   std::variant<std::span<const float>, std::span<const double>, std::span<const std::int64_t>,

@@ -17,17 +17,18 @@ namespace gsnav::io {
 /// A clip on the mesh's skeleton, with its name.
 struct NamedClip {
   std::string name;  ///< Name in the file, or "clip0", "clip1", ...
-  MotionClip clip;
+  MotionClip clip;   ///< The motion.
 };
 
 /// A rigged surface and its animations.
 struct LoadedSkinnedMesh {
-  SkinnedMesh mesh;
-  LocalPose pose;  ///< The pose that the file shows without animation.
-  std::vector<NamedClip> clips;
-  SkinnedMeshReport report;
+  SkinnedMesh mesh;              ///< The rigged surface.
+  LocalPose pose;                ///< The pose that the file shows without animation.
+  std::vector<NamedClip> clips;  ///< Animations of the file.
+  SkinnedMeshReport report;      ///< What the reader found and changed.
 };
 
+/// How a rigged glTF file is read.
 struct GltfOptions {
   /// Names or indices of the skins whose meshes are read; they must share a rig. Empty: all skins.
   std::vector<std::string> skins{};
@@ -72,8 +73,8 @@ Result<LoadedSkinnedMesh> load_gltf_skin(const std::filesystem::path& path,
 
 /// Clips for a skeleton, read from a separate file.
 struct LoadedClips {
-  std::vector<NamedClip> clips;
-  std::vector<std::string> warnings;
+  std::vector<NamedClip> clips;       ///< Animations of the file.
+  std::vector<std::string> warnings;  ///< Messages for people, one per problem.
 };
 
 /// Reads the animations of a glTF 2.0 file, with or without a skin, for `skeleton`. A joint corresponds
@@ -86,6 +87,7 @@ struct LoadedClips {
 Result<LoadedClips> load_gltf_clips(const std::filesystem::path& path, const Skeleton& skeleton,
                                     const GltfOptions& options = {});
 
+/// How MakeHuman's files are read.
 struct MakeHumanOptions {
   std::filesystem::path skeleton;  ///< A `.mhskel` file.
   std::filesystem::path weights;   ///< A `.mhw` file; empty: the one that the skeleton names.

@@ -14,8 +14,8 @@ namespace gsnav::io {
 
 /// A moving scene and the report of how it was read.
 struct LoadedTemporalCloud {
-  TemporalCloud scene;
-  LoadReport report;
+  TemporalCloud scene;  ///< Gaussians that move.
+  LoadReport report;    ///< What the reader found, changed and left out.
 };
 
 /// Reads 4D Gaussians in the layouts that Habitat-GS reads. Rows are in file order; sort_spatially sorts

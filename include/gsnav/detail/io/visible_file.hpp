@@ -30,7 +30,7 @@ std::filesystem::path visible_sets_path(const std::string& spec, const GaussianC
 
 /// Visible sets, and how cached_visible_sets got them.
 struct CachedVisibleSets {
-  VisibleSets sets;
+  VisibleSets sets;    ///< The visible sets.
   bool built = false;  ///< Whether they were built now, rather than read.
   std::string
       warning;  ///< Why an existing file was not used, or why the sets could not be written; or empty.

@@ -49,12 +49,14 @@ struct GaussianNavReport {
   std::vector<Storey> storeys;  ///< upwards, the main floor's among them
   std::size_t stairs = 0;       ///< stairs and ramps between storeys
   double ceiling_share = 0.0;   ///< share of the main floor that has something solid above head height
+  /// Solid voxels near the main floor.
   std::size_t solid_above = 0,
               solid_below = 0;          ///< voxels over and under the main floor and 1 m beside it
   Aabb<double> bounds{};                ///< box that was voxelised, world
   std::size_t columns = 0, voxels = 0;  ///< of the grid
+  /// Voxels that are solid, and voxels dropped as floating.
   std::size_t solid_voxels = 0, floater_voxels = 0;
-  std::size_t gaussians_used = 0;
+  std::size_t gaussians_used = 0;     ///< Gaussians that made voxels solid.
   std::size_t gaussians_faint = 0;    ///< below min_opacity, or not finite
   std::size_t gaussians_outside = 0;  ///< outliers outside the box
   std::size_t holes_filled = 0;       ///< floor cells closed over
@@ -64,9 +66,10 @@ struct GaussianNavReport {
   std::vector<double> island_areas;   ///< by falling area
 };
 
+/// A NavMesh and how it was made.
 struct NavMeshFromGaussians {
-  NavMesh mesh;
-  GaussianNavReport report;
+  NavMesh mesh;              ///< The walkable surface.
+  GaussianNavReport report;  ///< What was found on the way.
 };
 
 /// NavMeshSettings with voxels fine enough in height (0.05 m) for a floor made of Gaussians.

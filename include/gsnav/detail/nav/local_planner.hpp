@@ -9,6 +9,7 @@
 
 namespace gsnav {
 
+/// How the local planner steers.
 struct LocalPlannerOptions {
   double max_speed = 1.0;     ///< metres a second
   double horizon = 4.0;       ///< seconds ahead for which bodies are kept clear of

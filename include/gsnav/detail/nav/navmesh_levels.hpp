@@ -16,6 +16,7 @@ struct NavLevel {
   double area = 0.0;    ///< square metres that `height` is the mean of
 };
 
+/// What counts as a storey.
 struct LevelOptions {
   double band = 0.15;    ///< half the range of heights that make a level, metres
   double min_gap = 1.5;  ///< levels are at least this far apart: a dais or a stair's landing is no level

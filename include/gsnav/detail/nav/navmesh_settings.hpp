@@ -25,8 +25,10 @@ struct NavMeshSettings {
   int verts_per_poly = 6;                ///< 3 to 6
   double detail_sample_dist = 6.0;       ///< spacing of height samples, in cells; below 0.9: none
   double detail_sample_max_error = 1.0;  ///< height error of the surface, in cell heights
+  /// Steps that are low enough become walkable (Recast's filter).
   bool filter_low_hanging_obstacles = true;
-  bool filter_ledge_spans = true;
+  bool filter_ledge_spans = true;  ///< Edges of drops are not walkable (Recast's filter).
+  /// Floors under low ceilings are not walkable (Recast's filter).
   bool filter_walkable_low_height_spans = true;
   bool include_static_objects =
       false;  ///< objects beside the stage are obstacles too (NavMeshPart::static_object)

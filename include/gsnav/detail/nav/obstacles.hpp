@@ -30,9 +30,13 @@ class CapsuleSet {
   static Result<CapsuleSet> standing(std::span<const Capsule<double>> capsules,
                                      std::uint32_t avatar = 0);
 
+  /// Begin of the interval, seconds.
   double t0() const noexcept { return t0_; }
+  /// End of the interval, seconds.
   double t1() const noexcept { return t1_; }
+  /// Whether there are no capsules.
   bool empty() const noexcept { return capsules_.empty(); }
+  /// Number of capsules.
   std::size_t size() const noexcept { return capsules_.size(); }
   /// All capsules by (avatar, bone).
   std::span<const DynamicCapsule> capsules() const noexcept { return capsules_; }
@@ -45,9 +49,10 @@ class CapsuleSet {
 
   /// Consecutive capsules of one avatar and the box that they sweep during the interval.
   struct Group {
-    std::size_t first = 0, count = 0;
-    Aabb<double> swept{};
+    std::size_t first = 0, count = 0;  ///< Range of the capsules.
+    Aabb<double> swept{};              ///< Box of their motion, metres.
   };
+  /// All groups.
   std::span<const Group> groups() const noexcept { return groups_; }
   /// Calls f(group), once each, for the groups whose swept box meets `box`: by a grid on the ground
   /// plane.
@@ -72,6 +77,7 @@ class CapsuleSet {
     if (!empty()) groups_in(box, [&](const Group&) { any = true; });
     return any;
   }
+  /// The capsules of a group.
   View<const DynamicCapsule> capsules_of(const Group& g) const noexcept {
     return {capsules_.data() + g.first, g.count};
   }

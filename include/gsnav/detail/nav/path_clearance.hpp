@@ -7,6 +7,7 @@
 
 namespace gsnav {
 
+/// How a path keeps away from edges.
 struct ClearanceOptions {
   /// Metres to keep between the path and the mesh's edges where there is room; between edges that are
   /// nearer than twice that it goes through the middle. The mesh itself ends an agent's radius from
@@ -18,7 +19,7 @@ struct ClearanceOptions {
 
 /// A path with room beside it.
 struct ClearPath {
-  NavPath path;
+  NavPath path;  ///< The path.
   double least =
       0.0;  ///< metres to the nearest edge from points between the ends; 2 m above `clearance` at most
 };

@@ -11,7 +11,7 @@ namespace gsnav {
 
 /// An agent standing on the NavMesh: base position (metres, Y up) and solid.
 struct AgentState {
-  Vec3d position{};
+  Vec3d position{};       ///< Base of the agent, metres.
   double radius = 0.1;    ///< metres, >= 0
   double height = 1.5;    ///< metres, >= 0
   PolyId poly = kNoPoly;  ///< polygon under it, where known: saves a search
@@ -36,13 +36,15 @@ enum class StepCompat : std::uint8_t {
   habitat_gs,
 };
 
+/// How an agent steps.
 struct StepOptions {
-  bool slide = true;   ///< along walls and bodies; otherwise stop at the first
-  double skin = 1e-4;  ///< metres left between agent and body at contact
-  int max_slides = 3;  ///< body contacts that a step slides on from
-  StepCompat compat = StepCompat::none;
+  bool slide = true;                     ///< along walls and bodies; otherwise stop at the first
+  double skin = 1e-4;                    ///< metres left between agent and body at contact
+  int max_slides = 3;                    ///< body contacts that a step slides on from
+  StepCompat compat = StepCompat::none;  ///< Whose rules the step follows.
 };
 
+/// What stopped or turned a step.
 enum class BlockedBy : std::uint8_t {
   none,     ///< the step was done as asked
   wall,     ///< an edge of the NavMesh stopped or turned it
@@ -55,27 +57,28 @@ struct StepResult {
   Vec3d position{};       ///< where the agent stands at the end
   PolyId poly = kNoPoly;  ///< for the next AgentState; kNoPoly only where blocked_by is invalid
   double fraction = 0.0;  ///< ground-plane distance walked / asked for, in [0, 1]; 1 for a zero step
-  BlockedBy blocked_by = BlockedBy::none;
-  bool hit_wall = false;
-  Vec3d wall_normal{};  ///< where hit_wall, pointing into the mesh
+  BlockedBy blocked_by = BlockedBy::none;  ///< What stopped or turned the step.
+  bool hit_wall = false;                   ///< An edge of the NavMesh stopped or turned the step.
+  Vec3d wall_normal{};                     ///< where hit_wall, pointing into the mesh
 
   // The first contact that stopped or turned the agent; meaningful where blocked_by is capsule.
-  double toi = 1.0;  ///< when
-  std::uint32_t avatar = 0, bone = 0;
-  Vec3d contact_point{};      ///< on the body's surface
-  Vec3d normal{};             ///< unit, from the body to the agent
+  double toi = 1.0;                    ///< when
+  std::uint32_t avatar = 0, bone = 0;  ///< The body that was met first.
+  Vec3d contact_point{};               ///< on the body's surface
+  Vec3d normal{};                      ///< unit, from the body to the agent
   bool agent_caused = false;  ///< the agent itself moved towards the body (else it was caught up with)
 
-  bool started_overlapping = false;
+  bool started_overlapping = false;  ///< The agent overlapped a body at the begin.
   /// A body moved into the agent where it stood, before a step of zero length, after the stop, or
   /// deeper from contact. The agent stays; avatars are scripted.
   bool pushed_into = false;
-  double pushed_toi = 1.0;
-  std::uint32_t pushed_avatar = 0, pushed_bone = 0;
+  double pushed_toi = 1.0;                           ///< When a body moved into the agent first.
+  std::uint32_t pushed_avatar = 0, pushed_bone = 0;  ///< The body that moved into the agent first.
 
   /// The way taken; `fraction` here is the time in the tick. The agent stands still after the last.
   WalkPoints path;
 
+  /// Whether anything stopped or turned the step.
   bool blocked() const noexcept { return blocked_by != BlockedBy::none; }
 };
 

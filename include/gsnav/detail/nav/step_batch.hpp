@@ -20,6 +20,7 @@ struct StepBatch {
   std::span<const Vec3d> desired;      ///< [N], metres
   std::span<StepResult> results;       ///< [N], written
 
+  /// invalid_argument if the sizes differ.
   Status check() const {
     for (const auto& [size, name] :
          {std::pair{desired.size(), "desired"}, std::pair{results.size(), "results"}}) {

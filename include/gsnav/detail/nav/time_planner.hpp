@@ -13,6 +13,7 @@
 
 namespace gsnav {
 
+/// How the planner in time searches.
 struct TimePlannerOptions {
   double speed = 1.0;  ///< at most, metres a second on the surface, > 0
   double cell = 0.5;   ///< spacing of the lattice around the static path, metres, > 0
@@ -21,6 +22,7 @@ struct TimePlannerOptions {
   std::size_t max_states = 20000;  ///< give up the search after so many
 };
 
+/// How a search ended.
 enum class TimedPlanStatus : std::uint8_t {
   reached,  ///< the last point is the goal
   on_way,   ///< the known motion ends first: the rest is the static path from the last point
@@ -34,16 +36,17 @@ enum class TimedPlanStatus : std::uint8_t {
 /// Where to be, and when. Between consecutive points of equal position the agent waits; else it walks
 /// straight and evenly.
 struct TimedPoint {
-  Vec3d position{};
-  PolyId poly = kNoPoly;
-  double time = 0.0;  ///< seconds, a boundary between ticks
+  Vec3d position{};       ///< Place on the NavMesh, metres.
+  PolyId poly = kNoPoly;  ///< Polygon of the NavMesh below it, or kNoPoly if it is not known.
+  double time = 0.0;      ///< seconds, a boundary between ticks
 };
 
+/// Where to be at which time.
 struct TimedPlan {
-  TimedPlanStatus status = TimedPlanStatus::invalid;
-  std::vector<TimedPoint> points;  ///< the start first, times rising
-  double blocked_until = 0.0;      ///< seconds; meaningful where blocked
-  std::size_t states = 0;          ///< of the search
+  TimedPlanStatus status = TimedPlanStatus::invalid;  ///< How the search ended.
+  std::vector<TimedPoint> points;                     ///< the start first, times rising
+  double blocked_until = 0.0;                         ///< seconds; meaningful where blocked
+  std::size_t states = 0;                             ///< of the search
 
   /// Where the plan is at time t; the first or last point outside its time. Needs points.
   Vec3d at(double t) const noexcept;

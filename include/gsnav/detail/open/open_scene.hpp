@@ -42,7 +42,7 @@ struct OpenOptions {
   /// (guess_up), or else the usual axis of the file's format; "keep": the world is the file's frame.
   std::string up = "auto";
   double time = 0;  ///< Seconds: the moment of a scene that moves (4D Gaussians).
-  CloudStorage storage = CloudStorage::full;
+  CloudStorage storage = CloudStorage::full;  ///< How Gaussians are kept in memory.
   /// Largest change of a colour for which SH bands are dropped. 0 drops only bands of zeros, which
   /// changes no image. kUnseenColor drops bands too weak to be seen, for Quality::fast and levels of
   /// detail.

@@ -9,6 +9,7 @@
 
 namespace gsnav {
 
+/// How capsules are fitted to a body.
 struct CapsuleFitOptions {
   double percentile = 0.99;  ///< Share of a bone's Gaussian centres, over all poses, that its capsule
                              ///< contains, in (0.5, 1].
@@ -21,11 +22,11 @@ struct CapsuleFitOptions {
 
 /// How well capsules cover a body, over poses. Lengths are in metres.
 struct CapsuleReport {
-  std::size_t capsules = 0, poses = 0;
-  double percentile = 0.0;       ///< The percentile that was needed.
-  double contained_least = 1.0;  ///< Share of the centres inside a capsule, in the worst pose.
-  double contained_mean = 1.0;
-  double outside_greatest = 0.0;  ///< Greatest distance of a centre from the nearest capsule.
+  std::size_t capsules = 0, poses = 0;  ///< Counts of capsules and of poses.
+  double percentile = 0.0;              ///< The percentile that was needed.
+  double contained_least = 1.0;         ///< Share of the centres inside a capsule, in the worst pose.
+  double contained_mean = 1.0;          ///< Share of the centres within a capsule, mean over poses.
+  double outside_greatest = 0.0;        ///< Greatest distance of a centre from the nearest capsule.
   double over_mean = 0.0;  ///< Mean distance of the capsules' outer surface from the nearest centre.
   double over_p99 = 0.0;   ///< 99th percentile of that distance.
   double body_volume =

@@ -10,6 +10,7 @@
 
 namespace gsnav {
 
+/// How a recorded walk is made to loop.
 struct ClipWalkOptions {
   /// The part of the clip that is one cycle (two steps): frames [first, first + keys). With keys = 0 it
   /// is the whole clip, if it ends as it begins, or else the part of 0.7 to 1.8 s whose ends match best.
@@ -44,6 +45,7 @@ class ClipWalk final : public MotionSource {
   double speed() const noexcept { return stride() / seconds_; }
   /// First frame of the clip that is used. keys() is the number of frames.
   std::size_t first_key() const noexcept { return first_; }
+  /// Number of key poses in the cycle.
   std::size_t keys() const noexcept { return cycle_.size(); }
 
   void pose(const MotionInput& input, LocalPose& out) const override;

@@ -40,18 +40,20 @@ class NearestTriangle {
 
 }  // namespace detail
 
+/// How a cloud is bound to a skeleton.
 struct CloudBindingOptions {
   Similarity mesh_from_cloud{};  ///< Transform from the frame of the cloud to that of the mesh.
                                  ///< HumanGaussian's clouds are scaled and shifted.
   double furthest = 0.05;        ///< Metres. Gaussians further from the surface are left out.
-  WeightOptions weights;
+  WeightOptions weights;         ///< How many influences are kept.
 };
 
+/// A cloud as an avatar, and how well it is bound.
 struct BoundCloud {
-  AvatarAsset asset;
+  AvatarAsset asset;         ///< The avatar.
   std::size_t left_out = 0;  ///< Gaussians further from the surface than allowed.
   double furthest = 0.0;     ///< Greatest distance from the surface of those kept, metres.
-  WeightReport weights;
+  WeightReport weights;      ///< What happened to the skinning weights.
 };
 
 /// Makes an avatar from Gaussians without weights, such as HumanGaussian's PLY or a scan of a person.

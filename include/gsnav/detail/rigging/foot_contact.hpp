@@ -11,15 +11,15 @@ namespace gsnav {
 
 /// A point of a sole, fixed to a joint.
 struct SolePoint {
-  std::size_t joint = 0;
-  Vec3d local{};  ///< In the joint's frame, metres.
+  std::size_t joint = 0;  ///< Index of the joint.
+  Vec3d local{};          ///< In the joint's frame, metres.
 };
 
 /// The joints of one foot, the ankle first, and the points where it touches the ground: heel, ball and
 /// tip of the toes.
 struct Foot {
-  std::vector<std::size_t> joints;
-  std::vector<SolePoint> sole;
+  std::vector<std::size_t> joints;  ///< Joints of the foot, the ankle first.
+  std::vector<SolePoint> sole;      ///< Points that touch the ground.
 };
 
 /// Finds the feet of a skeleton that stands upright in its rest pose, with its soles at height `floor`
@@ -34,13 +34,13 @@ struct FootSlide {
   std::size_t contacts = 0;  ///< Number of times that a foot was down.
   double mean = 0.0;         ///< Mean distance that a foot slid in one contact.
   double greatest = 0.0;     ///< Greatest distance that a foot slid in one contact.
-  double total = 0.0;
+  double total = 0.0;        ///< Slid in all contacts together.
 };
 
 /// Movement of a foot from one frame to the next.
 struct FootMove {
-  bool down = false;
-  Vec3d way{};  ///< Movement along the floor of the point of the sole that moves least, metres.
+  bool down = false;  ///< The foot is on the ground.
+  Vec3d way{};        ///< Movement along the floor of the point of the sole that moves least, metres.
 };
 
 /// Finds when a foot is down: while a point of its sole is within `clearance` of the lowest height that
@@ -56,6 +56,7 @@ std::vector<FootMove> foot_moves(const Foot& foot,
 /// Measures sliding over frames of joints in the world, by foot_moves.
 class FootSlideMeter {
  public:
+  /// Measures these feet. `clearance` in metres, as for foot_moves.
   FootSlideMeter(std::vector<Foot> feet, double clearance = 0.02)
       : feet_(std::move(feet)), clearance_(clearance) {}
 

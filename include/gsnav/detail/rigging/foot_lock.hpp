@@ -12,11 +12,13 @@ namespace gsnav {
 /// The joints of a leg above a foot. Thigh and shin each rotate as a whole, even where a rig splits them
 /// into several joints.
 struct Leg {
-  std::size_t hip = 0, knee = 0, ankle = 0;
-  std::vector<std::size_t> thigh, shin,
-      foot;  ///< Joints that move with each part, hip, knee and ankle included.
+  std::size_t hip = 0, knee = 0, ankle = 0;  ///< Indices of the joints.
+  std::vector<std::size_t> thigh;            ///< Joints that move with the hip, itself included.
+  std::vector<std::size_t> shin;             ///< Joints that move with the knee, itself included.
+  std::vector<std::size_t> foot;             ///< Joints that move with the ankle, itself included.
 };
 
+/// How feet are held.
 struct FootLockOptions {
   double clearance = 0.02;  ///< Metres, as for FootSlideMeter.
   double shortest = 0.08;   ///< Least duration of a contact, and of the time between two contacts,
@@ -24,6 +26,7 @@ struct FootLockOptions {
   double furthest = 0.10;   ///< Greatest correction of a foot, metres. Sliding beyond it remains.
 };
 
+/// How far feet were moved.
 struct FootLockReport {
   double moved = 0.0;         ///< Greatest distance that a foot was moved, metres.
   double out_of_reach = 0.0;  ///< Greatest distance by which a leg was too short, metres.

@@ -12,7 +12,7 @@ namespace gsnav {
 /// the CMU captures (ASF/AMC), MakeHuman's default rig, MakeHuman's BVH files and Mixamo's rig (without
 /// "mixamorig:"). Upper and lower case are equal.
 struct BodyJointNames {
-  const char* smpl;
+  const char* smpl;                   ///< Name in SMPL.
   std::array<const char*, 6> others;  ///< Null: none.
 };
 

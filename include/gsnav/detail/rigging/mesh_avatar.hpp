@@ -11,9 +11,10 @@
 
 namespace gsnav {
 
+/// How Gaussians are spread over a surface.
 struct MeshAvatarOptions {
   std::size_t gaussians = 100000;  ///< Approximate number of Gaussians, in [100, 4000000].
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;          ///< Seed; equal seeds give equal results.
   double overlap = 0.7;     ///< Standard deviation along the surface, in units of the least spacing, >
                             ///< 0.
   double thickness = 0.12;  ///< Standard deviation across the surface, in units of the spacing, > 0.
@@ -22,11 +23,12 @@ struct MeshAvatarOptions {
   WeightOptions weights{};  ///< Choose its poses from the motions that the avatar will make.
 };
 
+/// An avatar made from a rigged mesh.
 struct MeshAvatar {
-  AvatarAsset asset;
+  AvatarAsset asset;     ///< The avatar.
   double area = 0.0;     ///< Area of the surface in its bind pose, square metres.
   double spacing = 0.0;  ///< Least distance between two Gaussians on one side of the surface, metres.
-  WeightReport weights;
+  WeightReport weights;  ///< What happened to the skinning weights.
 };
 
 namespace detail {

@@ -10,6 +10,7 @@
 
 namespace gsnav {
 
+/// How a motion is moved to another skeleton.
 struct RetargetOptions {
   /// Pairs of joint names, (target, source). Target joints without a pair keep their rest rotation;
   /// further roots without a pair rotate with the first root.

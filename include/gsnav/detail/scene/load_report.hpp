@@ -22,10 +22,10 @@ struct PackErrors {
   double mean_deviations = 0;  ///< Movement of a mean, in its Gaussian's largest standard deviations.
   double scale = 0;            ///< Change of a standard deviation, relative to the Gaussian's largest.
   double rotation = 0;         ///< Rotation, radians.
-  double opacity = 0;
-  double sh0 = 0;             ///< Change of a coefficient of degree 0.
-  double sh = 0, sh_rms = 0;  ///< Change of a coefficient of bands 1 to 3: largest, and root mean
-                              ///< square.
+  double opacity = 0;          ///< Difference of an opacity.
+  double sh0 = 0;              ///< Change of a coefficient of degree 0.
+  double sh = 0, sh_rms = 0;   ///< Change of a coefficient of bands 1 to 3: largest, and root mean
+                               ///< square.
 };
 
 /// The report of a loader on a file. Every repaired or dropped row is counted here.
@@ -46,22 +46,22 @@ struct LoadReport {
   int sh_degree_used = 0;                 ///< Highest band with a non-zero coefficient.
   Filter filter = Filter::classic;        ///< Filter that the file asks for.
   float eps2d = 0.3f;                     ///< Its term on the diagonal of the 2D covariance, px^2.
-  SortOrder sort_order = SortOrder::z_depth;
-  std::uint64_t memory = 0;  ///< Bytes of the cloud's arrays.
-  Vec3d up{};                ///< Guessed up axis in the asset's frame, one of +-y and +-z; zero for an
-                             ///< empty cloud.
+  SortOrder sort_order = SortOrder::z_depth;  ///< Quantity that Gaussians are sorted by.
+  std::uint64_t memory = 0;                   ///< Bytes of the cloud's arrays.
+  Vec3d up{};            ///< Guessed up axis in the asset's frame, one of +-y and +-z; zero for an
+                         ///< empty cloud.
   bool up_seen = false;  ///< Whether the cloud's ground decided `up` (guess_up). false: it is the usual
                          ///< axis of the format.
   double up_confidence = 0;     ///< Confidence if up_seen, 0 to 1.
   double sh_storage_error = 0;  ///< Largest change of an SH coefficient by binary16 storage.
   bool compact = false;         ///< Whether SH is stored as binary16.
   bool packed = false;          ///< Whether the cloud is packed (PackedCloud); `packing` has the errors.
-  PackErrors packing;
+  PackErrors packing;           ///< Errors of packing, where `packed`.
   bool moving = false;  ///< Whether the file has 4D Gaussians. first_time and last_time are then the
                         ///< least and the greatest of their own times, seconds.
-  double first_time = 0, last_time = 0;
-  Aabb<double> bounds{};              ///< Box of the kept means, asset frame.
-  std::vector<std::string> warnings;  ///< Everything else that a person should know.
+  double first_time = 0, last_time = 0;  ///< Range of time of a moving scene, seconds.
+  Aabb<double> bounds{};                 ///< Box of the kept means, asset frame.
+  std::vector<std::string> warnings;     ///< Everything else that a person should know.
 
   /// Counts a row that was read.
   void count(RowFate fate, bool clamped) noexcept {
@@ -95,6 +95,7 @@ struct LoadReport {
     bounds.add(part.bounds);
   }
 
+  /// Rows that were left out.
   std::uint64_t dropped() const noexcept {
     return dropped_non_finite + dropped_zero_quat + dropped_transparent;
   }

@@ -15,8 +15,8 @@ namespace gsnav {
 
 /// A surface ready to be drawn: one mesh for each part, and where the parts stand.
 struct PlacedMeshes {
-  MeshScene meshes;
-  std::vector<TexturedScene::Instance> instances;
+  MeshScene meshes;                                ///< One mesh per part.
+  std::vector<TexturedScene::Instance> instances;  ///< Where the meshes stand.
   std::vector<std::string> warnings;  ///< A line for each thing that is drawn differently than the file
                                       ///< asks for.
 

@@ -24,14 +24,15 @@ struct TexturedPart {
 
 /// A surface: parts, textures, and where the parts stand. A part may stand in many places.
 struct TexturedScene {
+  /// One occurrence of a part.
   struct Instance {
-    std::size_t part = 0;
-    Similarity world_from_part{};
+    std::size_t part = 0;          ///< Index of the part.
+    Similarity world_from_part{};  ///< Takes the part's frame to the world.
   };
-  std::vector<TexturedPart> parts;
-  std::vector<TextureImage> textures;
-  std::vector<Instance> instances;
-  std::vector<std::string> warnings;  ///< A line for each thing that was left out or changed.
+  std::vector<TexturedPart> parts;     ///< The parts, each with one material.
+  std::vector<TextureImage> textures;  ///< Images that materials refer to by index.
+  std::vector<Instance> instances;     ///< Where parts stand.
+  std::vector<std::string> warnings;   ///< A line for each thing that was left out or changed.
 };
 
 }  // namespace gsnav

@@ -11,7 +11,7 @@ namespace gsnav {
 
 /// An indexed triangle mesh: metres, counter-clockwise seen from outside.
 struct TriangleMesh {
-  std::vector<Vec3f> vertices;
+  std::vector<Vec3f> vertices;                          ///< Corners, metres.
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< indices into `vertices`
 };
 

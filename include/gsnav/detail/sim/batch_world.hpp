@@ -26,8 +26,8 @@ enum class AutoReset : std::uint8_t {
 
 /// An episode and the number of the scene that it takes place in.
 struct BatchEpisode {
-  std::size_t scene = 0;
-  PointNavEpisode episode;
+  std::size_t scene = 0;    ///< Number of the scene.
+  PointNavEpisode episode;  ///< The episode.
 };
 
 /// Gives environment `environment` its `count`-th episode, from 0. Called by one thread, in order of
@@ -36,7 +36,7 @@ using EpisodeSource = std::function<Result<BatchEpisode>(std::size_t environment
 
 /// What one step did in all environments, [N] each. Valid until the next call.
 struct BatchInfo {
-  std::span<const double> rewards;
+  std::span<const double> rewards;           ///< Reward of each environment.
   std::span<const std::uint8_t> terminated;  ///< stop ended the episode
   std::span<const std::uint8_t> truncated;   ///< it was cut off
   std::span<const StepInfo>
@@ -54,16 +54,16 @@ struct BatchScene {
   using BodySourceAfter = std::function<void(double t0, double t1, const CapsuleSet* before,
                                              std::vector<DynamicCapsule>& out)>;
 
-  std::shared_ptr<const NavMesh> navmesh;
-  World::BodySource bodies;
+  std::shared_ptr<const NavMesh> navmesh;  ///< The walkable surface.
+  World::BodySource bodies;                ///< Moving bodies of the scene.
   BodySourceAfter
       bodies_after{};  ///< where it is set, used in place of `bodies` during steps, and the same
 };
 
 /// Scenes by number, fetched when an episode begins in them and let go when no environment is in them.
 struct BatchPlaces {
-  std::size_t count = 0;
-  std::function<Result<BatchScene>(std::size_t scene)> get;
+  std::size_t count = 0;                                     ///< Number of scenes.
+  std::function<Result<BatchScene>(std::size_t scene)> get;  ///< Returns scene number `scene`.
   /// Called for scenes that will be needed; where it is set, the source of episodes is asked for each
   /// environment's next episode already when one begins.
   std::function<void(std::size_t scene)> prefetch;
@@ -84,16 +84,22 @@ class BatchWorld {
   static Result<BatchWorld> create(BatchPlaces places, const TaskConfig& config, AutoReset auto_reset,
                                    std::size_t environments, EpisodeSource next_episode);
 
+  /// Number of environments.
   std::size_t size() const noexcept { return environments_.size(); }
+  /// What happens when an episode ends.
   AutoReset auto_reset() const noexcept { return auto_reset_; }
+  /// The world of environment e.
   const World& world(std::size_t e) const noexcept { return *environments_[e].world; }
+  /// Number of the scene that environment e is in.
   std::size_t scene_of(std::size_t e) const noexcept { return environments_[e].scene; }
   /// How many intervals' bodies are held for whoever comes by there later; at most `most` after each
   /// step.
   std::size_t held_bodies() const noexcept { return bodies_.size(); }
+  /// Sets the largest number of intervals that are kept.
   void keep_bodies(std::size_t most) noexcept { most_bodies_ = most; }
   /// Whether the last call stepped or reset environment e.
   bool moved(std::size_t e) const noexcept { return environments_[e].moved; }
+  /// Results of the last call.
   const BatchInfo& info() const noexcept { return info_; }
 
   /// Begins the next episode everywhere or where mask[e] is not 0. Errors name the environment: what the

@@ -16,13 +16,15 @@ namespace gsnav {
 /// longest leaves first.
 class BodyCache {
  public:
+  /// A scene and an interval of time.
   struct Key {
-    std::size_t scene = 0;
+    std::size_t scene = 0;      ///< Number of the scene.
     double t0 = 0.0, t1 = 0.0;  ///< seconds
     bool operator==(const Key&) const = default;
   };
+  /// The bodies of one interval.
   struct Entry {
-    CapsuleSet bodies;
+    CapsuleSet bodies;                 ///< Bodies over the interval.
     bool made = false;                 ///< set by whoever makes the bodies
     std::list<Key>::iterator place{};  ///< the cache's own
   };
@@ -44,6 +46,7 @@ class BodyCache {
     const auto at = entries_.find(key);
     return at != entries_.end() && at->second.made ? &at->second.bodies : nullptr;
   }
+  /// Removes an entry if it exists.
   void erase(const Key& key) {
     const auto at = entries_.find(key);
     if (at == entries_.end()) return;
@@ -54,6 +57,7 @@ class BodyCache {
   void trim(std::size_t most) {
     while (entries_.size() > most) erase(Key(order_.front()));
   }
+  /// Number of entries.
   std::size_t size() const noexcept { return entries_.size(); }
 
  private:

@@ -27,9 +27,9 @@ std::optional<Vec3d> sensor_ray(const SensorSpec& spec, double u, double v) noex
 /// nearest.
 class CubeMap {
  public:
-  static constexpr std::size_t kFaces = 6;
+  static constexpr std::size_t kFaces = 6;  ///< Faces of a cube.
   CubeMap() = default;
-  explicit CubeMap(const SensorSpec& spec);
+  explicit CubeMap(const SensorSpec& spec);  ///< Cube for a sensor that is no pinhole camera.
 
   /// Pixels along a face, the border included.
   int side() const noexcept { return side_; }

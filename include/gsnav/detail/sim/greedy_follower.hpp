@@ -10,6 +10,7 @@
 
 namespace gsnav {
 
+/// When the follower stops.
 struct GreedyFollowerOptions {
   double goal_radius = 0.0;  ///< metres: stop nearer than this; 0: three quarters of a forward step
   std::size_t thrashing =

@@ -8,6 +8,7 @@
 
 namespace gsnav {
 
+/// Models of sensor noise.
 enum class NoiseKind : std::uint8_t {
   none,
   gaussian,       ///< colour
@@ -17,15 +18,15 @@ enum class NoiseKind : std::uint8_t {
 /// How a sensor errs. What it does depends on the seed of the observation alone, never on what was drawn
 /// before.
 struct NoiseModel {
-  NoiseKind kind = NoiseKind::none;
+  NoiseKind kind = NoiseKind::none;  ///< The model.
   // gaussian: c + intensity (mean + sigma n) in each channel, n standard normal, clamped to [0, 1].
   // Habitat's fields.
-  double intensity = 0.2;
-  double mean = 0.0;
-  double sigma = 1.0;
+  double intensity = 0.2;  ///< Factor on the noise (gaussian).
+  double mean = 0.0;       ///< Mean of the noise (gaussian).
+  double sigma = 1.0;      ///< Standard deviation of the noise (gaussian).
   // redwood_depth: factor of both of its standard deviations; 0 leaves the sampling and the
   // quantisation.
-  double multiplier = 1.0;
+  double multiplier = 1.0;  ///< Factor on both standard deviations (redwood_depth).
 };
 
 /// invalid_argument, naming the field, where a value is impossible. `sensor` begins the message.

@@ -13,8 +13,10 @@ namespace gsnav {
 /// same seed gives the same actions.
 class RandomPolicy {
  public:
+  /// Starts the sequence of a seed.
   explicit RandomPolicy(std::uint64_t seed = 0) noexcept : rng_(seed) {}
 
+  /// The next action: a random move, or stop near the goal.
   Action next(const World& world) noexcept {
     if (world.point_goal().distance < world.config().success_distance) return Action::stop;
     return static_cast<Action>(1 + rng_.below(3));

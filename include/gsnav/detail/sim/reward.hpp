@@ -24,10 +24,10 @@ struct RewardConfig {
 /// What an action did, as far as the reward goes.
 struct RewardInput {
   double before = 0.0, after = 0.0;  ///< distance to the goal along the surface, metres
-  bool success = false;
+  bool success = false;              ///< The episode ended in success.
   double avatar_clearance =
       0.0;  ///< least distance to any avatar during the action, metres; infinity with none
-  bool human_collision = false, wall_collision = false;
+  bool human_collision = false, wall_collision = false;  ///< The action touched a person or a wall.
 };
 
 /// Formula above. A goal that is cut off gives no progress.

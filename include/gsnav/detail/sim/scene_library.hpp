@@ -39,6 +39,7 @@ class SceneLibrary {
   SceneLibrary(const SceneLibrary&) = delete;
   SceneLibrary& operator=(const SceneLibrary&) = delete;
 
+  /// Number of scenes.
   std::size_t size() const noexcept { return slots_.size(); }
   /// Begins to load scene `index`, unless it is there.
   void prefetch(std::size_t index);
@@ -48,8 +49,8 @@ class SceneLibrary {
 
   /// What is held now, and how many scenes were loaded so far.
   std::size_t bytes() const;
-  std::size_t loads() const;
-  bool holds(std::size_t index) const;
+  std::size_t loads() const;            ///< How many scenes have been loaded so far.
+  bool holds(std::size_t index) const;  ///< Whether scene `index` is in memory.
 
  private:
   enum class State : std::uint8_t { absent, wanted, there, failed };

@@ -14,6 +14,7 @@
 
 namespace gsnav {
 
+/// What a sensor measures.
 enum class SensorKind : std::uint8_t {
   rgb,    ///< [H][W][3] float32, display-referred, 0 to 1 and above
   depth,  ///< [H][W] float32, metres (median), 0: no return; planar z, along the ray where not pinhole
@@ -36,7 +37,7 @@ enum class SensorModel : std::uint8_t {
 
 /// The double sphere model. The defaults are Habitat's.
 struct FisheyeLens {
-  double alpha = 0.59, xi = -0.18;
+  double alpha = 0.59, xi = -0.18;  ///< Parameters of the double sphere model.
   /// Pixels; 0: such that the middle row spans the sensor's hfov, which the lens must see.
   std::array<double, 2> focal_length{0.0, 0.0};
   std::array<double, 2> principal_point_offset{0.0, 0.0};  ///< from the image's centre, pixels
@@ -44,21 +45,21 @@ struct FisheyeLens {
 
 /// A sensor fixed to the agent, with Habitat's conventions and defaults.
 struct SensorSpec {
-  std::string uuid = "rgb";  ///< names the observation; unique
-  SensorKind kind = SensorKind::rgb;
-  SensorModel model = SensorModel::pinhole;
-  std::array<int, 2> resolution{256, 256};  ///< height, width in pixels
-  double hfov = 90.0;                       ///< horizontal field of view, degrees; square pixels
-  Vec3d position{0.0, 1.5, 0.0};            ///< from the agent's base, agent frame, metres
-  Vec3d orientation{};                      ///< Euler angles about X, then Y, then Z, radians
-  double near_plane = 0.01;                 ///< metres
-  double near_sigma = 1.0;                  ///< see Camera::near_sigma
-  double far_plane = 1000.0;                ///< metres; depth beyond it is no return
-  FisheyeLens fisheye{};
+  std::string uuid = "rgb";                  ///< names the observation; unique
+  SensorKind kind = SensorKind::rgb;         ///< What the sensor measures.
+  SensorModel model = SensorModel::pinhole;  ///< How directions become pixels.
+  std::array<int, 2> resolution{256, 256};   ///< height, width in pixels
+  double hfov = 90.0;                        ///< horizontal field of view, degrees; square pixels
+  Vec3d position{0.0, 1.5, 0.0};             ///< from the agent's base, agent frame, metres
+  Vec3d orientation{};                       ///< Euler angles about X, then Y, then Z, radians
+  double near_plane = 0.01;                  ///< metres
+  double near_sigma = 1.0;                   ///< see Camera::near_sigma
+  double far_plane = 1000.0;                 ///< metres; depth beyond it is no return
+  FisheyeLens fisheye{};                     ///< Lens of the fisheye model.
   /// Pixels along the edge of the cube of pinhole images that other models are sampled from; 0: half the
   /// width.
   int cube_size = 0;
-  NoiseModel noise{};
+  NoiseModel noise{};  ///< Noise that is added.
 };
 
 /// An RGB and a depth sensor ("rgb", "depth") at one place: they share one render.

@@ -39,7 +39,7 @@ struct TaskConfig {
   int max_steps = 500;            ///< actions, stop excluded, after which the episode is cut off
   double success_distance = 0.2;  ///< metres: stop nearer than this succeeds
   double skin = 1e-4;             ///< metres that a stopped move keeps from an avatar
-  RewardConfig reward{};
+  RewardConfig reward{};          ///< Terms of the reward.
 
   /// The settings of Habitat's PointNav v2 challenge (2020 to 2021) that do not concern noise of motion.
   static TaskConfig pointnav_v2() noexcept {

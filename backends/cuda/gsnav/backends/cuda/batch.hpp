@@ -12,7 +12,7 @@ namespace gsnav {
 
 /// One camera of a batch and what it sees.
 struct BatchCamera {
-  Camera camera;
+  Camera camera;  ///< The camera.
   /// Indices into the call's sets, each at most once; blended as one list, ties by place in this list.
   /// Empty: all sets, in order. Read during the call only.
   std::span<const std::uint32_t> sets;
@@ -41,7 +41,7 @@ struct BatchStats {
   std::uint64_t scratch_bytes = 0;  ///< held on the device, without scene and images
   int reruns = 0;                   ///< how often the batch was drawn again because scratch had to grow
   bool replayed = false;  ///< by a recorded CUDA graph: calls that differ in their cameras alone are
-  MeshStats meshes;
+  MeshStats meshes;       ///< Counts of the triangles.
 };
 
 /// Draws many cameras in one call on one GPU; docs/notes/cuda.md says how. Images have the bits that
@@ -61,8 +61,8 @@ struct BatchStats {
 /// the others as unsupported.
 class CudaBatchRenderer {
  public:
-  using camera_type = BatchCamera;
-  using images_type = BatchImages;
+  using camera_type = BatchCamera;  ///< What the renderer takes for each camera.
+  using images_type = BatchImages;  ///< What the renderer returns.
 
   /// The backend must outlive it; work goes to its stream.
   explicit CudaBatchRenderer(CudaBackend& backend, const RenderConfig& config = {});

@@ -15,7 +15,7 @@ namespace gsnav {
 namespace cuda {
 /// Page-locked host memory, or null where there is none.
 void* allocate_pinned(std::size_t bytes) noexcept;
-void free_pinned(void* p) noexcept;
+void free_pinned(void* p) noexcept;  ///< Frees page-locked host memory.
 }  // namespace cuda
 
 /// Host memory that a GPU copies to and from by itself: `CudaBackend::copy` of images into it returns at
@@ -35,10 +35,15 @@ class PinnedArray {
                                             std::to_string(sizeof(T)) + " bytes of page-locked memory");
     }
   }
+  /// First element, or null if there is none.
   T* data() noexcept { return data_.get(); }
+  /// First element, or null if there is none.
   const T* data() const noexcept { return data_.get(); }
+  /// Number of elements.
   std::size_t size() const noexcept { return size_; }
+  /// A view of all elements, valid while this lives and keeps its size.
   View<T> view() noexcept { return {data(), size_}; }
+  /// A view of all elements, valid while this lives and keeps its size.
   View<const T> view() const noexcept { return {data(), size_}; }
 
  private:
