@@ -6,7 +6,7 @@
 # usage: tools/install_deps.sh demo|tests|ci
 #   demo   build and run the navigation loop
 #   tests  ... and the tests, benchmarks and packaging checks
-#   ci     ... and clang with its OpenMP, sanitizers, fuzzer and clang-format
+#   ci     ... and clang with its OpenMP, sanitizers, fuzzer and clang-format, and Doxygen
 #
 # These are optional and not installed: libopenmpi-dev (nav_eval_mpi), ffmpeg (gsnav-replay --video),
 # chromium (test of the page of gsnav-viewer), libfcl-dev (comparison in bench_kernels).
@@ -21,7 +21,8 @@ if [[ $job == tests || $job == ci ]]; then
   packages+=(doctest-dev libbenchmark-dev libeigen3-dev libglm-dev libdlpack-dev libembree-dev pkg-config python3)
 fi
 if [[ $job == ci ]]; then
-  packages+=(clang clang-format libomp-dev libclang-rt-dev llvm xz-utils ccache libegl-dev libopengl-dev qemu-user)
+  packages+=(clang clang-format doxygen libomp-dev libclang-rt-dev llvm xz-utils ccache libegl-dev libopengl-dev
+             qemu-user)
 fi
 
 if ! command -v apt-get > /dev/null || ! command -v dpkg-query > /dev/null; then

@@ -20,6 +20,10 @@ from xml.sax.saxutils import quoteattr
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 SITE = ROOT / "docs/site"
 # Group, its title, the module header that has it (or none) and the folders whose other headers belong to it.
+ABOUT_GROUPS = {"core": "Errors, random numbers, arrays in the memory of a backend, and the concept of a backend.",
+                "math": "Vectors, quaternions, matrices, boxes and capsules.",
+                "backends": "Backends by their own names, for the templates that take one.",
+                "interop": "Views and copies of the types of other libraries."}
 GROUPS = (("render", "Scenes and rendering", "render", ("render", "image", "frame", "scene", "device")),
           ("avatar", "Avatars", "avatar", ("avatar", "skin")),
           ("rigging", "Making avatars", "rigging", ("rigging",)),
@@ -33,6 +37,10 @@ GROUPS = (("render", "Scenes and rendering", "render", ("render", "image", "fram
           ("math", "Mathematics", None, ("math",)),
           ("backends", "Serial, OpenMP and CUDA", None, ("backends",)),
           ("interop", "Eigen, GLM and DLPack", None, ("interop",)))
+# Types that settings and results are made of, in headers that are not for users otherwise.
+PARTS = {"render/quality.hpp": ("Exponential", "Quality"), "render/tuning.hpp": ("Tuning",),
+         "frame/output.hpp": ("Output", "FrameImages"), "frame/projection_camera.hpp": ("SortOrder", "Response"),
+         "mesh/mesh.hpp": ("MeshAlpha", "TextureView", "MeshView", "MeshInstance", "MeshLight", "Composite")}
 # Launch sizes of the CUDA kernels. Only changes of the backend read them.
 NOT_FOR_USERS = {"policy.hpp"}
 # Folders of pages, in the order of the menu.
@@ -41,13 +49,13 @@ SECTIONS = (("Guide", "docs/guide"), ("Concepts", "docs/concepts"), ("Reference"
 ABOUT = ("CONTRIBUTING.md", "CHANGELOG.md")
 FENCE = re.compile(r"\s*(```|~~~)")
 REFERENCE = re.compile(r"\[([^\]]*)\]\(@ref [^)]*\)")
-SPAN = re.compile(r"`[^`\n]+\n[^`\n]+`")  # Doxygen takes the second line for a list where it begins with + or -
+SPAN = re.compile(r"`(?:[^`\n]|\n(?!\n))+`")  # on one line, because Doxygen may take a second one for a list
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s]+)\)")
 
 
 def headers():
     """{header: group} of all headers for users."""
-    found = {}
+    found = {ROOT / "include/gsnav/detail" / name: "render" for name in PARTS}
     for group, _, module, _ in GROUPS:
         if module:
             text = (ROOT / f"include/gsnav/{module}.hpp").read_text(encoding="utf-8")
@@ -105,6 +113,8 @@ def page_text(name, known):
         return f"[{text}](@ref {label(linked, anchor)})"
 
     source = (ROOT / name).read_text(encoding="utf-8")
+    title = re.search(r"^# .*\n", source, re.MULTILINE)  # Doxygen takes it for the title where it is first
+    source = title.group() + source[:title.start()] + source[title.end():] if title else source
     parts = re.split(r"(^ *```.*?^ *```|^    [^\n]*)", source, flags=re.DOTALL | re.MULTILINE)
     parts[::2] = (SPAN.sub(lambda m: m.group().replace("\n", " "), LINK.sub(link, part)) for part in parts[::2])
     source = "".join(parts)
@@ -125,9 +135,26 @@ def page_text(name, known):
     return "\n".join(out) + "\n"
 
 
+FLAGS = re.MULTILINE | re.DOTALL
+
+
+def only(text, names):
+    """A header with these types alone; the other lines are empty."""
+    kept = re.compile(rf"(?:^///.*\n|^template .*\n)*^(?:enum class|enum|struct|class) (?:{'|'.join(names)})\b"
+                      r"[^;{]*\{.*?^\};|^#pragma once|^namespace gsnav \{|^\}  // namespace gsnav", FLAGS)
+    out, at = [], 0
+    for m in kept.finditer(text):
+        out.append("\n" * text.count("\n", at, m.start()) + m.group())
+        at = m.end()
+    return "".join(out) + "\n"
+
+
 def header_text(path, name, group):
     """A header whose namespaces are members of its group. Lines behind the first namespace keep their numbers."""
     text = path.read_text(encoding="utf-8")
+    part = PARTS.get(name.removeprefix("gsnav/detail/"))
+    if part:
+        text = only(text, part)
     opens = re.compile(r"^(?:inline )?namespace gsnav(?:::(?!detail)\w+)* \{", re.MULTILINE)
     for _ in opens.findall(text):  # each takes one line more
         text = re.sub(r"\A(.*?)\n\n", r"\1\n", text, count=1, flags=re.DOTALL)
@@ -139,7 +166,7 @@ def header_text(path, name, group):
     return document_the_obvious(plain_comments(text))
 
 
-NO_MARKUP = re.compile(r"<(?=/?[A-Za-z])|\\(?=x)|(?<=\w)@(?=\w)|(?<=[\w>])::(?=create\b)")
+NO_MARKUP = re.compile(r"<(?=/?[A-Za-z])|(?<!\\)\\(?=x)|(?<=\w)@(?=\w)|(?<=[\w>])::(?=create\b)")
 
 
 def plain_comments(text):
@@ -189,7 +216,7 @@ def document_the_obvious(text):
             else:
                 function = FUNCTION.match(line)
                 if function and function.group(1) == documented and "///" not in line:
-                    line = f"/** @overload */ {line}"
+                    line = f"/** As above, with other arguments. */ {line}"
         function = FUNCTION.match(line.split("*/ ", 1)[-1])
         if function and (commented or "/**" in line or "///<" in line):
             documented = function.group(1)
@@ -224,7 +251,7 @@ def module_comment(module):
 def write_groups(out):
     lines = []
     for group, title, module, _ in GROUPS:
-        text = f"`#include \"gsnav/{module}.hpp\"`\n\n{module_comment(module)}" if module else ""
+        text = (f"{module_comment(module)}\n\n`#include \"gsnav/{module}.hpp\"`" if module else ABOUT_GROUPS[group])
         lines.append(f"/** @defgroup {group} {title}\n{text}\n*/")
     for name, text in (("gsnav", "All names of the library."), ("gsnav::io", "Files: readers and writers."),
                        ("gsnav::interop", "Types of other libraries.")):
@@ -262,7 +289,9 @@ def make(out, doxygen):
     write_groups(out)
     write_layout(out)
     inputs = [*write_inputs(out), out / "groups.dox"]
-    values = {"OUT": out, "ROOT": ROOT, "SITE": SITE, "VERSION": version(),
+    images = {p.parent for p in (ROOT / "docs").rglob("*") if p.suffix in {".png", ".svg", ".webp"}}
+    values = {"OUT": out, "IMAGES": " ".join(f'"{p}"' for p in sorted(images)),
+              "ROOT": ROOT, "SITE": SITE, "VERSION": version(),
               "INPUT": " \\\n  ".join(f'"{p}"' for p in inputs)}
     text = (SITE / "Doxyfile.in").read_text(encoding="utf-8")
     (out / "Doxyfile").write_text(re.sub(r"@([A-Z]+)@", lambda m: str(values[m.group(1)]), text), encoding="utf-8")

@@ -85,8 +85,11 @@ class Rules(unittest.TestCase):
 
     def test_columns(self):
         wide = " ".join(["word"] * 20) + " " + "x" * 8
-        for name, form in (("README.md", "{}\n"), ("a.hpp", "// {}\n"), ("a.py", "# {}\n"), ("a.sh", "# {}\n")):
+        for name, form in (("README.md", "{}\n"), ("a.hpp", "// {}\n")):
             self.assertIn("columns", rules(name, form.format(wide)), name)
+        for name in ("a.py", "a.sh", "a.cmake"):
+            self.assertIn("columns", rules(name, f"# {wide} {'x' * 9}\n"), name)
+            self.assertNotIn("columns", rules(name, f"# {wide}\n"), name)
         self.assertNotIn("columns", rules("README.md", wide[:105]))
         self.assertNotIn("columns", rules("README.md", f"| {wide} |\n|---|\n\n```\n{wide}\n```\n\n    {wide}\n"))
         self.assertNotIn("columns", rules("a.py", f"a = f('{wide}')\n"))

@@ -1,0 +1,111 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of tools/make_site.py: links and headings of pages, groups and lines of headers, errors of Doxygen."""
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+import make_site  # noqa: E402
+
+HEADER = """// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+namespace gsnav {
+
+/// A place.
+struct Place {
+  double x = 0, y = 0;  ///< metres
+  /// Whether it is here.
+  bool here() const;
+  bool here(int other) const;
+  bool operator==(const Place&) const = default;
+};
+
+}  // namespace gsnav
+"""
+
+
+class Tree(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name).resolve()
+        self.addCleanup(setattr, make_site, "ROOT", make_site.ROOT)
+        self.addCleanup(setattr, make_site, "SITE", make_site.SITE)
+        make_site.ROOT = self.root
+        shutil.copytree(ROOT / "docs/site", self.root / "docs/site")
+        make_site.SITE = self.root / "docs/site"
+        for group in make_site.GROUPS:
+            if group[2]:
+                self.write(f"include/gsnav/{group[2]}.hpp", "#pragma once\n\n// A module.\n\n")
+        self.write("include/gsnav/version.hpp", (ROOT / "include/gsnav/version.hpp").read_text())
+        for name, types in make_site.PARTS.items():
+            types = "".join(f"/// A type.\nstruct {t} {{\n}};\n" for t in types)
+            text = f"#pragma once\nnamespace gsnav {{\n{types}}}  // namespace gsnav\n"
+            self.write(f"include/gsnav/detail/{name}", text)
+        self.write("include/gsnav/nav/place.hpp", HEADER)
+        self.write("README.md", "![A room](docs/a.svg)\n\n# Name\n\n"
+                                "See [the\npage](docs/a.md#two-words) and [code](src).\n")
+        self.write("docs/a.svg", "<svg xmlns='http://www.w3.org/2000/svg' width='8' height='8'/>")
+        self.write("docs/a.md", "# Page\n\n## Two words\n\n```\n[not](a-link.md)\n```\n")
+
+    def write(self, name, text):
+        (self.root / name).parent.mkdir(parents=True, exist_ok=True)
+        (self.root / name).write_text(text)
+
+    def test_links_lead_to_pages_and_headings(self):
+        text = make_site.page_text("README.md", {"README.md", "docs/a.md"})
+        self.assertTrue(text.startswith("# Name {#page_README}"))
+        self.assertIn("[the\npage](@ref page_docs_a__two-words) and code.", text)
+        text = make_site.page_text("docs/a.md", {"README.md", "docs/a.md"})
+        self.assertIn("## Two words {#page_docs_a__two-words}", text)
+        self.assertIn("[not](a-link.md)", text)
+
+    def test_headers_join_their_group_and_keep_their_lines(self):
+        path = self.root / "include/gsnav/nav/place.hpp"
+        self.assertEqual(make_site.headers()[path], "nav")
+        text = make_site.header_text(path, "gsnav/nav/place.hpp", "nav")
+        self.assertIn("@addtogroup nav\n@{", text)
+        line = [k for k, t in enumerate(HEADER.split("\n")) if "struct Place" in t]
+        self.assertEqual(line, [k for k, t in enumerate(text.split("\n")) if "struct Place" in t])
+        self.assertIn("/** metres */ double y = 0; double x = 0; ///< metres", text)
+        self.assertIn("/** As above, with other arguments. */   bool here(int other) const;", text)
+
+    def test_comments_of_templates_are_no_markup(self):
+        said = make_site.plain_comments("/// Box<b> and `Box<b>`.\n///     Box<b> a;\nBox<b> c;  ///< Box<b>\n")
+        self.assertEqual(said, "/// Box\\<b> and `Box<b>`.\n///     Box<b> a;\nBox<b> c;  ///< Box\\<b>\n")
+
+    def run_doxygen(self):
+        program = ("import sys, pathlib; sys.path.insert(0, sys.argv[1]); import make_site\n"
+                   "root = pathlib.Path(sys.argv[2]); make_site.ROOT = root; make_site.SITE = root / 'docs/site'\n"
+                   "sys.exit(make_site.make(root / 'out', 'doxygen'))")
+        return subprocess.run([sys.executable, "-c", program, str(ROOT / "tools"), str(self.root)],
+                              capture_output=True, text=True, check=False)
+
+    @unittest.skipUnless(shutil.which("doxygen"), "no doxygen here")
+    def test_what_is_not_documented_is_an_error(self):
+        done = self.run_doxygen()
+        self.assertEqual(done.returncode, 0, done.stdout)
+        html = self.root / "out/html"
+        self.assertIn("Whether it is here.", (html / "structgsnav_1_1Place.html").read_text())
+        self.assertIn("page_docs_a.html", (html / "index.html").read_text())
+        self.assertTrue((html / "search").is_dir())
+        for wrong, said in ((HEADER.replace("  /// Whether it is here.\n", ""), "here() const (function) of struct"),
+                            (HEADER.replace("/// A place.\n", ""), "Compound gsnav::Place is not documented"),
+                            (HEADER.replace("  ///< metres", ""), "Member x (variable)")):
+            self.write("include/gsnav/nav/place.hpp", wrong)
+            done = self.run_doxygen()
+            self.assertNotEqual(done.returncode, 0)
+            self.assertIn(said, done.stdout)
+            self.assertIn("include/gsnav/nav/place.hpp:", done.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
