@@ -255,8 +255,8 @@ std::vector<Triangle> triangulated(const PolyMesh& mesh, const PolyMesh::Poly& p
 }  // namespace
 
 void mend_heights(PolyMesh& mesh) {
-  std::vector<std::pair<std::size_t, std::vector<Triangle>>> mended;  // Polygons and their new
-                                                                      // triangles.
+  // Polygons and their new triangles.
+  std::vector<std::pair<std::size_t, std::vector<Triangle>>> mended;
   std::vector<Vec3d> added;
   std::size_t count = mesh.tris.size();
   for (std::size_t id = 0; id < mesh.polys.size(); ++id) {

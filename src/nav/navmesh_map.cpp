@@ -81,8 +81,8 @@ Result<TopDownMap> NavMesh::top_down_map(double height, double metres_per_cell, 
     }
     return map;
   }
-  std::vector<double> off(map.islands.size(), max_height_delta);  // Distance from `height` to the
-                                                                  // surface that a cell shows.
+  // Distance from `height` to the surface that a cell shows.
+  std::vector<double> off(map.islands.size(), max_height_delta);
 
   const detail::PolyMesh& m = impl_->polys;
   const Vec3d low = map.low - impl_->origin;

@@ -48,7 +48,7 @@ class UnfoldedMesh {
     double angle = 0;                             ///< Angle of this edge in the fan of its vertex.
   };
   struct Face {
-    std::uint32_t first = 0, count = 0;  ///< Edges.
+    std::uint32_t first = 0, count = 0;  ///< Range of its edges.
     Vec3d u{1, 0, 0}, v{0, 0, 1};        ///< Axes of the plane, counter-clockwise in (x, z).
     PolyId poly = 0;
   };

@@ -97,8 +97,8 @@ class Lookahead {
         }
       }
       if (way.left < reach_) {
-        out.cost = out.charge - c.forward_step * (horizon_ - 1 - i);  // Reward for actions that are not
-                                                                      // needed.
+        // Reward for actions that are not needed.
+        out.cost = out.charge - c.forward_step * (horizon_ - 1 - i);
         return out;
       }
     }

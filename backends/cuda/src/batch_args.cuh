@@ -211,8 +211,9 @@ struct BatchArgs {
   Pair* pairs_alt;
   BeyondPair* beyond;
   std::uint32_t slot_capacity, hard_capacity, several_capacity, large_capacity, part_capacity;
-  std::uint32_t pair_capacity;                  ///< Used if lists are counted first.
-  std::uint32_t beyond_capacity, alt_capacity;  ///< Used if lists have reserved space.
+  std::uint32_t pair_capacity;  ///< Number of `pairs`, if lists are counted first.
+  /// Numbers of `beyond` and `pairs_alt`, if lists have reserved space.
+  std::uint32_t beyond_capacity, alt_capacity;
   std::uint32_t slab;  ///< Number of slots that a warp takes at a time, small if there are few cameras.
   bool operator==(const BatchArgs&) const = default;
 };

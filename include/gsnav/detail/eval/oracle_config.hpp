@@ -78,7 +78,8 @@ struct OracleConfig {
   const OracleMesh* mesh = nullptr;
 };
 
-/// Alpha below which OracleKind::untruncated with boxes omits a Gaussian.
+/// Base-2 logarithm of the alpha below which OracleKind::untruncated may omit a Gaussian, if
+/// OracleConfig::boxed is set.
 /// A pixel's colour is linear in each alpha, with a slope of at most c, the largest colour component
 /// (background included). Omitting n Gaussians therefore changes the colour by less than n c 2^-40 and
 /// alpha by less than n 2^-40, or 9.1e-7 c for a million.

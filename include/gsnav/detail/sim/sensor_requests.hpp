@@ -196,9 +196,9 @@ class SensorRequests {
   std::vector<ImageRequest> requests_;
   std::vector<Normals> normals_;
   std::vector<Shares> shares_;
-  std::vector<RenderConfig> share_configs_;                           // One per view.
-  std::vector<std::array<HostArray<float, B>, Plan::kKinds>> faces_;  // Indexed
-                                                                      // [group][kind][view][face].
+  std::vector<RenderConfig> share_configs_;  // One per view.
+  // Indexed [group][kind][view][face].
+  std::vector<std::array<HostArray<float, B>, Plan::kKinds>> faces_;
   std::vector<HostArray<float, B>> seen_;  // Indexed [group][view][pixel], if no sensor of the group has
                                            // depth.
   std::size_t render_count_ = 0;
