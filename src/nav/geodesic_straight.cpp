@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kRounding = 1e-9;  // Radians.
+constexpr double kRounding = 1e-9;  // Tolerance for rounding, radians.
 
 }  // namespace
 

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kBeside = 1e-2;  // Largest distance of a height sample from its edge, metres.
 constexpr double kOnLine = 1e-4;  // Metres. Corners that lie on a straight side between its ends.
-constexpr double kSliver = 1e-8;  // m².
+constexpr double kSliver = 1e-8;  // Largest area that counts as 0, m².
 constexpr std::uint32_t kNew = ~0u;
 
 using Triangle = PolyMesh::Corners;

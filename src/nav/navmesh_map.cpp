@@ -69,7 +69,8 @@ Result<TopDownMap> NavMesh::top_down_map(double height, double metres_per_cell, 
   map.islands.assign(map.columns * map.rows, -1);
   if (corners) {
     map.at = 0;
-    constexpr double kBeside = 0.01, kFarthest = 1e9;  // Metres.
+    constexpr double kBeside = 0.01,
+                     kFarthest = 1e9;  // Limits of snapping: horizontal, vertical; metres.
     for (std::size_t r = 0; r < map.rows; ++r) {
       for (std::size_t c = 0; c < map.columns; ++c) {
         const Vec3d p{box.low.x + static_cast<double>(c) * metres_per_cell, height,

@@ -14,7 +14,7 @@ namespace gsnav::detail {
 namespace {
 
 constexpr double kTouch = 1e-9;       // Metres. Closer points coincide.
-constexpr double kParallel = 1e-12;   // Sine of an angle.
+constexpr double kParallel = 1e-12;   // Sine below which directions are parallel.
 constexpr std::size_t kMaxFan = 64;   // Polygons around one point.
 constexpr double kOffSurface = 0.01;  // Metres. A leg that leaves the surface by more is split.
 

@@ -26,8 +26,7 @@ struct SensorView {
   std::span<const GaussianSet> sets;     ///< Gaussians to draw.
   const RenderConfig* config = nullptr;  ///< Render settings. The sensors choose `outputs`.
   std::size_t row = 0;                   ///< Row of the images.
-  MeshFrame meshes{};                    ///< Meshes to draw. Their ids are their numbers in semantic
-                                         ///< images.
+  MeshFrame meshes{};                    ///< Meshes to draw. Semantic images contain their ids.
   const SceneDetail* detail = nullptr;   ///< Levels of detail and visible sets of the assets, which are
                                         ///< the first of `sets`. Null: draw everything. Semantic sensors
                                         ///< always draw everything.
