@@ -14,7 +14,8 @@ namespace gsnav::detail {
 namespace {
 
 constexpr double kBeside = 1e-2;  // Largest distance of a height sample from its edge, metres.
-constexpr double kOnLine = 1e-4;  // Metres. Corners that lie on a straight side between its ends.
+constexpr double kOnLine =
+    1e-4;  // A corner this near to the line of its neighbours lies on a straight side, metres.
 constexpr double kSliver = 1e-8;  // Largest area that counts as 0, m².
 constexpr std::uint32_t kNew = ~0u;
 

@@ -151,7 +151,7 @@ struct BatchCounters {
   alignas(kLine) unsigned long long large;
   alignas(kLine) unsigned long long pairs;
   alignas(kLine) unsigned long long beyond;
-  alignas(kLine) unsigned long long placed;  ///< Number of those beyond that have been placed.
+  alignas(kLine) unsigned long long placed;  ///< Number of pairs in `beyond` that have been placed.
   alignas(kLine) unsigned long long alt;     ///< Number of places in pairs_alt that lists may need, if
                                              ///< lists have reserved space.
   alignas(kLine) std::uint32_t items;
