@@ -67,7 +67,7 @@ Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamer
   if (cameras.empty()) return {Errc::invalid_argument, "CudaBatchRenderer: no camera to render from"};
   if (cameras.size() > kMostCameras) {
     return {Errc::unsupported,
-            "CudaBatchRenderer: " + std::to_string(cameras.size()) + " cameras: at most 65535 a call"};
+            "CudaBatchRenderer: " + std::to_string(cameras.size()) + " cameras: at most 65535 per call"};
   }
   const auto in = [](const char* list, std::size_t i, const Status& s) {
     return s ? s
