@@ -127,8 +127,8 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
   const std::size_t batches = std::max<std::size_t>(1, views / count);
   std::vector<double> ms, host_us;
   double pairs = 0;
-  for (int repeat = -1; repeat < kRepeats; ++repeat) {  // the first one is not counted: it allocates the
-                                                        // scratch
+  // The first repeat allocates the scratch and is not counted.
+  for (int repeat = -1; repeat < kRepeats; ++repeat) {
     for (std::size_t b = 0; b < batches; ++b) {
       std::vector<BatchCamera> cameras = cameras_of(b * count, count);
       seen.choose(cameras);

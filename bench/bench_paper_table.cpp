@@ -183,7 +183,7 @@ int main(int argc, char** argv) try {
       ->capture_default_str()
       ->check(CLI::Range(0.02, 7.0));
   app.add_option("--environments", o.environments,
-                 "more than 1: a batch of so many; ms and frames/s are of each frame")
+                 "above 1: a batch with this number of environments; ms and frames/s are per frame")
       ->capture_default_str()
       ->check(CLI::Range(1, 4096));
   app.add_option("--backend", o.backends, "openmp, cuda (where there is one), or both")

@@ -208,7 +208,8 @@ void lod_rows_on_gpu(LodViews& views, const GaussianCloud& cloud, const LodTree&
     return;
   }
   CudaBackend cuda;
-  std::printf("\n%s; \"visible\" is what is read, ms is the device's\n", cuda.device_name().c_str());
+  std::printf("\n%s; \"visible\" counts rows that are read, ms is device time\n",
+              cuda.device_name().c_str());
   LodRow::print_head();
   GpuRows rows(cuda, views, cloud, tree, visible);
   views.direct.clear();

@@ -8,7 +8,7 @@
 
 namespace gsnav_bench {
 
-/// Arrays of N Gaussians by planes.
+/// Input and output of the SH kernel for N Gaussians, one array per coordinate.
 struct ShPlanes {
   const float* coefficients;  ///< [K][3][N]
   const float* deltas[3];     ///< Gaussian - camera, any length, [N] each

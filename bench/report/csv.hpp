@@ -116,7 +116,8 @@ class CsvFile {
   /// Whether there is a row with this key.
   bool has(const std::string& key) const { return keys_.count(key) != 0; }
   const std::vector<Row>& rows() const noexcept { return rows_; }
-  /// Rows for changes, for example the worst view's image. `save` then writes the whole file again.
+  /// Rows that may be changed, for example to add the image of the worst view. `save` then writes the
+  /// whole file again.
   std::vector<Row>& rows() noexcept { return rows_; }
   gsnav::Status save();
 

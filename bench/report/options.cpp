@@ -47,9 +47,9 @@ void add_scenes(CLI::App& app, Options& o, std::vector<std::string>& sizes, std:
   app.add_option("--flat", o.flats, "Benchmark flats, PLY files with a cameras.json beside them");
   app.add_option(
       "--visible-sets", o.visible_sets,
-      "SCENE=FILE: what is seen from where cameras go (gsnav-navmesh --visible-sets writes it); adds "
-      "the "
-      "profile visible to that scene: fast, drawing what is in the set of a view's cell. Repeatable");
+      "SCENE=FILE: visible sets of a scene, written by gsnav-navmesh --visible-sets; adds the profile "
+      "visible, which is fast with only the Gaussians that are visible from the view's cell. "
+      "Repeatable");
   app.add_option("--views", o.views, "Views a scene, spread over its cameras")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
@@ -110,8 +110,9 @@ void add_run(CLI::App& app, Options& o) {
                  "Folder of the references; default OUT/references, `none`: not kept");
   app.add_option("--docs", o.docs,
                  "Also writes a Markdown page of approximations from the CSV to this file");
-  app.add_option("--commit", o.commit, "What the rows are of")->capture_default_str();
-  app.add_option("--machine", o.machine, "What they were measured on; default: the processor's name");
+  app.add_option("--commit", o.commit, "Commit that the rows are measured for")->capture_default_str();
+  app.add_option("--machine", o.machine,
+                 "Machine that the rows are measured on; default: the processor's name");
   app.add_flag("--resume", o.resume,
                "Keeps the rows of OUT/report.csv and makes those that are missing");
   app.add_flag("--acceptance", o.acceptance,

@@ -162,7 +162,7 @@ namespace {
 
 /// Labels of the corner near a goal, and results computed from them.
 struct NearGoal {
-  std::vector<double> to_hub;       ///< Infinity for hubs without a label.
+  std::vector<double> to_hub;       ///< Distance to each hub, metres. Infinity for hubs without a label.
   std::vector<std::uint32_t> set;   ///< Hubs with a finite value.
   std::vector<double> from_corner;  ///< Valid where `round_of` equals `round`.
   std::vector<std::uint64_t> round_of;

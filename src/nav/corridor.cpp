@@ -10,7 +10,7 @@ namespace gsnav::detail {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kSame = 1e-9;  // Metres.
+constexpr double kSame = 1e-9;  // Points closer than this are equal, metres.
 
 /// Transform from the plane of a face to that of the first face.
 struct Placed {

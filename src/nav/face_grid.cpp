@@ -9,7 +9,7 @@ namespace gsnav::detail {
 namespace {
 
 constexpr double kCellsAFace = 3.0;
-constexpr double kMostAcross = 1024;  // Cells along a side of a polygon.
+constexpr double kMostAcross = 1024;  // Largest number of cells along a side.
 constexpr double kSlack = 1e-9;       // Margin for rounding, as a fraction of a corner's share.
 
 }  // namespace

@@ -9,8 +9,9 @@
 
 namespace gsnav::detail {
 
-/// Which faces can be seen from which along straight lines: through which edge and in which directions.
-/// A search for straight paths can skip the rest. It is conservative: a beam contains all lines that
+/// Visibility between the faces of a mesh along straight lines. For each face and goal face it has the
+/// edges through which such lines leave, and their range of directions, so that a search for straight
+/// paths can skip all others. It is conservative: a beam contains all lines that
 /// cross two edges, and slightly more than those that cross the edges between them too.
 class FaceViews {
  public:

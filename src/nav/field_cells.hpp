@@ -46,8 +46,8 @@ struct FieldSource {
 
 /// Grid that divides a face into cells.
 struct FieldGrid {
-  /// About kCellsASource cells per source, at least kLeastSide metres wide, at most kMostAcross along a
-  /// side.
+  /// Sizes of cells: about kCellsASource cells per source, each at least kLeastSide metres wide, and at
+  /// most kMostAcross along a side.
   static constexpr double kCellsASource = 2.0, kLeastSide = 0.2, kMostAcross = 64;
 
   Flat low;

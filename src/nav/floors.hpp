@@ -23,8 +23,8 @@ inline constexpr double kPatch = 1.0;  // Side of the square patches that a floo
 inline constexpr double kApart = 2.0;  // Smallest height difference of storeys, metres.
 inline constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 inline constexpr std::uint16_t kNoLevel = std::numeric_limits<std::uint16_t>::max();
-inline constexpr std::int32_t kNotWalkable = -1, kFree = -2;  // Labels of runs. Storeys are numbered
-                                                              // from 0.
+/// Labels of runs. Storeys are numbered from 0.
+inline constexpr std::int32_t kNotWalkable = -1, kFree = -2;
 
 /// Free levels above run k of a column. kNone if nothing is above.
 inline std::size_t room_above(std::span<const SolidRun> runs, std::size_t k) noexcept {
@@ -51,9 +51,9 @@ struct Mark {
 
 /// Connected ground outside the storeys. Neighbouring cells differ by at most the agent's climb height.
 struct Piece {
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> runs;    // Pairs (column, run).
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> beside;  // Pairs (column, run) of adjacent
-                                                                // storeys.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> runs;  // Pairs (column, run).
+  // Pairs (column, run) of adjacent storeys.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> beside;
   std::vector<std::int32_t> storeys;
 };
 

@@ -198,7 +198,7 @@ Status check_upright(const GaussianNavReport& report, std::size_t floors) {
               "GaussianNavOptions.refuse_underside"};
 }
 
-/// Input of a NavMesh.
+/// Everything that a NavMesh is built from: voxels of Gaussians, their floors, and triangles.
 struct NavGround {
   const NavMeshSettings& settings;
   const GaussianNavOptions& options;

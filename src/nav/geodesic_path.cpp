@@ -7,7 +7,7 @@ namespace gsnav::detail {
 namespace {
 
 constexpr double kHeightError = 0.01;  // Largest distance of a path from the surface, metres.
-constexpr double kSame = 1e-9;         // Metres.
+constexpr double kSame = 1e-9;         // Points closer than this are equal, metres.
 
 struct PathPoint {
   Vec3d position{};

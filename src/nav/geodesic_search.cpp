@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kRounding = 1e-9;  // Metres, m² or radians.
+constexpr double kRounding = 1e-9;  // Tolerance for rounding: metres, m² or radians.
 constexpr double kPoint = 1e-11;    // Metres. Narrower windows are points.
 
 Flat turned(const Flat& d, double angle) noexcept {

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kRounding = 1e-9;  // Radians.
+constexpr double kRounding = 1e-9;  // Tolerance for rounding, radians.
 
 }  // namespace
 
@@ -50,7 +50,7 @@ std::size_t GeodesicSearch::look_around(const UnfoldedMesh& mesh, std::uint32_t 
     settle();
     return nodes_.size();
   }
-  // Directions that are at least half a turn from another path between the walls.
+  // A path that bends here leaves at least half a turn between itself and one of the two walls.
   leave_vertex(vertex, 0.0, kNone, 0.0, v.total - kPi + kRounding);
   leave_vertex(vertex, 0.0, kNone, kPi - kRounding, v.total);
   settle();

@@ -14,8 +14,9 @@ namespace gsnav::detail {
 namespace {
 
 constexpr double kBeside = 1e-2;  // Largest distance of a height sample from its edge, metres.
-constexpr double kOnLine = 1e-4;  // Metres. Corners that lie on a straight side between its ends.
-constexpr double kSliver = 1e-8;  // m².
+constexpr double kOnLine =
+    1e-4;  // A corner this near to the line of its neighbours lies on a straight side, metres.
+constexpr double kSliver = 1e-8;  // Largest area that counts as 0, m².
 constexpr std::uint32_t kNew = ~0u;
 
 using Triangle = PolyMesh::Corners;
@@ -255,8 +256,8 @@ std::vector<Triangle> triangulated(const PolyMesh& mesh, const PolyMesh::Poly& p
 }  // namespace
 
 void mend_heights(PolyMesh& mesh) {
-  std::vector<std::pair<std::size_t, std::vector<Triangle>>> mended;  // Polygons and their new
-                                                                      // triangles.
+  // Polygons and their new triangles.
+  std::vector<std::pair<std::size_t, std::vector<Triangle>>> mended;
   std::vector<Vec3d> added;
   std::size_t count = mesh.tris.size();
   for (std::size_t id = 0; id < mesh.polys.size(); ++id) {

@@ -9,7 +9,7 @@ namespace gsnav::detail {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kRounding = 1e-9;  // Metres.
+constexpr double kRounding = 1e-9;  // Tolerance for rounding, metres.
 constexpr std::uint32_t kParts = Landmarks::kParts;
 
 float rounded_up(double x) noexcept {
@@ -32,7 +32,7 @@ struct AlongEdge {
   const Reach* first = nullptr;
   const Reach* last = nullptr;
   double length = 0;
-  double from_low = kInfinity, from_high = kInfinity;  ///< Distances of its ends.
+  double from_low = kInfinity, from_high = kInfinity;  ///< Distances from the landmark to its ends.
 
   double distance(double x) const noexcept {
     double d = min(from_low + x, from_high + length - x);

@@ -74,7 +74,8 @@ class LandmarkLead {
   double least() const noexcept { return least_; }
   /// Lower bound of the distance from point k of an edge (0 to kParts) to the goal.
   double from(std::uint32_t edge, std::uint32_t k) const noexcept;
-  /// Estimate of that distance without the stored error. Not a bound.
+  /// Estimate of the distance from point k of an edge to the goal. It ignores the stored error and may
+  /// be too large.
   double toward(std::uint32_t edge, std::uint32_t k) const noexcept;
   /// Lower bound of a path from a root through [low, high] of the edge to the goal. The root is at
   /// distance `beside` from the point `at` of the edge.

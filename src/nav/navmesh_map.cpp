@@ -69,7 +69,8 @@ Result<TopDownMap> NavMesh::top_down_map(double height, double metres_per_cell, 
   map.islands.assign(map.columns * map.rows, -1);
   if (corners) {
     map.at = 0;
-    constexpr double kBeside = 0.01, kFarthest = 1e9;  // Metres.
+    constexpr double kBeside = 0.01,
+                     kFarthest = 1e9;  // Limits of snapping: horizontal, vertical; metres.
     for (std::size_t r = 0; r < map.rows; ++r) {
       for (std::size_t c = 0; c < map.columns; ++c) {
         const Vec3d p{box.low.x + static_cast<double>(c) * metres_per_cell, height,
@@ -81,8 +82,8 @@ Result<TopDownMap> NavMesh::top_down_map(double height, double metres_per_cell, 
     }
     return map;
   }
-  std::vector<double> off(map.islands.size(), max_height_delta);  // Distance from `height` to the
-                                                                  // surface that a cell shows.
+  // Distance from `height` to the surface that a cell shows.
+  std::vector<double> off(map.islands.size(), max_height_delta);
 
   const detail::PolyMesh& m = impl_->polys;
   const Vec3d low = map.low - impl_->origin;

@@ -8,7 +8,7 @@ namespace gsnav {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kSame = 1e-9;  // Metres.
+constexpr double kSame = 1e-9;  // Points closer than this are equal, metres.
 constexpr double kLeg = 1e-6;   // Metres: rounding error of a leg.
 
 std::string text(const Vec3d& p) {

@@ -166,7 +166,7 @@ std::vector<ObstacleHit> NavMesh::obstacles_near(const NavPoint& p, double radiu
   const Vec3d c = p.position - impl_->origin;
   each_wall(impl_->polys, p.poly, c, radius,
             [&](double d, const Vec3d& a, const Vec3d& b, const Vec3d& nearest) {
-              constexpr double kTouching = 1e-9;  // Metres.
+              constexpr double kTouching = 1e-9;  // At this distance p is on the edge, metres.
               const Vec3d way{c.x - nearest.x, 0, c.z - nearest.z};
               out.push_back({d, nearest + impl_->origin, d > kTouching ? way * (1 / d) : inward(a, b)});
             });

@@ -124,7 +124,8 @@ Status check_tile(std::span<const std::byte> tile, const TileLayout& t, const Wh
     detail_verts += static_cast<unsigned>(d[8]);
     detail_tris += static_cast<unsigned>(d[9]);
   }
-  // If polygons shared them, memory could grow to a thousand times the file size.
+  // Detail vertices must not be shared: with shared ones, memory could grow to a thousand times the file
+  // size.
   if (detail_verts > static_cast<std::uint64_t>(t.detail_verts)) {
     return where.bad("detailVertCount", t.detail_verts,
                      "is less than the polygons have, " + std::to_string(detail_verts));

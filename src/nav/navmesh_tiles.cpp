@@ -181,7 +181,8 @@ class Extractor {
         }
       }
     }
-    // Two edges of one polygon that lie on this edge are found through both links.
+    // If two edges of one polygon lie on this edge, each is found through both links. Remove the
+    // duplicates.
     std::sort(out.begin(), out.end());
     out.erase(std::unique(out.begin(), out.end()), out.end());
     if (out.size() > links) out.resize(links);

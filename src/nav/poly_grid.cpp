@@ -9,11 +9,11 @@
 namespace gsnav::detail {
 namespace {
 
-constexpr double kRounding = 1e-9;  // Metres.
+constexpr double kRounding = 1e-9;  // Tolerance for rounding, metres.
 constexpr double kPolygonsPerCell = 1.0;
-constexpr double kLeastSide = 0.25;  // Metres.
+constexpr double kLeastSide = 0.25;  // Smallest side of a cell, metres.
 constexpr double kMaxSideCells = 2048.0;
-constexpr double kMostEntries = 16.0;  // Per polygon.
+constexpr double kMostEntries = 16.0;  // Largest mean number of cells that list a polygon.
 
 /// Cells [low, high] along one axis that overlap an interval. Empty if high < low.
 struct Cells {

@@ -56,8 +56,8 @@ double PolyMesh::height(PolyId id, const Vec3d& q) const noexcept {
   if (p.count == 0) return q.y;
   const Vec3d& o = corners[p.first];
   if (p.planar) return o.y + p.rise_x * (q.x - o.x) + p.rise_z * (q.z - o.z);
-  // The triangle that contains q or is nearest to containing it, so that points on edges always find
-  // one.
+  // Use the triangle that contains q, or else the one that q misses least. Points on edges therefore
+  // always find one.
   double best = -std::numeric_limits<double>::max(), y = o.y;
   for (std::uint32_t i = p.tri_first; i < p.tri_first + p.tri_count; ++i) {
     const Share &s = share_1[i], &t = share_2[i];

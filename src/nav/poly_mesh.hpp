@@ -22,8 +22,8 @@ inline double shortened(double dx, double dz) noexcept {
 /// with the neighbour across each edge. Walking, heights, islands and sampling use it without Detour.
 struct PolyMesh {
   struct Poly {
-    std::uint32_t first = 0, count = 0;          ///< Edges and corners.
-    std::uint32_t tri_first = 0, tri_count = 0;  ///< Height triangles.
+    std::uint32_t first = 0, count = 0;          ///< Range of its edges and corners.
+    std::uint32_t tri_first = 0, tri_count = 0;  ///< Range of its height triangles.
     std::uint32_t island = 0;
     double area = 0.0;
     bool planar = false;            ///< Corners and height triangles lie in one plane.
@@ -36,7 +36,7 @@ struct PolyMesh {
     double x = 0, z = 0;
   };
   struct Island {
-    std::uint32_t first = 0, count = 0;  ///< In `by_island`.
+    std::uint32_t first = 0, count = 0;  ///< Range in `by_island`.
     double area = 0.0, radius = 0.0;
   };
 

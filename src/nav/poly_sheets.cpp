@@ -14,7 +14,7 @@ namespace {
 constexpr double kLevel = 1e-3;   // Metres. A polygon that deviates less from a plane is one face.
 constexpr double kBeside = 1e-2;  // Largest distance of a height sample from the edge of its polygon,
                                   // metres.
-constexpr double kSliver = 1e-8;  // m².
+constexpr double kSliver = 1e-8;  // Largest area that counts as 0, m².
 
 /// Cuts a polygon into triangles by ear clipping, the best-shaped ear first.
 std::vector<Sheet> clipped(PolyId id, const std::vector<Vec3d>& c) {

@@ -9,7 +9,7 @@
 namespace gsnav::detail::solids {
 
 Aabb<double> scene_box(std::span<const GaussianSet> sets, const GaussianNavOptions& options) {
-  constexpr double kCoarse = 1.0;   // Metres.
+  constexpr double kCoarse = 1.0;   // Side of a coarse cell, metres.
   constexpr double kSparse = 0.02;  // Cells with less than this fraction of the median Gaussian's cell
                                     // are not part of the scene.
   constexpr double kFar = 1e7;

@@ -110,7 +110,8 @@ void Floors::find_heights() {
       const std::size_t c = x + g_.nx * z;
       for (std::uint32_t r = g_.first[c]; r < g_.first[c + 1]; ++r) {
         if (label_[r] == kNotWalkable) continue;
-        // A floor's own runs are near its plane. A more distant run is seen through a gap.
+        // Runs of a floor are near its plane. A neighbour farther away belongs to another surface behind
+        // a gap.
         const std::size_t top = g_.runs[r].top(), reach = (label_[r] >= 0 ? 1 : 2) * s_.climb;
         tops.clear();
         for (std::size_t k = z - min<std::size_t>(z, near); k <= min(z + near, g_.nz - 1); ++k) {

@@ -11,7 +11,7 @@ namespace gsnav {
 namespace {
 
 constexpr double kMaxCoordinate = 1e9;
-constexpr double kRounding = 1e-9;  // Metres.
+constexpr double kRounding = 1e-9;  // Tolerance for rounding, metres or relative.
 constexpr double kShortest = 1e-6;  // Metres. Shorter remainders of a step do not slide.
 
 bool valid(const AgentState& a) noexcept {

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t kBeside =
     3;  // Number of patches around a floor within which a level nearer than kApart is furniture.
-constexpr double kLeastStorey = 4.0;  // m².
+constexpr double kLeastStorey = 4.0;  // Smallest area of a storey, m².
 
 }  // namespace
 

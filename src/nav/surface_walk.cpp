@@ -14,7 +14,7 @@ namespace gsnav::detail {
 namespace {
 
 constexpr double kTouch = 1e-9;       // Metres. Closer points coincide.
-constexpr double kParallel = 1e-12;   // Sine of an angle.
+constexpr double kParallel = 1e-12;   // Sine below which directions are parallel.
 constexpr std::size_t kMaxFan = 64;   // Polygons around one point.
 constexpr double kOffSurface = 0.01;  // Metres. A leg that leaves the surface by more is split.
 
@@ -234,8 +234,8 @@ void PolyMesh::walk(PolyId start_poly, const Vec3d& start, double dx, double dz,
     arrive(to, poly, 1.0 - left, ends_here ? 1.0 : 1.0 - (left - t));
     if (ends_here) break;
     left -= t;
-    // The point keeps the polygon of the leg that leads to it. If that leg is cut short, the agent
-    // stands on it.
+    // The point gets the polygon of the leg that leads to it, because the agent stands on that polygon
+    // if the leg is cut short.
     const PolyId next = neighbours[polys[poly].first + way.exit.edge];
     if (next != kNoPoly) poly = next;
   }

@@ -40,7 +40,7 @@ class Seams {
 
   void close() {
     weld();
-    // Limit the triangles that are added, by half their number and by the number of points. Files not
+    // At most half as many triangles are added as there are, and at most one for each point. Files not
     // made by Recast may stack many polygons.
     left_ = min(m_.tris.size() / 2, m_.points.size()) + 8;
     extra_.resize(m_.polys.size());

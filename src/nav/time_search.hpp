@@ -62,7 +62,7 @@ class TimeSearch {
   }
 
  private:
-  static constexpr double kSame = 1e-6;   // Metres.
+  static constexpr double kSame = 1e-6;   // Lengths that differ by less are equal, metres.
   static constexpr double kStorey = 0.5;  // Metres. Lattice points with a smaller height difference
                                           // coincide.
   static constexpr std::uint32_t kNone = 0xffffffffu;

@@ -45,7 +45,7 @@ class TimedBodies {
   }
 
  private:
-  static constexpr double kRounding = 1e-3;  // Metres.
+  static constexpr double kRounding = 1e-3;  // Extra reach that covers rounding, metres.
 
   /// Disc on the ground that moves linearly and contains a body during a tick.
   struct MovingDisc {

@@ -14,7 +14,7 @@ namespace gsnav::detail {
 namespace {
 
 constexpr double kWeld = 1e-4;      // Metres. Closer points of an edge coincide.
-constexpr double kStraight = 1e-9;  // Radians.
+constexpr double kStraight = 1e-9;  // Tolerance for a straight angle, radians.
 constexpr double kPi = 3.14159265358979323846;
 constexpr std::uint64_t kWall = ~std::uint64_t{0};
 
@@ -44,7 +44,8 @@ struct Cut {
 };
 using Cuts = std::vector<std::vector<Cut>>;  ///< Indexed by the edge of a polygon.
 
-/// Begins and ends of the parts of edge e and of the neighbour's edge f against it.
+/// Positions at which edge e is cut, as sorted fractions of its length. They are the ends of the parts
+/// of e, and of the parts of f, the edge of the neighbour along e.
 std::vector<double> cut_places(const PolySheets& sheets, std::uint32_t e, std::uint32_t f,
                                double length) {
   std::vector<double> at;

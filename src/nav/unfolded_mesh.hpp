@@ -48,7 +48,7 @@ class UnfoldedMesh {
     double angle = 0;                             ///< Angle of this edge in the fan of its vertex.
   };
   struct Face {
-    std::uint32_t first = 0, count = 0;  ///< Edges.
+    std::uint32_t first = 0, count = 0;  ///< Range of its edges.
     Vec3d u{1, 0, 0}, v{0, 0, 1};        ///< Axes of the plane, counter-clockwise in (x, z).
     PolyId poly = 0;
   };
@@ -85,7 +85,7 @@ class UnfoldedMesh {
     if (e.same_plane) return p;
     return {e.cosine * p.x - e.sine * p.y + e.dx, e.sine * p.x + e.cosine * p.y + e.dy};
   }
-  /// Face of a polygon that contains (x, z) of p, or is nearest to containing it.
+  /// Face of a polygon that contains (x, z) of p, or else the one that p misses least.
   std::uint32_t face_at(PolyId poly, const Vec3d& p) const noexcept;
   /// Point of a face nearest to p, in its plane. p itself if it is inside.
   Flat clamped(std::uint32_t face, const Flat& p) const noexcept;

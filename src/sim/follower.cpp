@@ -19,7 +19,8 @@ constexpr double kNearness = 0.9;  // Step within the comfort distance, scaled b
                                    // distance 0.
 constexpr double kStuck = 0.2;     // Move that a wall stops.
 
-/// Wait, turn, walk straight, then follow the path. All zero: follow the path at once.
+/// Numbers of actions: first wait, then turn, then walk straight, and from then on follow the path. All
+/// zero: follow the path at once.
 struct Plan {
   int waits = 0, turns = 0, walks = 0;  // Positive turns are to the left.
 };
@@ -97,8 +98,8 @@ class Lookahead {
         }
       }
       if (way.left < reach_) {
-        out.cost = out.charge - c.forward_step * (horizon_ - 1 - i);  // Reward for actions that are not
-                                                                      // needed.
+        // Reward for actions that are not needed.
+        out.cost = out.charge - c.forward_step * (horizon_ - 1 - i);
         return out;
       }
     }

@@ -12,7 +12,7 @@ namespace {
 constexpr double kBaseline = 35.130;  // Focal length times baseline: disparity = kBaseline / z.
 constexpr double kSteps = 8.0;        // Quantization steps per unit of disparity.
 constexpr double kDisparitySigma = 1.0 / 36.0;
-constexpr double kShiftSigma = 0.25;  // Pixels.
+constexpr double kShiftSigma = 0.25;  // Standard deviation of the shift, pixels.
 
 }  // namespace
 

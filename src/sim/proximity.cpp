@@ -227,7 +227,7 @@ class Approach {
     return best;
   }
 
-  static constexpr double kTolerance = 1e-6;  // Metres.
+  static constexpr double kTolerance = 1e-6;  // Absolute error of distances, metres.
   static constexpr double kShare = 1e-4;      // Fraction of the motion of both during a tick.
 
   std::span<const WalkPoint> path_;

@@ -29,7 +29,7 @@ Status validate_assets(const SimulatorScene& scene) {
     };
     if (a.cloud == nullptr && a.packed == nullptr) return bad("cloud is null");
     if (a.cloud != nullptr && a.packed != nullptr)
-      return bad("packed is there and cloud too: one is drawn");
+      return bad("packed and cloud are both set: set only one of them");
     const std::size_t chunks = (a.packed != nullptr ? a.packed->view() : a.cloud->view()).chunk_count();
     if (a.bands != nullptr && a.bands->chunk_sh_degrees.size() != chunks)
       return bad("bands are of another cloud");
@@ -54,7 +54,7 @@ Status validate_detail(const SimulatorScene& scene, const DetailChoice& choice) 
                                                 std::to_string(i) + "]." + what);
     };
     if (a.packed != nullptr && (choice.lod || choice.visible_sets)) {
-      return bad(choice.lod ? "lod" : "visible_sets", "packed: only `cloud` can be drawn so");
+      return bad(choice.lod ? "lod" : "visible_sets", "packed: this needs Gaussians in `cloud`");
     }
     if (choice.visible_sets &&
         (a.visible == nullptr || a.visible->cloud_chunks != a.cloud->view().chunk_count())) {

@@ -57,7 +57,7 @@ Result<std::shared_ptr<SceneLibrary>> SceneLibrary::create(std::vector<SceneEntr
   if (scenes.empty()) return {Errc::invalid_argument, "SceneLibrary: no scene"};
   for (const SceneEntry& e : scenes) {
     if (!e.load)
-      return {Errc::invalid_argument, "SceneLibrary: scene \"" + e.name + "\" has no way to load it"};
+      return {Errc::invalid_argument, "SceneLibrary: scene \"" + e.name + "\" has no load function"};
   }
   std::shared_ptr<SceneLibrary> library(new SceneLibrary(std::move(scenes), budget));
   library->thread_ = std::thread([p = library.get()] { p->work(); });

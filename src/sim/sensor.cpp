@@ -39,12 +39,11 @@ Status validate(const SensorSpec& s) {
   };
   if (s.uuid.empty()) return {Errc::invalid_argument, "SensorSpec.uuid is empty: a sensor needs a name"};
   if (s.kind > SensorKind::normal)
-    return bad("kind", std::to_string(static_cast<int>(s.kind)), "there is none of this number");
+    return bad("kind", std::to_string(static_cast<int>(s.kind)), "not a value of the enum");
   if (s.model > SensorModel::fisheye)
-    return bad("model", std::to_string(static_cast<int>(s.model)), "there is none of this number");
+    return bad("model", std::to_string(static_cast<int>(s.model)), "not a value of the enum");
   if (s.noise.kind > NoiseKind::redwood_depth) {
-    return bad("noise.kind", std::to_string(static_cast<int>(s.noise.kind)),
-               "there is none of this number");
+    return bad("noise.kind", std::to_string(static_cast<int>(s.noise.kind)), "not a value of the enum");
   }
   for (const int side : s.resolution) {
     if (side < 1 || side > kMaxImageSide)

@@ -42,7 +42,8 @@ Result<CapsuleSet> World::bodies(double t0, double t1) const {
 
 namespace {
 Status moved_away() {
-  return {Errc::invalid_argument, "this World or Simulator was moved from: use what it became"};
+  return {Errc::invalid_argument,
+          "this World or Simulator was moved from: use the object that it was moved to"};
 }
 }  // namespace
 

@@ -149,7 +149,7 @@ Status compare_contents(const fs::path& path, const Header& header, const Option
                                         (name == "scene" || name == "navmesh" ? " has" : " have") +
                                         " changed (content hash " + hash + ", recorded " +
                                         (was == header.contents.end() ? "none" : was->second) +
-                                        "). Put back what was, " + kAnew};
+                                        "). Restore the recorded content, " + kAnew};
   }
   return {};
 }

@@ -51,9 +51,10 @@ std::string metrics_table(const gsnav::MetricsSummary& s) {
   row(out, "distance to goal (DTG)", s.distance_to_goal, "m", "along the floor, at the end");
   row(out, "collision rate (CR)", s.collision_rate, "",
       "share of steps in which a person was touched or stopped the move");
-  row(out, "personal space intrusion (PSI)", s.psi, "", "0: never near anybody, 1: always in touch");
+  row(out, "personal space intrusion (PSI)", s.psi, "", "0: never near a person, 1: always in contact");
   row(out, "personal space compliance (PSC)", s.psc, "", "share of steps outside of personal space");
-  row(out, "H-Coll", s.human_collision_episode_rate, "", "share of episodes with somebody touched");
+  row(out, "H-Coll", s.human_collision_episode_rate, "",
+      "share of episodes in which a person was touched");
   row(out, "stopped by somebody", s.human_blocked_episode_rate, "",
       "share of episodes with a move stopped by a person");
   row(out, "wall collisions", s.collisions, "", "an episode");
@@ -123,7 +124,7 @@ std::string page(const Options& o, const gsnav::MetricsSummary& s, const std::ve
            ", SPL " + format(m.spl) + ", " + std::to_string(m.steps) + " actions, CR " +
            format(m.collision_rate) + ", PSI " + format(m.psi) + ", reward " + format(e.record->reward) +
            "</summary>\n";
-    out += figure(e.strip, "What the agent saw in episode " + e.record->id +
+    out += figure(e.strip, "Images of the agent in episode " + e.record->id +
                                ", from its begin to its end: colour, and below it depth.");
     out += figure(e.map, "Episode " + e.record->id + " from above.");
     out += "</details>\n";

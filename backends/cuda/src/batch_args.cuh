@@ -151,7 +151,7 @@ struct BatchCounters {
   alignas(kLine) unsigned long long large;
   alignas(kLine) unsigned long long pairs;
   alignas(kLine) unsigned long long beyond;
-  alignas(kLine) unsigned long long placed;  ///< Number of those beyond that have been placed.
+  alignas(kLine) unsigned long long placed;  ///< Number of pairs in `beyond` that have been placed.
   alignas(kLine) unsigned long long alt;     ///< Number of places in pairs_alt that lists may need, if
                                              ///< lists have reserved space.
   alignas(kLine) std::uint32_t items;
@@ -211,8 +211,9 @@ struct BatchArgs {
   Pair* pairs_alt;
   BeyondPair* beyond;
   std::uint32_t slot_capacity, hard_capacity, several_capacity, large_capacity, part_capacity;
-  std::uint32_t pair_capacity;                  ///< Used if lists are counted first.
-  std::uint32_t beyond_capacity, alt_capacity;  ///< Used if lists have reserved space.
+  std::uint32_t pair_capacity;  ///< Number of `pairs`, if lists are counted first.
+  /// Numbers of `beyond` and `pairs_alt`, if lists have reserved space.
+  std::uint32_t beyond_capacity, alt_capacity;
   std::uint32_t slab;  ///< Number of slots that a warp takes at a time, small if there are few cameras.
   bool operator==(const BatchArgs&) const = default;
 };

@@ -236,8 +236,8 @@ __device__ void place_bins(const BatchArgs& a, std::uint32_t* of_length) {
     }
     begin = __shfl_sync(kAll, begin, 0);
     first_part = __shfl_sync(kAll, first_part, 0);
-    // A part begins with the first bin that begins at or after it. `before` is the begin of the previous
-    // bin.
+    // Part k begins with the first bin that begins at or after k * kPartLength pairs. `before` is the
+    // begin of the previous bin.
     const bool fits = first_part + parts <= a.part_capacity;
     const auto begin_bin = [&](std::uint32_t before, std::uint32_t at, std::uint32_t bin,
                                std::uint32_t last_part) {

@@ -190,10 +190,8 @@ __device__ inline float load_mesh(const BlendArgs& b, const std::size_t (&pixel)
   __syncthreads();
   for (int k = 0; k < K; ++k) {
     mesh[k] = inside[k] ? b.raster.mesh.depth[pixel[k]] : 0.0f;
-    if (inside[k])
-      atomicMax(&far, __float_as_uint(has_mesh(mesh[k]) ? mesh[k] : INFINITY));  // Unsigned order equals
-                                                                                 // float order, because
-                                                                                 // no depth is negative.
+    // Unsigned order equals float order, because no depth is negative.
+    if (inside[k]) atomicMax(&far, __float_as_uint(has_mesh(mesh[k]) ? mesh[k] : INFINITY));
   }
   __syncthreads();
   return __uint_as_float(far);

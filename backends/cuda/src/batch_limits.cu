@@ -67,7 +67,7 @@ Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamer
   if (cameras.empty()) return {Errc::invalid_argument, "CudaBatchRenderer: no camera to render from"};
   if (cameras.size() > kMostCameras) {
     return {Errc::unsupported,
-            "CudaBatchRenderer: " + std::to_string(cameras.size()) + " cameras: at most 65535 a call"};
+            "CudaBatchRenderer: " + std::to_string(cameras.size()) + " cameras: at most 65535 per call"};
   }
   const auto in = [](const char* list, std::size_t i, const Status& s) {
     return s ? s
@@ -106,7 +106,7 @@ Status CudaBatchRenderer::supports(const RenderConfig& config, std::span<const G
 
 std::size_t CudaBatchRenderer::State::measured_capacity(std::size_t cameras) const {
   if (taken.cameras == 0) return cameras;
-  // Add an eighth, as capacities grow.
+  // Add an eighth, as grown() does for capacities.
   const auto of_each = [this](std::uint64_t n) { return (n + n / 8) / taken.cameras + 1; };
   std::uint64_t most = kMostPlaces / of_each(std::max(taken.slots, taken.pairs));
   constexpr std::uint64_t kSlotBytes = sizeof(cuda::SplatRecord) + sizeof(cuda::SplatEntry) +

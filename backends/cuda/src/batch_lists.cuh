@@ -98,8 +98,8 @@ __device__ inline void queue_large_row(const BatchArgs& a, unsigned long long pl
   if (place < a.large_capacity) a.large[place] = {splat, row};
 }
 
-/// Queues the rows of the lanes that have some. All lanes must call ask(), then put(), so that the
-/// counter is not needed before put().
+/// Adds the rows of very large splats to the queue. All lanes of the warp must call ask(), then put().
+/// The warp waits for the counter only in put().
 class LargeQueue {
  public:
   __device__ void ask(const BatchArgs& a, const LargeRows& rows) {

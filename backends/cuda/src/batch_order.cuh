@@ -13,9 +13,8 @@ namespace gsnav::cuda {
 
 inline constexpr int kOrderThreads = policy::Order::kThreads, kOrderItems = policy::Order::kItems;
 inline constexpr int kOrderBinBits = policy::Order::kBinBits, kOrderBins = 1 << kOrderBinBits;
-inline constexpr int kOrderLevels = 2 * ((32 + kOrderBinBits - 1) / kOrderBinBits);  ///< Levels for the
-                                                                                     ///< key and the
-                                                                                     ///< rank.
+/// Levels for the key and the rank.
+inline constexpr int kOrderLevels = 2 * ((32 + kOrderBinBits - 1) / kOrderBinBits);
 inline constexpr std::size_t kOrderLent = 12800;
 
 /// A batch is scattered into this number of buckets by key. Splats that share a bucket are ordered

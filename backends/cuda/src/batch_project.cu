@@ -80,7 +80,7 @@ class WarpProjection {
     first_ = item.part * kChunkPart + half % kWarpsPerPart * 32;
     const unsigned lane = threadIdx.x % 32;
     const unsigned existing = rows_there(gaussians_->size(), first_);
-    unsigned seen = 0;  // Rows of the lane's instance.
+    unsigned seen = 0;  // Mask of the rows that the lane's instance may see.
     if constexpr (SomeRows) {
       if ((item.mask >> lane & 1u) != 0) seen = existing & seen_rows_of(lane);
       if (!__any_sync(kAll, seen != 0)) return;

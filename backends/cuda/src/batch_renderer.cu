@@ -255,7 +255,7 @@ Status CudaBatchRenderer::finish() {
     return {Errc::out_of_memory,
             "CudaBatchRenderer: scratch was too small for a batch that another call of render() "
             "followed before "
-            "finish(); its images are not whole. There is room for it now: draw it again"};
+            "finish(); its images are incomplete. Scratch is large enough now: draw it again"};
   }
   return s.backend.synchronize();
 }

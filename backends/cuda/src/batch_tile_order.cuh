@@ -117,7 +117,7 @@ class TileOrder {
   }
 
   std::uint32_t tile_, camera_, begin_, end_;
-  std::uint32_t bin_ = 0;  ///< Next depth bin.
+  std::uint32_t bin_ = 0;  ///< Depth bin to be sorted next.
   int level_ = kNone;      ///< Level of the bin that is being read.
 };
 

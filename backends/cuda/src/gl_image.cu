@@ -100,7 +100,7 @@ Result<GlImage> GlImage::create(CudaBackend& backend, unsigned texture, int widt
   };
   if (width <= 0 || height <= 0 || height > 65535) {
     return bad("size " + std::to_string(width) + " x " + std::to_string(height) +
-               " is none that can be drawn");
+               ": must be positive, and the height at most 65535");
   }
   auto state = std::make_unique<State>(backend, width, height);
   const cudaError_t e = cudaGraphicsGLRegisterImage(&state->resource, texture, GL_TEXTURE_2D,

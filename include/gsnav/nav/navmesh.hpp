@@ -228,8 +228,8 @@ class NavMesh {
   /// @param island Sample this island only. If it does not exist, the result has no polygon (kNoPoly).
   NavPoint random_point(Rng& rng, std::optional<std::size_t> island = {}) const;
   /// Random point, uniform over the part of the surface within `radius` metres (3D) of p.
-  /// @return nothing if that part is empty or smaller than about 1/1000 of the surface above and below
-  /// the disc.
+  /// @return nothing if that part is empty, or smaller than about 1/1000 of the surface in the vertical
+  /// column of width 2 * radius around p.
   std::optional<NavPoint> random_point_near(Rng& rng, const Vec3d& p, double radius,
                                             std::optional<std::size_t> island = {}) const;
   /// Ground-plane distance from p to the nearest boundary edge, metres. p is snapped first. Only edges

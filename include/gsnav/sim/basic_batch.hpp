@@ -122,12 +122,12 @@ class BasicBatchSimulator {
     if (config.images > ImageMemory::backend) {
       return {Errc::invalid_argument,
               "BatchConfig.images = " + std::to_string(static_cast<int>(config.images)) +
-                  ": there is none of this number"};
+                  ": not a value of the enum"};
     }
     if (config.auto_reset > AutoReset::disabled) {
       return {Errc::invalid_argument,
               "BatchConfig.auto_reset = " + std::to_string(static_cast<int>(config.auto_reset)) +
-                  ": there is none of this number"};
+                  ": not a value of the enum"};
     }
     if (config.pose_slots < 1)
       return {Errc::invalid_argument, "BatchConfig.pose_slots = 0: must be >= 1"};
@@ -182,7 +182,8 @@ class BasicBatchSimulator {
   }
 
   static Status moved_away() {
-    return {Errc::invalid_argument, "this BatchSimulator was moved from: use what it became"};
+    return {Errc::invalid_argument,
+            "this BatchSimulator was moved from: use the object that it was moved to"};
   }
   /// Frees the scenes that no environment uses.
   void free_scenes() {

@@ -182,7 +182,8 @@ class BasicSimulator {
  private:
   Status alive() const {
     return world_.moved_from()
-               ? Status(Errc::invalid_argument, "this Simulator was moved from: use what it became")
+               ? Status(Errc::invalid_argument,
+                        "this Simulator was moved from: use the object that it was moved to")
                : Status();
   }
 

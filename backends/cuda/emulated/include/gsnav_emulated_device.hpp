@@ -106,7 +106,7 @@ T atomically(T* to, F changed) {
   return std::exchange(*to, changed(*to));
 }
 
-/// Bits [begin, end) of a key, as used by sorts of the toolkit. Fewer than 64.
+/// Bits [begin, end) of a key, as used by sorts of the toolkit. There must be fewer than 64.
 template <class Key>
 std::uint64_t digits_of(Key key, int begin, int end) {
   return std::uint64_t{key} >> begin & ((std::uint64_t{1} << (end - begin)) - 1);

@@ -78,7 +78,8 @@ struct OracleConfig {
   const OracleMesh* mesh = nullptr;
 };
 
-/// Alpha below which OracleKind::untruncated with boxes omits a Gaussian.
+/// Base-2 logarithm of the alpha below which OracleKind::untruncated may omit a Gaussian, if
+/// OracleConfig::boxed is set.
 /// A pixel's colour is linear in each alpha, with a slope of at most c, the largest colour component
 /// (background included). Omitting n Gaussians therefore changes the colour by less than n c 2^-40 and
 /// alpha by less than n 2^-40, or 9.1e-7 c for a million.
@@ -159,7 +160,7 @@ inline Status validate(const OracleConfig& c, const Camera& camera) {
   if (Status s = gsnav::validate(camera); !s) return s;
   if (c.rules.response != Response::ewa) {
     return {Errc::unsupported,
-            "OracleConfig.rules.response: oracles know Response::ewa only; OracleKind::ray is the exact "
+            "OracleConfig.rules.response: must be Response::ewa; OracleKind::ray is the exact "
             "response"};
   }
   if (c.rules.compat != Compat::none) {
@@ -176,7 +177,8 @@ inline Status validate(const OracleConfig& c, const Camera& camera) {
   const std::size_t pixels =
       static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   if (c.mesh != nullptr && (c.mesh->depth.size() != pixels || c.mesh->rgb.size() != 3 * pixels)) {
-    return {Errc::invalid_argument, "OracleConfig.mesh: its planes are not of the camera's image"};
+    return {Errc::invalid_argument,
+            "OracleConfig.mesh: its images must have the size of the camera's image"};
   }
   if (c.mesh != nullptr && !c.mesh->fragments.empty()) {
     if (c.mesh->fragments.size() != pixels) {

@@ -88,8 +88,8 @@ class PhotoReducer {
 
 }  // namespace detail
 
-/// Renders what a sensor sees that integrates over its pixels, O_photo(k). The reference of `config` is
-/// rendered at k times the resolution and reduced to that of the camera.
+/// Renders the image of a sensor that integrates over its pixels, O_photo(k). The reference of `config`
+/// is rendered at k times the resolution and reduced to that of the camera.
 ///
 /// Each k x k block is reduced as follows:
 /// - colour, alpha and accumulated depth: mean

@@ -7,13 +7,14 @@
 
 namespace gsnav::detail {
 
-/// Numeric settings of a NavMesh, with Habitat's JSON names and in the order of a `.navmesh` file.
+/// Number of numeric settings of a NavMesh.
 inline constexpr std::size_t kSettingCount = 13;
 /// One numeric setting.
 struct SettingField {
-  const char* name;                ///< Habitat's name.
+  const char* name;                ///< Name in Habitat's JSON.
   double NavMeshSettings::*value;  ///< Null for verts_per_poly, which is an integer.
 };
+/// Numeric settings in the order of a `.navmesh` file.
 inline constexpr SettingField kSettingFields[kSettingCount] = {
     {"cellSize", &NavMeshSettings::cell_size},
     {"cellHeight", &NavMeshSettings::cell_height},

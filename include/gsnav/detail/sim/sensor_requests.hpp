@@ -26,8 +26,7 @@ struct SensorView {
   std::span<const GaussianSet> sets;     ///< Gaussians to draw.
   const RenderConfig* config = nullptr;  ///< Render settings. The sensors choose `outputs`.
   std::size_t row = 0;                   ///< Row of the images.
-  MeshFrame meshes{};                    ///< Meshes to draw. Their ids are their numbers in semantic
-                                         ///< images.
+  MeshFrame meshes{};                    ///< Meshes to draw. Semantic images contain their ids.
   const SceneDetail* detail = nullptr;   ///< Levels of detail and visible sets of the assets, which are
                                         ///< the first of `sets`. Null: draw everything. Semantic sensors
                                         ///< always draw everything.
@@ -196,9 +195,9 @@ class SensorRequests {
   std::vector<ImageRequest> requests_;
   std::vector<Normals> normals_;
   std::vector<Shares> shares_;
-  std::vector<RenderConfig> share_configs_;                           // One per view.
-  std::vector<std::array<HostArray<float, B>, Plan::kKinds>> faces_;  // Indexed
-                                                                      // [group][kind][view][face].
+  std::vector<RenderConfig> share_configs_;  // One per view.
+  // Indexed [group][kind][view][face].
+  std::vector<std::array<HostArray<float, B>, Plan::kKinds>> faces_;
   std::vector<HostArray<float, B>> seen_;  // Indexed [group][view][pixel], if no sensor of the group has
                                            // depth.
   std::size_t render_count_ = 0;

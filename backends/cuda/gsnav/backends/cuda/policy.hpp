@@ -10,7 +10,7 @@
 /// multiprocessor at once, which limits the registers per thread.
 namespace gsnav::cuda::policy {
 
-/// Sizes of tiles, and which of the two ways a batch is drawn by.
+/// Sizes of tiles, and the choice between the two ways of drawing a batch.
 struct Batch {
   static constexpr int kTile = 16, kSmallTile = 8;  ///< Tile width in pixels. The small size is for few
                                                     ///< cameras.

@@ -5,7 +5,8 @@
 
 namespace cub {
 
-/// Like the toolkit's BlockScan, it requires a barrier before its storage is reused.
+/// Prefix sums over the threads of a block. As for the toolkit's BlockScan, a barrier is required before
+/// its storage is reused.
 template <class T, int Threads>
 class BlockScan {
  public:
