@@ -10,6 +10,7 @@
 #include <memory>
 #include <span>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
@@ -18,16 +19,35 @@
 
 namespace gsnav {
 
-/// Backends that draw many cameras in one call, each with sets of its own, into images in their own
-/// memory. Before a call their renderer is asked what it supports and how many cameras one call can draw
-/// (CudaBatchRenderer says what is asked of it).
-template <class B>
-concept BatchBackend = Backend<B> && !is_host_backend<B> &&
-                       requires(const typename B::batch_renderer& batch, const FrameJob<float>& job,
-                                std::span<const typename B::batch_renderer::camera_type> cameras) {
-  { B::batch_renderer::supports(*job.config, job.sets, job.meshes) } -> std::same_as<Status>;
-  { batch.capacity(job.sets, cameras) } -> std::same_as<std::size_t>;
+/// Draws many cameras in one call, each with sets of its own, into images in the backend's memory
+/// (CudaBatchRenderer says what each member does). It is asked before a call what it supports and how
+/// many cameras one call can draw, so that an error of `render` is one.
+template <class R, class B>
+concept BatchRenderer = std::constructible_from<R, B&, const RenderConfig&> &&
+    std::default_initializable<typename R::images_type> &&
+    requires(R& batch, const R& asked, const FrameJob<float>& job, std::span<const GaussianSet> sets,
+             std::span<const typename R::camera_type> cameras, typename R::camera_type& camera,
+             typename R::images_type& images) {
+  { R::supports(*job.config, sets, job.meshes) } -> std::same_as<Status>;
+  { asked.capacity(sets, cameras) } -> std::same_as<std::size_t>;
+  { batch.render(sets, cameras, std::as_const(images)) } -> std::same_as<Status>;
+  { batch.finish() } -> std::same_as<Status>;
+  camera = {*job.camera, camera.sets, job.meshes};
+  camera.sets = std::span<const std::uint32_t>();
+  camera.seen = std::span<const View<const std::uint32_t>>();
+  images.floats = FrameImages<float>();
 };
+
+/// Those that say how often `finish` drew the last call again; images of the others are whole only after
+/// `finish`.
+template <class R>
+concept CountsReruns = requires(const R& batch) {
+  { batch.stats().reruns } -> std::convertible_to<int>;
+};
+
+/// Backends that have such a renderer.
+template <class B>
+concept BatchBackend = Backend<B> && !is_host_backend<B> && BatchRenderer<typename B::batch_renderer, B>;
 
 /// Draws frames that share nothing by a backend's batched renderer: all frames of one size, rules and
 /// images by one call, or by as few as it has the capacity for. The bits are those of BasicRenderer.
@@ -122,10 +142,9 @@ class FrameBatch {
       }
     };
     // At once, so that nothing waits for the host in between; once more where scratch had to grow.
-    constexpr bool kSaysReruns = requires(const Batch& b) { b.stats().reruns; };
-    if constexpr (kSaysReruns) hand_out();
+    if constexpr (CountsReruns<Batch>) hand_out();
     if (Status s = known.batch->finish(); !s) return s;
-    if constexpr (kSaysReruns) {
+    if constexpr (CountsReruns<Batch>) {
       if (known.batch->stats().reruns == 0) return {};
     }
     hand_out();
