@@ -82,7 +82,7 @@ struct OneRow {
   }
   /// The element of `offsets` (one per origin) that belongs to the row.
   GSNAV_HD Vec3d offset(const View<const Vec3d>& offsets) const noexcept {
-    return offsets[shape.origin_ids.empty() ? 0 : shape.origin_ids[i]];
+    return offsets[origin_id(shape.origin_ids, i)];
   }
 };
 
