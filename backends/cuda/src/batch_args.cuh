@@ -88,7 +88,7 @@ struct alignas(16) SplatEntry {
 };
 
 /// A slot whose record is still to be computed, in double, from row `row` of an instance.
-struct HardSplat {
+struct HighPrecisionSplat {
   std::uint32_t slot, instance, row;
 };
 
@@ -186,7 +186,7 @@ struct BatchArgs {
   std::uint32_t* sources;     ///< per slot: first_rank of its instance + row as stored
   SplatDepth<float>* depths;  ///< null: no image sums depths, and medians are few beside survivors
   SplatPerspective<float>* perspectives;  ///< null: Response::ewa
-  HardSplat* hard;
+  HighPrecisionSplat* hard;
   SplatKey* several;
   LargeRow* large;
   /// [tiles << depth_bins.bits]: how many pairs; where the next goes, once lists have their places;

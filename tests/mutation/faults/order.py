@@ -76,7 +76,7 @@ FAULTS = [
           "    key.z = static_cast<float>(position.z * args.camera.scale);\n",
           "    key.z = dot(vec_cast<float>(args.camera.rotation.row[2]), key.delta);\n",
           ORDER, "N77_quantised_capture*", why="a reference with the kernels' fault would hide it"),
-    fault("visible_by_another_expression", "SeenRow",
+    fault("visible_by_another_expression", "ProjectedRow",
           "        splat(project<L, F>(camera, axes, key.z, ",
           "        splat(project<L, F>(camera, axes, static_cast<F>(axes.position.z * L(1.0000001f)), ",
           "tests/hard_cases/test_near.cpp", "N16_near_plane_cross"),

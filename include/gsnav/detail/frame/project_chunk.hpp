@@ -168,7 +168,7 @@ GSNAV_HD bool project_row(const ViewedSet<S>& args, bool depth, std::size_t i,
   RowKey<float> key = row_key<float>(args.camera64, row);
   if constexpr (sizeof(S) == sizeof(float)) {
     if (!(key.z > args.camera.near_plane)) return false;
-    const SeenRow<float> seen(args.camera, row, key);
+    const ProjectedRow<float> seen(args.camera, row, key);
     if (!seen.splat.visible) return false;
     out.key = sort_key(args.camera64, key);
     out.delta = key.delta;
@@ -179,7 +179,7 @@ GSNAV_HD bool project_row(const ViewedSet<S>& args, bool depth, std::size_t i,
     // The float64 reference computes its own depths, so that an error in `row_key` shows in comparisons.
     const Vec3d position = args.camera.rotation * key.delta64;
     key.z = static_cast<float>(position.z * args.camera.scale);
-    const SeenRow<double> seen(args.camera, row, key);
+    const ProjectedRow<double> seen(args.camera, row, key);
     if (!seen.splat.visible) return false;
     const bool by_z = args.camera.sort_order == SortOrder::z_depth;
     out.key = by_z ? key.z : static_cast<float>(norm(position) * args.camera.scale);
