@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "gsnav/detail/math/screw.hpp"
+#include "gsnav/detail/skin/fk.hpp"
 #include "gsnav/skin/lbs.hpp"
 
 namespace gsnav {
@@ -173,10 +174,7 @@ Result<MotionClip> clip_from_matrices(const Skeleton& skeleton, double frame_rat
       }
       const Affine3<double> rigid{polar_rotation(m.linear), m.translation};
       globals[j] = skinning ? rigid * binds[j] : rigid;
-      const std::int32_t parent = skeleton.parents[j];
-      const Affine3<double> local =
-          parent < 0 ? globals[j]
-                     : rigid_inverse(globals[static_cast<std::size_t>(parent)]) * globals[j];
+      const Affine3<double> local = joint_local(globals.data(), skeleton.parents[j], globals[j]);
       clip.rotations.push_back(quat_from_matrix(local.linear));
       clip.translations.push_back(local.translation);
     }

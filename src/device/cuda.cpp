@@ -2,9 +2,13 @@
 #include "gsnav/backends/cuda.hpp"
 
 #include "engines_on.hpp"
+#include "gsnav/detail/sim/frame_batch.hpp"
 
 namespace gsnav::detail {
 namespace {
+
+// A renderer that lacks a member of the concept would be passed over, and cameras drawn one by one.
+static_assert(BatchBackend<CudaBackend> && CountsReruns<CudaBatchRenderer>);
 
 std::unique_ptr<CudaBackend> make_cuda(const Device& device) {
   return std::make_unique<CudaBackend>(device.index());

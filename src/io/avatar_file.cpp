@@ -10,6 +10,7 @@
 #include "gsnav/detail/avatar/smpl_joints.hpp"
 #include "gsnav/detail/avatar/weight_gradients.hpp"
 #include "gsnav/detail/io/npz_file.hpp"
+#include "gsnav/detail/skin/fk.hpp"
 #include "gsnav/frame/sh.hpp"
 #include "npz_arrays.hpp"
 
@@ -56,11 +57,9 @@ class AvatarReader {
       const Affine3<double>& m = skeleton.inverse_binds[j];
       // Float32 matrices are only approximately rigid.
       globals.push_back(rigid_inverse(Affine3<double>{polar_rotation(m.linear), m.translation}));
-      const std::int32_t parent = skeleton.parents[j];
-      skeleton.rest_local.push_back(parent < 0 || static_cast<std::size_t>(parent) >= j
-                                        ? globals[j]
-                                        : rigid_inverse(globals[static_cast<std::size_t>(parent)]) *
-                                              globals[j]);
+      // One that comes later is refused below.
+      const std::int32_t parent = std::min(skeleton.parents[j], static_cast<std::int32_t>(j) - 1);
+      skeleton.rest_local.push_back(joint_local(globals.data(), parent, globals[j]));
     }
     if (Status s = skeleton.validate(); !s) return {s.code(), file_.source() + ": " + s.message()};
     return {};

@@ -28,8 +28,6 @@ class CornerHubs {
 
   bool empty() const noexcept { return first_sight_.empty(); }
   std::size_t corners() const noexcept { return corners_.size(); }
-  std::size_t sights() const noexcept { return sights_.size(); }
-  std::size_t labels() const noexcept { return labels_.size(); }
 
   /// A path that bends: straight from the start to corner `first`, by the shortest path to `last`, and
   /// straight to the goal.

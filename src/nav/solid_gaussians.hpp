@@ -29,8 +29,8 @@ struct PlacedSet {
   bool read(std::size_t i, double min_opacity, Solid& s) const {
     const ShapeRows& g = set->gaussians.shape;
     s.opacity = static_cast<double>(opacity_of(g, i));
-    const Vec3d o = g.origin_ids.empty() ? Vec3d{} : set->gaussians.origins[g.origin_ids[i]];
-    s.mean = set->world_from_asset * (o + vec_cast<double>(mean_of(g, i)));
+    const Vec3d mean = set->gaussians.origin_of(i) + vec_cast<double>(mean_of(g, i));
+    s.mean = set->world_from_asset * mean;
     if (!(s.opacity >= min_opacity) || !is_finite(s.mean)) return false;
     const Vec3d scales = vec_cast<double>(scales_of(g, i));
     s.axes = placed * rotation_matrix(quat_cast<double>(quat_of(g, i)));

@@ -6,10 +6,11 @@
 
 A fault names a function, the tokens to replace in it, and test cases. Each needs one translation unit of tests,
 header-only with OpenMP, the sources of what that includes of tests/, and at most the few library files that it
-names, so nothing is built before. First every named case must pass on the sources as they are; then the cases of
-each fault must fail. Exit status: 0 all faults are caught, 1 one is missed, 2 no verdict (the tokens do not stand
-in the function exactly once, a fault does not compile, a case fails without a fault). --check only looks whether
-each fault has its place: a second, and a test of every build.
+names (a .cu the emulated CUDA runtime), so nothing is built before. First every named case must pass on the sources
+as they are; then the cases of each fault must fail, on each backend by itself where the fault names backends. Exit
+status: 0 all faults are caught, 1 one is missed, 2 no verdict (the tokens do not stand in the function exactly
+once, a fault does not compile, a case fails without a fault). --check only looks whether each fault has its place:
+a second, and a test of every build.
 """
 import argparse
 import concurrent.futures
@@ -32,6 +33,8 @@ from sources import Sources  # noqa: E402
 FLAGS = ["-std=c++20", "-O1", "-ffp-contract=off", "-fopenmp", "-DGSNAV_OPENMP_HEADER_ONLY", "-w", "-Iinclude",
          "-Ibackends/serial", "-Ibackends/openmp", "-Itests", "-Isrc/io", '-DGSNAV_DATA_DIR="/nonexistent"']
 FOLDERS = ("include", "backends", "src", "tests")
+EMULATED = "backends/cuda/emulated"
+REWRITTEN = "rewritten"  # device code as C++, in each tree
 CASE_TIMEOUT_S = 600
 
 
@@ -102,14 +105,31 @@ class Bench:
 
     def build(self, fault, binary, tree=None):
         """Its test, with the fault or without. Returns what the compiler said, or nothing."""
-        sources = [fault.source, *sources_beside(self.tree, fault.source), *fault.more]
-        done = self.run([self.cxx, *FLAGS, *sources, str(self.main), "-o", str(binary)], cwd=tree)
+        tree = tree or self.tree
+        sources, flags = [fault.source, *sources_beside(self.tree, fault.source), *fault.more], FLAGS
+        if fault.source.endswith(".cu"):
+            sources[0] = self.device_code_as_cpp(tree, fault.source)
+            sources += [f"{EMULATED}/{name}.cpp" for name in ("blocks", "fiber", "memory", "runtime", "settings")]
+            flags = [*FLAGS, f"-I{REWRITTEN}", f"-I{EMULATED}", f"-I{EMULATED}/include", "-Ibackends/cuda",
+                     "-DGSNAV_HAS_CUDA"]
+        done = self.run([self.cxx, *flags, *sources, str(self.main), "-o", str(binary)], cwd=tree)
         return "" if done.returncode == 0 else done.stderr.strip() or "the compiler failed"
 
-    def fails(self, binary, case):
-        """How a test case ended, or nothing where it passed."""
+    def device_code_as_cpp(self, tree, source):
+        """Rewrites a test and all device headers. Returns the test's new path in the tree."""
+        headers = [f.relative_to(tree / "backends/cuda") for f in (tree / "backends/cuda").rglob("*.cuh")
+                   if "emulated" not in f.parts]
+        test = pathlib.Path(REWRITTEN) / pathlib.Path(source).with_suffix(".cpp").name
+        for from_, to in ((source, test), *((f"backends/cuda/{h}", pathlib.Path(REWRITTEN) / h) for h in headers)):
+            (tree / to).parent.mkdir(parents=True, exist_ok=True)
+            self.run([sys.executable, f"{EMULATED}/rewrite.py", str(from_), str(to)], cwd=tree, check=True)
+        return str(test)
+
+    def fails(self, binary, case, backend=None):
+        """How a test case ended, on one backend or all, or nothing where it passed."""
+        env = os.environ | ({"GSNAV_CASES_ON": backend} if backend else {})
         try:
-            done = self.run([str(binary), f"-tc={case}"], timeout=CASE_TIMEOUT_S)
+            done = self.run([str(binary), f"-tc={case}"], timeout=CASE_TIMEOUT_S, env=env)
         except subprocess.TimeoutExpired:
             return "timeout"
         if "test cases: 0 |" in " ".join(done.stdout.split()):
@@ -153,9 +173,12 @@ def check_fault(bench, fault, scratch):
         binary = scratch / f"{fault.name}.bin"
         if said := bench.build(fault, binary, tree):
             return "BROKEN", "does not compile: " + next((l for l in said.splitlines() if "error" in l), said)
-        missed = [c for c in fault.cases if not bench.fails(binary, c)]
+        runs = [(c, b) for c in fault.cases for b in (fault.on or [None])]
+        missed = [f"{c} on {b}" if b else c for c, b in runs if not bench.fails(binary, c, b)]
         binary.unlink()
-        return ("MISSED", ", ".join(missed)) if missed else ("caught", ", ".join(fault.cases))
+        if missed:
+            return "MISSED", ", ".join(missed)
+        return "caught", ", ".join(fault.cases) + (f" on each of {', '.join(fault.on)}" if fault.on else "")
     finally:
         shutil.rmtree(tree)
 
@@ -167,8 +190,8 @@ def check_unchanged(bench, faults, scratch, pool):
         binary = scratch / (source.replace("/", "_") + ".bin")
         if said := bench.build(some[0], binary):
             return [f"{source} does not compile: {said.splitlines()[0]}"]
-        cases = sorted({c for p in some for c in p.cases})
-        return [f"{source}: {c}: {how} without a fault" for c in cases if (how := bench.fails(binary, c))]
+        runs = sorted({(c, b) for p in some for c in p.cases for b in ("", *p.on)})
+        return [f"{source}: {c}: {how} without a fault" for c, b in runs if (how := bench.fails(binary, c, b))]
 
     by_source = {}
     for p in faults:

@@ -89,7 +89,7 @@ struct alignas(16) SplatEntry {
 };
 
 /// A slot whose record must be computed in double, from row `row` of an instance.
-struct HardSplat {
+struct HighPrecisionSplat {
   std::uint32_t slot, instance, row;
 };
 
@@ -189,7 +189,7 @@ struct BatchArgs {
   SplatDepth<float>* depths;  ///< Null if no image sums depths and there are few median depths compared
                               ///< with visible splats.
   SplatPerspective<float>* perspectives;  ///< Null for Response::ewa.
-  HardSplat* hard;
+  HighPrecisionSplat* hard;
   SplatKey* several;
   LargeRow* large;
   /// Shape [tiles << depth_bins.bits]. First the number of pairs; then, once lists have places, the

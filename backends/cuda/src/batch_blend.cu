@@ -211,7 +211,7 @@ __device__ SplatDepth<float> depth_record(const BatchArgs& a, std::uint32_t came
   const ViewedSet<float>& args = instance_of(a, camera, source).args;
   const ViewedRow row({args.gaussians.shape, source - args.first_rank}, args.offsets);
   const RowKey<float> key = row_key<float>(args.camera64, row);
-  const SeenRow<float> seen(args.camera, row, key);
+  const ProjectedRow<float> seen(args.camera, row, key);
   if (!gsnav::detail::needs_double(args.camera, seen.splat))
     return make_splat_depth(args.camera, seen.axes, seen.splat);
   SplatDepth<float> depth;

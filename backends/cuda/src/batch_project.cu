@@ -151,7 +151,7 @@ class WarpProjection {
     // For rows beyond the near plane.
     const auto project_row = [&](const ProjectionCamera<float>& camera, const auto& from,
                                  const auto& camera64) {
-      const SeenRow<float> seen_row(camera, from, out.key);
+      const ProjectedRow<float> seen_row(camera, from, out.key);
       if (!seen_row.splat.visible) return;
       out.hard = gsnav::detail::needs_double(camera, seen_row.splat);
       out.drawn = !out.hard && make_splat<Plain>(camera, camera64(), a_.depths != nullptr, out.key,
@@ -183,7 +183,7 @@ class WarpProjection {
     }
   }
 
-  __device__ void queue_hard(const HardSplat& splat) const {
+  __device__ void queue_hard(const HighPrecisionSplat& splat) const {
     const unsigned long long place = atomicAdd(&a_.counters->hard, 1ull);
     if (!Room && splat.slot != kNoSlot)
       a_.entries[splat.slot] = {0, 0, 0, kNoSlot};  // Until it has a record.
@@ -267,7 +267,7 @@ __global__ void __launch_bounds__(32 * Policy::kWarps, Policy::kResident)
 __global__ void __launch_bounds__(Policy::kHardThreads) project_hard_kernel(const BatchArgs a) {
   const std::uint32_t n = used(a.counters->hard, a.hard_capacity);
   for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < n; i += gridDim.x * blockDim.x) {
-    const HardSplat h = a.hard[i];
+    const HighPrecisionSplat h = a.hard[i];
     if (h.slot == kNoSlot) continue;
     const BatchInstance& instance = a.instances[h.instance];
     const ViewedSet<float>& args = instance.args;

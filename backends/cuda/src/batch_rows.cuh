@@ -124,7 +124,7 @@ __device__ inline SplatColor<float> row_color(const ColorRows& sh, int degree, s
   return gaussian_color<float>(v, degree, at, delta);
 }
 
-/// Row `at` of the warp, in the form that row_key and SeenRow read.
+/// Row `at` of the warp, in the form that row_key and ProjectedRow read.
 struct KeptRow {
   const WarpRows& rows;
   unsigned at;

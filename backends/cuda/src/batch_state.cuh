@@ -272,7 +272,7 @@ struct CudaBatchRenderer::State {
   Array<std::uint32_t> sources, zeroed, tile_counts, tile_begins, tile_order, long_parts;
   Array<SplatDepth<float>> depths;
   Array<SplatPerspective<float>> perspectives;
-  Array<cuda::HardSplat> hard;
+  Array<cuda::HighPrecisionSplat> hard;
   Array<cuda::ListPart> parts;
   Array<cuda::Pair> pairs, pairs_alt;
   Array<cuda::BeyondPair> beyond;

@@ -71,6 +71,17 @@ struct SeenRows {
   }
 };
 
+/// Of row i, its place in a list of values for each origin. `ids`: [N], or empty: all rows have the
+/// first.
+GSNAV_HD std::size_t origin_id(const View<const std::uint32_t>& ids, std::size_t i) noexcept {
+  return ids.empty() ? 0 : ids[i];
+}
+/// The origin of row i; without `origins` it is zero.
+GSNAV_HD Vec3d origin_of(const View<const std::uint32_t>& ids, const View<const Vec3d>& origins,
+                         std::size_t i) noexcept {
+  return origins.empty() ? Vec3d{} : origins[origin_id(ids, i)];
+}
+
 /// Positions, shapes and opacities of N Gaussians, in metres in the asset's frame. Shapes are in one of
 /// three encodings: quats and scales, axes, or codes.
 struct ShapeRows {
@@ -160,6 +171,10 @@ struct GaussianRows {
   GSNAV_HD std::size_t size() const noexcept { return shape.size; }
   /// Number of chunks.
   GSNAV_HD std::size_t chunk_count() const noexcept { return shape.chunk_count(); }
+  /// The origin of row i.
+  GSNAV_HD Vec3d origin_of(std::size_t i) const noexcept {
+    return gsnav::origin_of(shape.origin_ids, origins, i);
+  }
 };
 
 /// Number of leading words of `Selection::seen` that hold the bits of `chunks` chunks.

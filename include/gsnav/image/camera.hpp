@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "gsnav/math/mat.hpp"
+#include "gsnav/math/similarity.hpp"
 
 namespace gsnav {
 
@@ -25,6 +26,10 @@ struct Camera {
 
   /// Camera position in the world, metres.
   Vec3d position() const noexcept { return rigid_inverse(viewmat).translation; }
+  /// Camera position in the frame of an asset that stands so in the world.
+  Vec3d position_in(const Similarity& world_from_asset) const noexcept {
+    return inverse(world_from_asset) * position();
+  }
 
   /// Sets a w x h image with square pixels, a horizontal field of view in degrees and a centred
   /// principal point.

@@ -62,8 +62,8 @@ struct GaussianCloud {
 
   /// Mean of Gaussian i in the asset's frame, metres.
   Vec3d mean(std::size_t i) const noexcept {
-    const Vec3d o = origin_ids.empty() ? Vec3d{} : origins[origin_ids[i]];
-    return o + Vec3d{means[0][i], means[1][i], means[2][i]};
+    return origin_of(view_of(origin_ids), view_of(origins), i) +
+           Vec3d{means[0][i], means[1][i], means[2][i]};
   }
 
   /// Bytes of the arrays.

@@ -225,8 +225,7 @@ inline std::vector<ChunkBounds> packed_bounds(const PackedCloud& packed, std::si
   for (std::size_t c = 0; c < out.size(); ++c) {
     Aabb<double> box;
     for (std::size_t i = c * rows; i < std::min(v.size, (c + 1) * rows); ++i) {
-      const Vec3d origin = v.origin_ids.empty() ? Vec3d{} : all.origins[v.origin_ids[i]];
-      box.add(origin + vec_cast<double>(mean_of(v, i)));
+      box.add(all.origin_of(i) + vec_cast<double>(mean_of(v, i)));
       const Vec3f s = scales_of(v, i);
       out[c].scale_max = std::max({out[c].scale_max, s.x, s.y, s.z});
       out[c].opacity_max = std::max(out[c].opacity_max, opacity_of(v, i));

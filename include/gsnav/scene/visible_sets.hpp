@@ -110,7 +110,7 @@ struct VisibleSets {
     const bool known = std::max(camera.fx, camera.fy) <= focal * (1 + 1e-6) &&
                        camera.near_plane <= near_plane * (1 + 1e-6) && camera.near_sigma == near_sigma;
     if (!known) return {};
-    const auto key = key_of(inverse(world_from_asset) * camera.position(), cell);
+    const auto key = key_of(camera.position_in(world_from_asset), cell);
     if (!key) return {};
     const auto at = std::lower_bound(keys.begin(), keys.end(), *key);
     if (at == keys.end() || *at != *key) return {};

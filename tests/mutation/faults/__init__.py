@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Seeded faults, and the test cases that must notice them (tests/mutation/mutate.py).
 
-Each module here has a list FAULTS. The tokens to replace stand once in the function, whatever its file.
+Each module here has a list FAULTS. The tokens to replace stand once in the function, whatever its file. A fault of a
+rule that several backends use names them in `on`: the cases must fail on each of them alone. A test that is device
+code (.cu) runs on the emulated CUDA runtime.
 """
 from __future__ import annotations
 
@@ -23,9 +25,10 @@ class Fault:
     cases: tuple[str, ...]  # doctest cases in it; each must fail
     why: str = ""
     more: tuple[str, ...] = ()  # compiled with it: what the test needs of the libraries
+    on: tuple[str, ...] = ()    # backends of hard cases, each of which must notice it by itself
 
 
 def fault(name: str, function: str, old: str, new: str, source: str, *cases: str, why: str = "",
-          more: tuple[str, ...] = ()) -> Fault:
+          more: tuple[str, ...] = (), on: tuple[str, ...] = ()) -> Fault:
     """The usual kind: one edit."""
-    return Fault(name, (Edit(function, old, new),), source, cases, why, more)
+    return Fault(name, (Edit(function, old, new),), source, cases, why, more, on)

@@ -5,6 +5,7 @@ from . import fault
 STACK_TEST = "tests/hard_cases/test_stack.cpp"
 DEPTH_TEST = "tests/hard_cases/test_depth.cpp"
 CUT_TEST = "tests/hard_cases/test_determinism.cpp"
+ORDER_TEST = "tests/hard_cases/test_order.cpp"
 
 OPEN = "transmittance >= L(rules.transmittance_min)"
 WEIGHT = "L weight = select(drawn, alpha * before, zero);"
@@ -98,6 +99,10 @@ FAULTS = [
           "normalize_closed: a closed pixel is divided by its alpha, an open one is not"),
     fault("open_pixel_normalized", "finished", "select(open, t, L(S(0)))", "L(S(0))", STACK_TEST,
           "normalize_closed: a closed pixel is divided by its alpha, an open one is not"),
+    fault("blue_written_as_green", "write_pixel", "image[3 * pixel + 1] = value.y;", "image[3 * pixel + 1] = value.z;",
+          ORDER_TEST, "N21_depth_tie_stack", on=("serial",)),
+    fault("blue_written_as_green_in_lanes", "write_color", "y[i] = v.y;", "y[i] = v.z;",
+          ORDER_TEST, "N21_depth_tie_stack", on=("openmp",)),
     fault("empty_pixel_divided", "pixel_expected_depth", RETURNED, "const mask_of<L> returned(true);",
           DEPTH_TEST, "N48_depth_no_return", why="0 / 0 where nothing is"),
     fault("return_alpha_ignored", "pixel_expected_depth", RETURNED, "const auto returned = alpha > zero;",

@@ -35,7 +35,7 @@ FAULTS = [
     fault("sh_direction_not_unit", "view_direction",
           "const Vec3<L> unit = delta * (L(S(1)) / n);", "const Vec3<L> unit = delta;",
           TEST, "N39_sh_dir_zero"),
-    fault("sh_turned_forwards", "delta", "delta = rotate(conjugate(q), delta);", "delta = rotate(q, delta);",
+    fault("sh_turned_forwards", "turned_back", "rotate(conjugate(rotation), direction)", "rotate(rotation, direction)",
           TEST, "N61_sh_rotation_equiv", why="the direction is turned back, not on"),
     fault("sh_not_turned", "gaussian_color", "if (!rows.rotations.empty()) {", "if (degree > 9) {",
           TEST, "N61_sh_rotation_equiv", why="lights stay with the world when a body turns"),

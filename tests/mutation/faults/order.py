@@ -5,6 +5,8 @@ from . import fault
 FOOTPRINT = "tests/hard_cases/test_footprint.cpp"
 ORDER = "tests/hard_cases/test_order.cpp"
 KEYS = "tests/hard_cases/test_keys.cpp"
+CULLING = "tests/hard_cases/test_culling.cpp"
+EACH = ("serial", "openmp")
 
 FAULTS = [
     fault("three_sigma_box", "project",
@@ -31,7 +33,7 @@ FAULTS = [
     fault("cull_by_means", "reach",
           "    const double reach = f * bounds.scale_max * sqrt(1 + limit * limit);\n",
           "    const double reach = 0 * f * bounds.scale_max * sqrt(1 + limit * limit);\n",
-          "tests/hard_cases/test_culling.cpp", "N65_cull_invariance of chunks in space",
+          CULLING, "N65_cull_invariance of chunks in space",
           why="a Gaussian beside the image reaches into it"),
     fault("slice_of_the_middle", "place_of",
           "      place.bucket = static_cast<std::uint16_t>(std::min(bucket, kBuckets - 1));\n",
@@ -49,7 +51,7 @@ FAULTS = [
           "tests/hard_cases/test_slices.cpp", "N65_cull_invariance of slices of depth"),
     fault("ties_in_sorted_order", "RankTies",
           "    heap_sort(order.data + i, end - i);\n", "",
-          "tests/hard_cases/test_culling.cpp", "N21_depth_ties_keep_file_order when rows are sorted in space"),
+          CULLING, "N21_depth_ties_keep_file_order when rows are sorted in space"),
     fault("perspective_box_centred", "add_perspective",
           "  out.center_x = select(ellipse, center_x, zero);\n"
           "  out.center_y = select(ellipse, center_y, zero);\n",
@@ -74,7 +76,7 @@ FAULTS = [
           "    key.z = static_cast<float>(position.z * args.camera.scale);\n",
           "    key.z = dot(vec_cast<float>(args.camera.rotation.row[2]), key.delta);\n",
           ORDER, "N77_quantised_capture*", why="a reference with the kernels' fault would hide it"),
-    fault("visible_by_another_expression", "SeenRow",
+    fault("visible_by_another_expression", "ProjectedRow",
           "        splat(project<L, F>(camera, axes, key.z, ",
           "        splat(project<L, F>(camera, axes, static_cast<F>(axes.position.z * L(1.0000001f)), ",
           "tests/hard_cases/test_near.cpp", "N16_near_plane_cross"),
@@ -98,6 +100,17 @@ FAULTS = [
     fault("last_tile_of_a_row_lost", "of",
           "tile_of(box.x1 - one)", "tile_of(box.x1 - one - one)",
           FOOTPRINT, "N11_tile_cover_conservative"),
+    fault("distance_of_the_asset", "distance_key", "norm(delta) * D(camera.scale)", "norm(delta)",
+          ORDER, "N22_depth_tie_grid", why="an asset that is placed larger is farther away, too"),
+    fault("last_pixel_of_a_box_lost", "pixel_range", "select(l > last, l - one, l) + one",
+          "select(l > last, l - one, l)",
+          ORDER, "N22_depth_tie_grid", on=EACH),
+    fault("rank_of_the_stored_row", "ViewedSet::rank_of",
+          "(gaussians.row_ids.empty() ? row : gaussians.row_ids[row])", "row",
+          CULLING, "N21_depth_ties_keep_file_order when rows are sorted in space", on=EACH),
+    fault("ranks_of_lanes_by_the_stored_row", "ranks_of", "args.rank_of(rows[l] < last ? rows[l] : last)",
+          "args.first_rank + (rows[l] < last ? rows[l] : last)",
+          CULLING, "N21_depth_ties_keep_file_order when rows are sorted in space", on=("openmp",)),
     fault("background_forgotten", "pixel_color",
           "return {fma(t, L(args.background.x), state.r),", "return {state.r,",
           KEYS, "N26_pair_count_zero"),

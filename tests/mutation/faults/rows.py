@@ -77,6 +77,8 @@ FAULTS = [
           "  return vec_cast<double>(vec_cast<float>(table.empty() ? Vec3d{} : table[o]) -\n"
           "                          vec_cast<float>(args.camera64.position));\n",
           WORLD, "N28_world_1e6", why="a difference of two large floats"),
+    fault("eye_in_the_world", "position_in", "return inverse(world_from_asset) * position();", "return position();",
+          WORLD, "N28_world_1e6", on=("serial", "openmp"), why="the offset of an asset that is placed elsewhere"),
     fault("cell_of_the_first", "push",
           "      cloud.origin_ids.push_back(id);\n",
           "      cloud.origin_ids.push_back(id > 1 ? 1u : id);\n",

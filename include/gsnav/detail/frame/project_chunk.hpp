@@ -10,7 +10,6 @@
 #include "gsnav/detail/frame/set_rows.hpp"
 #include "gsnav/detail/frame/splat.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
-#include "gsnav/detail/math/half.hpp"
 #include "gsnav/frame/gaussians.hpp"
 #include "gsnav/frame/sh.hpp"
 
@@ -128,6 +127,12 @@ GSNAV_HD Vec3<L> view_direction(const Vec3<L>& delta) noexcept {
           select(defined, unit.z, L(S(1)))};
 }
 
+/// A view direction turned back by the rotation of a Gaussian since training: where its SH see it from.
+template <class L>
+GSNAV_HD Vec3<L> turned_back(const Vec3<L>& direction, const Quat<L>& rotation) noexcept {
+  return rotate(conjugate(rotation), direction);
+}
+
 /// Colour of Gaussian i seen along `delta` (mean - camera, asset frame, any length), with SH up to
 /// `degree`.
 template <class S>
@@ -137,29 +142,11 @@ GSNAV_HD SplatColor<S> gaussian_color(const ColorRows& rows, int degree, std::si
     delta = view_direction(delta);
     if (!rows.rotations.empty()) {
       const Planes<const float, 4>& r = rows.rotations;
-      const Quat<S> q{S(r[0][i]), S(r[1][i]), S(r[2][i]), S(r[3][i])};
-      delta = rotate(conjugate(q), delta);
+      delta = turned_back(delta, Quat<S>{S(r[0][i]), S(r[1][i]), S(r[2][i]), S(r[3][i])});
     }
   }
-  if (rows.packed()) {
-    const Vec3<S> c = sh_color<S>(
-        degree, delta, [&](int k) GSNAV_INLINED { return vec_cast<S>(packed_coefficient(rows, i, k)); });
-    return {c.x, c.y, c.z, S(0)};
-  }
-  const float* sh0 = rows.sh0.data + 3 * i;
-  if (!rows.shN_half.empty()) {
-    const std::uint16_t* halves = rows.shN_half.data + rows.rest() * i;
-    const Vec3<S> c = sh_color<S>(degree, delta, [=](int k) GSNAV_INLINED {
-      if (k == 0) return Vec3<S>{S(sh0[0]), S(sh0[1]), S(sh0[2])};
-      const std::uint16_t* p = halves + 3 * (k - 1);
-      return Vec3<S>{S(half_to_float(p[0])), S(half_to_float(p[1])), S(half_to_float(p[2]))};
-    });
-    return {c.x, c.y, c.z, S(0)};
-  }
-  const float* shn = rows.shN.data + rows.rest() * i;
-  const Vec3<S> c = sh_color<S>(degree, delta, [=](int k) GSNAV_INLINED {
-    const float* p = k == 0 ? sh0 : shn + 3 * (k - 1);
-    return Vec3<S>{S(p[0]), S(p[1]), S(p[2])};
+  const Vec3<S> c = with_coefficients(rows, i, [&](const auto& coefficient) GSNAV_INLINED {
+    return sh_color<S>(degree, delta, [&](int k) GSNAV_INLINED { return vec_cast<S>(coefficient(k)); });
   });
   return {c.x, c.y, c.z, S(0)};
 }
@@ -181,7 +168,7 @@ GSNAV_HD bool project_row(const ViewedSet<S>& args, bool depth, std::size_t i,
   RowKey<float> key = row_key<float>(args.camera64, row);
   if constexpr (sizeof(S) == sizeof(float)) {
     if (!(key.z > args.camera.near_plane)) return false;
-    const SeenRow<float> seen(args.camera, row, key);
+    const ProjectedRow<float> seen(args.camera, row, key);
     if (!seen.splat.visible) return false;
     out.key = sort_key(args.camera64, key);
     out.delta = key.delta;
@@ -192,7 +179,7 @@ GSNAV_HD bool project_row(const ViewedSet<S>& args, bool depth, std::size_t i,
     // The float64 reference computes its own depths, so that an error in `row_key` shows in comparisons.
     const Vec3d position = args.camera.rotation * key.delta64;
     key.z = static_cast<float>(position.z * args.camera.scale);
-    const SeenRow<double> seen(args.camera, row, key);
+    const ProjectedRow<double> seen(args.camera, row, key);
     if (!seen.splat.visible) return false;
     const bool by_z = args.camera.sort_order == SortOrder::z_depth;
     out.key = by_z ? key.z : static_cast<float>(norm(position) * args.camera.scale);

@@ -11,11 +11,11 @@
 
 // Formulas that turn a row of a set into the records of its splat, for one row or a pack of rows. The
 // drivers (serial kernel, SIMD kernels, CUDA kernels) contribute loops, masks and memory. They call the
-// formulas in this order: row_key, near plane, SeenRow, needs_double and pixel_box, splat_geometry.
+// formulas in this order: row_key, near plane, ProjectedRow, needs_double and pixel_box, splat_geometry.
 
 namespace gsnav {
 
-/// Rows of a set relative to a camera: the input of row_key and SeenRow.
+/// Rows of a set relative to a camera: the input of row_key and ProjectedRow.
 template <class At>
 struct ViewedRows : SetRows<At> {
   using L = typename At::lane;
@@ -79,13 +79,13 @@ GSNAV_HD SplatAxes<L> row_axes(const Mat3<scalar_of<L>>& rotation, const Vec3<L>
 /// A row projected to the image, computed in L. Members are initialised in place: packs assigned to a
 /// struct are copied through memory.
 template <class L>
-struct SeenRow {
+struct ProjectedRow {
   SplatAxes<L> axes;
   Projected<L> splat;
 
   template <class Row, class F>
-  GSNAV_HD SeenRow(const ProjectionCamera<scalar_of<L>>& camera, const Row& row,
-                   const RowKey<F>& key) noexcept
+  GSNAV_HD ProjectedRow(const ProjectionCamera<scalar_of<L>>& camera, const Row& row,
+                        const RowKey<F>& key) noexcept
       : axes(row_axes<L>(camera.rotation, delta_of<L>(key), row)),
         splat(project<L, F>(camera, axes, key.z, static_cast<L>(row.opacity()))) {}
 };
@@ -252,8 +252,8 @@ struct Splat {
 /// Returns false if no pixel centre lies in its bounds.
 /// @tparam GeometryOnly neither depth nor perspective is requested
 template <bool GeometryOnly, class T, class U, class S>
-GSNAV_HD bool make_splat(const ProjectionCamera<T>& camera, bool depth, const SeenRow<T>& seen, U mean_x,
-                         U mean_y, Splat<S>& out) noexcept {
+GSNAV_HD bool make_splat(const ProjectionCamera<T>& camera, bool depth, const ProjectedRow<T>& seen,
+                         U mean_x, U mean_y, Splat<S>& out) noexcept {
   if (!detail::splat_bounds(camera, seen.splat, out.bounds)) return false;
   const ReferencePixel<T> ref = reference_of<T>(camera.width, camera.height, mean_x, mean_y);
   out.geometry = record_cast<S>(splat_geometry(seen.splat, ref));
@@ -268,7 +268,7 @@ GSNAV_HD bool make_splat(const ProjectionCamera<T>& camera, bool depth, const Se
 /// Makes the records of a row for which float is precise enough. Only its mean is computed in double.
 template <bool GeometryOnly>
 GSNAV_HD bool make_splat(const ProjectionCamera<float>& camera, const ProjectionCamera<double>& camera64,
-                         bool depth, const RowKey<float>& key, const SeenRow<float>& seen,
+                         bool depth, const RowKey<float>& key, const ProjectedRow<float>& seen,
                          Splat<float>& out) noexcept {
   double mean_x, mean_y;
   detail::project_mean(camera64, key.delta64, mean_x, mean_y);
@@ -280,7 +280,7 @@ GSNAV_HD bool make_splat(const ProjectionCamera<float>& camera, const Projection
 template <class S, class Row>
 GSNAV_HD bool make_splat64(const ProjectionCamera<double>& camera, bool depth, const Row& row,
                            const RowKey<float>& key, Splat<S>& out) noexcept {
-  const SeenRow<double> seen(camera, row, key);
+  const ProjectedRow<double> seen(camera, row, key);
   return make_splat<false>(camera, depth, seen, seen.splat.mean_x, seen.splat.mean_y, out);
 }
 

@@ -87,7 +87,7 @@ ProjectionCamera<S> make_projection_camera(const Camera& camera, const GaussianS
   const Similarity& a = set.world_from_asset;
   const Mat3d rotation = camera.viewmat.linear * rotation_matrix(a.rotation);
   p.rotation = mat_cast<S>(rotation);
-  p.position = inverse(a) * camera.position();
+  p.position = camera.position_in(a);
   p.scale = static_cast<S>(a.scale);
   p.fx = static_cast<S>(camera.fx);
   p.fy = static_cast<S>(camera.fy);

@@ -59,6 +59,13 @@ GSNAV_HD L unpack_opacity(const L& code) noexcept {
 /// Index in PackedChunk::sh_steps for coefficient k >= 1.
 GSNAV_HD constexpr int packed_band(int k) noexcept { return k < 4 ? 0 : k < 9 ? 1 : 2; }
 
+/// One value of an SH coefficient as it is stored: a float, a half, or a code with its chunk's step.
+GSNAV_HD float sh_value(float stored) noexcept { return stored; }
+GSNAV_HD float sh_value(std::uint16_t stored) noexcept { return half_to_float(stored); }
+GSNAV_HD float sh_value(std::int8_t stored, float step) noexcept {
+  return static_cast<float>(stored) * step;
+}
+
 /// Reads one row of a set, as SetRows needs it.
 struct OneRow {
   using lane = float;
@@ -75,7 +82,7 @@ struct OneRow {
   }
   /// The element of `offsets` (one per origin) that belongs to the row.
   GSNAV_HD Vec3d offset(const View<const Vec3d>& offsets) const noexcept {
-    return offsets[shape.origin_ids.empty() ? 0 : shape.origin_ids[i]];
+    return offsets[origin_id(shape.origin_ids, i)];
   }
 };
 
@@ -139,21 +146,42 @@ GSNAV_HD float opacity_of(const ShapeRows& shape, std::size_t i) noexcept {
   return SetRows<OneRow>{{shape, i}}.opacity();
 }
 
+/// Value `at` of the bands above degree 0 ([N][rest]), whichever way they are kept. It is of coefficient
+/// k of a row of `chunk`.
+GSNAV_HD float band_value(const ColorRows& rows, std::size_t at, std::size_t chunk, int k) noexcept {
+  if (rows.packed() && !rows.shN_codes.empty())
+    return sh_value(rows.shN_codes[at], rows.chunks[chunk].sh_steps[packed_band(k)]);
+  return rows.shN_half.empty() ? sh_value(rows.shN[at]) : sh_value(rows.shN_half[at]);
+}
+
+/// Three values from p on, as they are stored.
+template <class Stored>
+GSNAV_HD Vec3<float> sh_values(const Stored* p) noexcept {
+  return {sh_value(p[0]), sh_value(p[1]), sh_value(p[2])};
+}
+
 /// Coefficient k of row i of packed colours, for bands stored as codes, halves or floats.
 GSNAV_HD Vec3<float> packed_coefficient(const ColorRows& rows, std::size_t i, int k) noexcept {
-  const auto halves = [](const std::uint16_t* p) GSNAV_INLINED {
-    return Vec3<float>{half_to_float(p[0]), half_to_float(p[1]), half_to_float(p[2])};
+  if (k == 0) return sh_values(rows.sh0_half.data + 3 * i);
+  const std::size_t at = rows.rest() * i + 3 * static_cast<std::size_t>(k - 1),
+                    chunk = i / kProjectChunk;
+  return {band_value(rows, at, chunk, k), band_value(rows, at + 1, chunk, k),
+          band_value(rows, at + 2, chunk, k)};
+}
+
+/// f(coefficient) of what reads row i of any colours: coefficient(k) is its Vec3<float> k. The encoding
+/// is looked up once, before.
+template <class F>
+GSNAV_HD auto with_coefficients(const ColorRows& rows, std::size_t i, const F& f) noexcept {
+  if (rows.packed()) return f([&](int k) GSNAV_INLINED { return packed_coefficient(rows, i, k); });
+  const float* const sh0 = rows.sh0.data + 3 * i;
+  const auto of_bands = [=, &f](const auto* bands) GSNAV_INLINED {
+    return f([=](int k)
+                 GSNAV_INLINED { return k == 0 ? sh_values(sh0) : sh_values(bands + 3 * (k - 1)); });
   };
-  if (k == 0) return halves(rows.sh0_half.data + 3 * i);
-  const std::size_t at = rows.rest() * i + 3 * static_cast<std::size_t>(k - 1);
-  if (!rows.shN_codes.empty()) {
-    const float step = rows.chunks[i / kProjectChunk].sh_steps[packed_band(k)];
-    const std::int8_t* p = rows.shN_codes.data + at;
-    return {static_cast<float>(p[0]) * step, static_cast<float>(p[1]) * step,
-            static_cast<float>(p[2]) * step};
-  }
-  if (!rows.shN_half.empty()) return halves(rows.shN_half.data + at);
-  return {rows.shN[at], rows.shN[at + 1], rows.shN[at + 2]};
+  const std::size_t at = rows.rest() * i;
+  if (!rows.shN_half.empty()) return of_bands(rows.shN_half.data + at);
+  return of_bands(rows.shN.data + at);
 }
 
 }  // namespace gsnav

@@ -93,7 +93,7 @@ struct BoundChunkAt {
     bool first = true;
     for (std::size_t i = begin; i < end; ++i) {
       if (!(rows.opacities[i] > 0)) continue;
-      const Vec3d origin = rows.origin_ids.empty() ? Vec3d{} : moment.origins[rows.origin_ids[i]];
+      const Vec3d origin = moment.origin_of(i);
       for (int k = 0; k < 3; ++k) {
         const std::size_t axis = static_cast<std::size_t>(k);
         const double offset = static_cast<double>(rows.means[axis][i]), x = origin[k] + offset;

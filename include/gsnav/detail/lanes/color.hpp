@@ -31,8 +31,7 @@ GSNAV_HD SplatColor<F> gaussian_colors(const ColorRows& sh, int degree, const st
       for (std::size_t k = 0; k < 4; ++k) {
         for (int l = 0; l < kWidth; ++l) q[k][l] = sh.rotations[k][rows[l]];
       }
-      const Quat<F> turned{F::load(q[0]), F::load(q[1]), F::load(q[2]), F::load(q[3])};
-      delta = rotate(conjugate(turned), delta);
+      delta = turned_back(delta, Quat<F>{F::load(q[0]), F::load(q[1]), F::load(q[2]), F::load(q[3])});
     }
   }
   // Plain vectors, because packs would be initialised first.
@@ -43,7 +42,7 @@ GSNAV_HD SplatColor<F> gaussian_colors(const ColorRows& sh, int degree, const st
   for (int l = 0; l < kWidth; ++l) {
     const std::size_t row = rows[l];
     if (packed) {
-      for (std::size_t k = 0; k < 3; ++k) widened[l][k] = half_to_float(sh.sh0_half[3 * row + k]);
+      for (std::size_t k = 0; k < 3; ++k) widened[l][k] = sh_value(sh.sh0_half[3 * row + k]);
     }
     at[l] = packed ? widened[l] : sh.sh0.data + 3 * row;
   }
@@ -61,7 +60,7 @@ GSNAV_HD SplatColor<F> gaussian_colors(const ColorRows& sh, int degree, const st
       for (int k = 0; k < kGroup; ++k) steps[k] = chunk.sh_steps[packed_band(1 + (from + k) / 3)];
       for (int l = 0; l < kWidth; ++l) {
         const std::int8_t* codes = sh.shN_codes.data + stride * rows[l] + from;
-        for (int k = 0; k < kGroup; ++k) widened[l][k] = static_cast<float>(codes[k]) * steps[k];
+        for (int k = 0; k < kGroup; ++k) widened[l][k] = sh_value(codes[k], steps[k]);
         at[l] = widened[l];
       }
     } else if (sh.shN_half.empty()) {
@@ -69,7 +68,7 @@ GSNAV_HD SplatColor<F> gaussian_colors(const ColorRows& sh, int degree, const st
     } else {
       for (int l = 0; l < kWidth; ++l) {
         const std::uint16_t* halves = sh.shN_half.data + stride * rows[l] + from;
-        for (int k = 0; k < kGroup; ++k) widened[l][k] = half_to_float(halves[k]);
+        for (int k = 0; k < kGroup; ++k) widened[l][k] = sh_value(halves[k]);
         at[l] = widened[l];
       }
     }

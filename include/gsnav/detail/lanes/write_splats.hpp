@@ -21,7 +21,7 @@ inline namespace GSNAV_LANES_TAG {
 struct ProjectedPack {
   std::size_t first;
   const RowKey<F>& key;
-  const SeenRow<F>& seen;
+  const ProjectedRow<F>& seen;
 };
 
 namespace detail {

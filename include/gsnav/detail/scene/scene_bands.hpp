@@ -10,7 +10,6 @@
 
 #include "gsnav/detail/core/pool_backend.hpp"
 #include "gsnav/detail/frame/set_rows.hpp"
-#include "gsnav/detail/math/half.hpp"
 #include "gsnav/detail/scene/needed_bands.hpp"
 #include "gsnav/frame/gaussians.hpp"
 
@@ -29,13 +28,6 @@ inline SceneBands scene_bands(const GaussianRows& cloud, double unseen = 0) {
   const ColorRows& sh = cloud.color;
   const std::size_t size = cloud.size(), rest = sh.rest();
   out.chunk_sh_degrees.assign(cloud.chunk_count(), static_cast<std::uint8_t>(sh.degree));
-  const auto number = [&](std::size_t at, std::size_t chunk, int k) {
-    if (!sh.shN_codes.empty()) {
-      const float step = sh.chunks[chunk].sh_steps[packed_band(k)];
-      return static_cast<double>(static_cast<float>(sh.shN_codes[at]) * step);
-    }
-    return static_cast<double>(sh.shN_half.empty() ? sh.shN[at] : half_to_float(sh.shN_half[at]));
-  };
   std::vector<double> errors(out.chunk_sh_degrees.size());
   PoolBackend backend(threads_for(size));
   backend.parallel_for(errors.size(), [&](std::size_t c) {
@@ -47,7 +39,8 @@ inline SceneBands scene_bands(const GaussianRows& cloud, double unseen = 0) {
         for (int l = sh.degree; l > 0; --l) {
           double squares = 0;
           for (int k = sh_coefficient_count(l - 1); k < sh_coefficient_count(l); ++k) {
-            const double v = number(rest * i + 3 * static_cast<std::size_t>(k - 1) + channel, c, k);
+            const std::size_t at = rest * i + 3 * static_cast<std::size_t>(k - 1) + channel;
+            const double v = static_cast<double>(band_value(sh, at, c, k));
             squares += v * v;
           }
           error += std::sqrt(squares * (2 * l + 1) / (4 * std::numbers::pi));

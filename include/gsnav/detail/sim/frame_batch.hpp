@@ -10,6 +10,7 @@
 #include <memory>
 #include <span>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
@@ -18,16 +19,36 @@
 
 namespace gsnav {
 
-/// Backends whose `batch_renderer` draws many cameras in one call, each with its own sets, into images
-/// in the backend's memory. `supports` says whether it can draw a frame, `capacity` how many cameras one
-/// call can draw. CudaBatchRenderer documents the members.
-template <class B>
-concept BatchBackend = Backend<B> && !is_host_backend<B> &&
-                       requires(const typename B::batch_renderer& batch, const FrameJob<float>& job,
-                                std::span<const typename B::batch_renderer::camera_type> cameras) {
-  { B::batch_renderer::supports(*job.config, job.sets, job.meshes) } -> std::same_as<Status>;
-  { batch.capacity(job.sets, cameras) } -> std::same_as<std::size_t>;
+/// A renderer that draws many cameras in one call, each with its own sets, into images in the backend's
+/// memory. `supports` says whether it can draw a frame, `capacity` how many cameras one call can draw.
+/// Both are asked before `render`, so an error of `render` is a failure. CudaBatchRenderer documents the
+/// members.
+template <class R, class B>
+concept BatchRenderer = std::constructible_from<R, B&, const RenderConfig&> &&
+    std::default_initializable<typename R::images_type> &&
+    requires(R& batch, const R& asked, const FrameJob<float>& job, std::span<const GaussianSet> sets,
+             std::span<const typename R::camera_type> cameras, typename R::camera_type& camera,
+             typename R::images_type& images) {
+  { R::supports(*job.config, sets, job.meshes) } -> std::same_as<Status>;
+  { asked.capacity(sets, cameras) } -> std::same_as<std::size_t>;
+  { batch.render(sets, cameras, std::as_const(images)) } -> std::same_as<Status>;
+  { batch.finish() } -> std::same_as<Status>;
+  camera = {*job.camera, camera.sets, job.meshes};
+  camera.sets = std::span<const std::uint32_t>();
+  camera.seen = std::span<const View<const std::uint32_t>>();
+  images.floats = FrameImages<float>();
 };
+
+/// Renderers that count how often `finish` drew the last call again. The images of other renderers are
+/// complete only after `finish`.
+template <class R>
+concept CountsReruns = requires(const R& batch) {
+  { batch.stats().reruns } -> std::convertible_to<int>;
+};
+
+/// Backends with a BatchRenderer as their `batch_renderer`.
+template <class B>
+concept BatchBackend = Backend<B> && !is_host_backend<B> && BatchRenderer<typename B::batch_renderer, B>;
 
 /// Draws independent frames with a backend's batched renderer. All frames of one size, configuration and
 /// kind of images are drawn by one call, or by the fewest calls that its capacity allows. Images have
@@ -127,10 +148,9 @@ class FrameBatch {
     };
     // The copies are enqueued before finish(), so that the device does not wait for the host. If scratch
     // had to grow, finish() has drawn the images again, and they are copied again.
-    constexpr bool kSaysReruns = requires(const Batch& b) { b.stats().reruns; };
-    if constexpr (kSaysReruns) hand_out();
+    if constexpr (CountsReruns<Batch>) hand_out();
     if (Status s = known.batch->finish(); !s) return s;
-    if constexpr (kSaysReruns) {
+    if constexpr (CountsReruns<Batch>) {
       if (known.batch->stats().reruns == 0) return {};
     }
     hand_out();

@@ -19,6 +19,13 @@ GSNAV_HD Affine3<S> joint_global(const Affine3<S>* globals, std::int32_t parent,
   return parent < 0 ? local : globals[static_cast<std::size_t>(parent)] * local;
 }
 
+/// The reverse: a joint's frame to its parent's. The parent's `globals` are there, and rigid.
+template <class S>
+GSNAV_HD Affine3<S> joint_local(const Affine3<S>* globals, std::int32_t parent,
+                                const Affine3<S>& global) noexcept {
+  return parent < 0 ? global : rigid_inverse(globals[static_cast<std::size_t>(parent)]) * global;
+}
+
 /// Arrays of forward kinematics for A actors that share a skeleton of J joints. "Global" is the actor's
 /// root frame, in metres. A local transform maps a joint's frame to its parent's frame.
 template <class S>
