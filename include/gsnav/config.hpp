@@ -6,6 +6,7 @@
 #if __cplusplus < 202002L
 #error "gsnav needs C++20: compile with -std=c++20 or later"
 // This header does not exist, so that the compiler stops here instead of listing follow-up errors.
+/// Name of a header that does not exist; it stops compilers with a clear message.
 #define GSNAV_STOP <gsnav needs -std=c++20 or later>
 #include GSNAV_STOP
 #endif

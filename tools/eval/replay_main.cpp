@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <numbers>
 #include <optional>
@@ -36,6 +37,7 @@ struct ReplayOptions {
   std::string video;
   int every = 1;
   int per_action = 1;
+  std::size_t first = 0, last = std::numeric_limits<std::size_t>::max();  // actions that are drawn
   bool inset = false;
 };
 
@@ -165,13 +167,14 @@ class Recorder {
     track_.yaws.push_back(now.agent.yaw);
     track_.times.push_back(now.time);
     track_.clearances.push_back(s.world().last_step().avatar_clearance);
-    if (step % static_cast<std::size_t>(replay_.every) != 0) return {};
-    for (int k = step == 0 ? replay_.per_action : 1; k <= replay_.per_action; ++k) {
-      const auto rgb = painter_.paint(between(last_, now, static_cast<double>(k) / replay_.per_action));
+    if (step % static_cast<std::size_t>(replay_.every) != 0 || step > replay_.last) return {};
+    const Moment before = std::exchange(last_, now);
+    if (step < replay_.first) return {};
+    for (int k = step <= replay_.first ? replay_.per_action : 1; k <= replay_.per_action; ++k) {
+      const auto rgb = painter_.paint(between(before, now, static_cast<double>(k) / replay_.per_action));
       if (!rgb) return rgb.status();
-      if (Status added = add(*rgb); !added) return added;
+      if (Status added = add(step, *rgb); !added) return added;
     }
-    last_ = now;
     return {};
   }
   Status close() {
@@ -182,11 +185,10 @@ class Recorder {
   }
 
  private:
-  Status add(const std::vector<std::uint8_t>& rgb) {
+  Status add(std::size_t step, const std::vector<std::uint8_t>& rgb) {
     if (video_ != nullptr) return video_->add(rgb);
     char name[32];
-    const std::size_t number =
-        pictures_++ * static_cast<std::size_t>(replay_.per_action > 1 ? 1 : replay_.every);
+    const std::size_t number = replay_.per_action == 1 ? step : pictures_++;
     std::snprintf(name, sizeof name, "%05zu.png", number);
     return gsnav::io::save_png_rgb8(fs::path(replay_.frames) / name, rgb, options_.width,
                                     options_.height);
@@ -259,6 +261,8 @@ int main(int argc, char** argv) try {
                  "images per action; the agent moves in a straight line between two steps")
       ->capture_default_str()
       ->check(CLI::Range(1, 100));
+  app.add_option("--first", r.first, "first action to draw; 0 is the start")->capture_default_str();
+  app.add_option("--last", r.last, "last action to draw (default: the end)");
   app.add_flag("--inset", r.inset, "draw the agent's own view in the corner")->needs("--eye");
   if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
   gsnav::Status s;

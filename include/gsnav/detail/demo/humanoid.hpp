@@ -14,19 +14,19 @@ namespace gsnav {
 
 /// Looks of a procedural person. Colours are display-referred, in [0, 1].
 struct HumanoidOptions {
-  double height = 1.70;        ///< Metres, in [1.0, 2.2].
-  double build = 1.0;          ///< Girth of body and limbs relative to the average, in [0.8, 1.3].
-  double shoulders = 1.0;      ///< Width of the shoulders relative to the average, in [0.85, 1.15].
-  bool long_hair = false;      ///< Whether the hair is long.
-  bool short_sleeves = false;  ///< Whether the sleeves are short.
-  std::uint64_t seed = 1;      ///< Seed of sampling and of colour noise.
-  int gaussians = 30000;       ///< Approximate number, in [2000, 400000].
-  int sh_degree = 0;           ///< 0 to 3; bands above 0 are zero.
-  Vec3d skin{0.80, 0.62, 0.52};
-  Vec3d hair{0.20, 0.14, 0.10};
-  Vec3d top{0.25, 0.38, 0.58};
-  Vec3d trousers{0.22, 0.23, 0.27};
-  Vec3d shoes{0.13, 0.12, 0.12};
+  double height = 1.70;          ///< Metres, in [1.0, 2.2].
+  double build = 1.0;            ///< Girth of body and limbs relative to the average, in [0.8, 1.3].
+  double shoulders = 1.0;        ///< Width of the shoulders relative to the average, in [0.85, 1.15].
+  bool long_hair = false;        ///< Whether the hair is long.
+  bool short_sleeves = false;    ///< Whether the sleeves are short.
+  std::uint64_t seed = 1;        ///< Seed of sampling and of colour noise.
+  int gaussians = 30000;         ///< Approximate number, in [2000, 400000].
+  int sh_degree = 0;             ///< 0 to 3; bands above 0 are zero.
+  Vec3d skin{0.80, 0.62, 0.52};  ///< Colour of the skin.
+  Vec3d hair{0.20, 0.14, 0.10};  ///< Colour of the hair.
+  Vec3d top{0.25, 0.38, 0.58};   ///< Colour of the shirt.
+  Vec3d trousers{0.22, 0.23, 0.27};  ///< Colour of the trousers.
+  Vec3d shoes{0.13, 0.12, 0.12};     ///< Colour of the shoes.
 };
 
 /// Returns invalid_argument naming the option that is out of range, or ok.

@@ -37,14 +37,14 @@ enum class DepthMode { none, median, any };
 /// Pointers to the images of one camera. Null: the image is not requested.
 template <class S>
 struct FrameImages {
-  S* rgb = nullptr;
-  S* alpha = nullptr;
-  S* median_depth = nullptr;
-  S* expected_depth = nullptr;
-  S* accumulated_depth = nullptr;
-  S* first_hit_depth = nullptr;
+  S* rgb = nullptr;                ///< [H][W][3].
+  S* alpha = nullptr;              ///< [H][W].
+  S* median_depth = nullptr;       ///< [H][W], metres.
+  S* expected_depth = nullptr;     ///< [H][W], metres.
+  S* accumulated_depth = nullptr;  ///< [H][W], metres.
+  S* first_hit_depth = nullptr;    ///< [H][W], metres.
 
-  GSNAV_HD DepthMode depth_mode() const noexcept;
+  GSNAV_HD DepthMode depth_mode() const noexcept;  ///< The cheapest mode that gives all these images.
   bool operator==(const FrameImages&) const = default;
 };
 

@@ -27,7 +27,7 @@ struct LoadAvatarOptions {
   /// Names and parents of the joints. Empty: `joint_names` and `joint_parents` of the file, or else SMPL
   /// for 24 joints and SMPL-X for 55.
   std::vector<std::string> joint_names;
-  std::vector<std::int32_t> joint_parents;
+  std::vector<std::int32_t> joint_parents;  ///< Parent of each joint, or -1 for the root.
   WeightOptions weights;  ///< How many weights are kept, and the poses in which the error of dropping
                           ///< the others is measured.
 };

@@ -13,8 +13,9 @@ namespace gsnav {
 /// into several joints.
 struct Leg {
   std::size_t hip = 0, knee = 0, ankle = 0;  ///< Indices of the joints.
-  std::vector<std::size_t> thigh, shin,
-      foot;  ///< Joints that move with each part, hip, knee and ankle included.
+  std::vector<std::size_t> thigh;            ///< Joints that move with the hip, itself included.
+  std::vector<std::size_t> shin;             ///< Joints that move with the knee, itself included.
+  std::vector<std::size_t> foot;             ///< Joints that move with the ankle, itself included.
 };
 
 /// Settings of lock_feet.

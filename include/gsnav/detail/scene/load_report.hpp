@@ -59,9 +59,9 @@ struct LoadReport {
   PackErrors packing;           ///< Errors of packing.
   bool moving = false;  ///< Whether the file has 4D Gaussians. first_time and last_time are then the
                         ///< least and the greatest of their own times, seconds.
-  double first_time = 0, last_time = 0;
-  Aabb<double> bounds{};              ///< Box of the kept means, asset frame.
-  std::vector<std::string> warnings;  ///< Everything else that a person should know.
+  double first_time = 0, last_time = 0;  ///< Range of time of a moving scene, seconds.
+  Aabb<double> bounds{};                 ///< Box of the kept means, asset frame.
+  std::vector<std::string> warnings;     ///< Everything else that a person should know.
 
   /// Counts a row that was read.
   void count(RowFate fate, bool clamped) noexcept {
