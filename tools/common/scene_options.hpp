@@ -38,6 +38,10 @@ struct SceneOptions {
   gsnav::Device device;
 };
 
+/// Adds those that say what the scene is: --scene (or its name alone), --up, --time, --density.
+void add_scene_file_options(CLI::App& app, SceneOptions& o);
+/// Adds --mesh: triangles beside the Gaussians.
+void add_scene_mesh_option(CLI::App& app, SceneOptions& o);
 /// Adds all of them; their defaults are `o`'s. `float64` as of add_device_option.
 void add_scene_options(CLI::App& app, SceneOptions& o, bool* float64 = nullptr);
 /// As the library takes them.

@@ -5,15 +5,20 @@
 #include <string>
 #include <vector>
 
+#include "../common/scene_options.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/nav.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 
 namespace gsnav_navmesh {
 
-/// What a file is, from its name.
-enum class InputKind { navmesh, mesh, gaussians };
-InputKind kind_of(const std::string& input);
+/// What a scene's name stands for, as far as the name says.
+enum class InputKind {
+  navmesh,    ///< a file of one
+  triangles,  ///< a file of triangles
+  scene,      ///< what gsnav::open_scene opens: Gaussians, or triangles of a Habitat scene
+};
+InputKind kind_of(const std::string& scene);
 
 /// Triangles that stand in the scene.
 struct StaticObject {
@@ -21,18 +26,15 @@ struct StaticObject {
   gsnav::Similarity placed;
 };
 
-struct Options {
-  std::string input;
-  std::string up = "auto";
+struct Options : gsnav_tools::SceneOptions {
   double scale = 1.0;
-  std::string mesh;  ///< triangles beside the Gaussians of the input
   std::vector<StaticObject> objects;
   std::string out, obj, png, settings_out;
   int mset_version = 2;  ///< of `out`
   gsnav::NavMeshSettings settings;
   int threads = 0;  ///< that share out the tiles; 0: one a core
+  bool cell_height_given = false, solid_alpha_given = false;
   gsnav::GaussianNavOptions gaussians;
-  std::vector<double> crop;      ///< x0 y0 z0 x1 y1 z1 in the world; empty: all of the scene
   std::optional<double> height;  ///< of the picture; a level's where it is not given
   std::optional<std::size_t> level;
   std::string visible_sets;  ///< file to write; empty: none

@@ -18,6 +18,8 @@
 
 namespace gsnav {
 
+struct NavMeshTriangles;  // gsnav/nav/navmesh.hpp
+
 /// How a scene's Gaussians are kept in memory.
 enum class CloudStorage : std::uint8_t {
   full,     ///< float32
@@ -41,10 +43,12 @@ struct OpenOptions {
   /// ground (guess_up), or else what the file's kind usually has; "keep": the world is the file's frame.
   std::string up = "auto";
   double time = 0;  ///< seconds; the moment of a scene that moves (4D Gaussians)
+  int level = 0;    ///< of a streamed set that is opened without `levels`; 0 is the finest
   CloudStorage storage = CloudStorage::full;
   /// SH bands that change no colour by more than this are let go. 0: those of zeros alone, which changes
   /// no image; kUnseenColor: those that nobody sees, for Quality::fast and levels of detail.
   double unseen_color = 0;
+  bool keep_zero_bands = false;            ///< keep all SH bands of the file, those of zeros too
   SceneLevels levels = SceneLevels::none;  ///< kept beside the scene's file once they were built
   /// Triangle meshes among the Gaussians, in the frame of the scene's file: .gltf and .glb with colours
   /// and textures, .obj and .ply grey.
@@ -59,6 +63,7 @@ struct OpenOptions {
   double cell_size = 0.05;                        ///< edge of its voxels, metres
   std::optional<Aabb<double>> crop{};             ///< build it in this box only; world, metres
   double agent_radius = 0.1, agent_height = 1.5;  ///< it is built for, metres
+  bool keep_triangles = false;                    ///< fill OpenedScene::triangles
 
   // ---- what is seen from where
   /// "": none; "auto": of the places on the NavMesh, read from beside the scene's file or found and kept
@@ -84,12 +89,14 @@ struct OpenOptions {
 struct OpenedScene {
   std::string name;  ///< as it was asked for; "embedded flat" for "default"
   std::shared_ptr<const SimulatorScene>
-      scene;                       ///< of it assets[0] are the Gaussians, where there are any
-  LoadReport report;               ///< of reading the Gaussians
-  std::string up = "y";            ///< axis of the file that was taken as up, as OpenOptions::up has it
-  bool up_guessed = false;         ///< from the ground, report.up_confidence
-  std::string navmesh_source;      ///< "from the mesh", "from FILE", ...; empty: there is none
-  std::vector<std::string> notes;  ///< what was found and made, step by step
+      scene;                   ///< of it assets[0] are the Gaussians, where there are any
+  LoadReport report;           ///< of reading the Gaussians
+  std::string up = "y";        ///< axis of the file that was taken as up, as OpenOptions::up has it
+  bool up_guessed = false;     ///< from the ground, report.up_confidence
+  std::string navmesh_source;  ///< "from the mesh", "from FILE", ...; empty: there is none
+  /// World; those that a NavMesh may be built of. Null without OpenOptions::keep_triangles.
+  std::shared_ptr<const NavMeshTriangles> triangles;
+  std::vector<std::string> notes;                ///< what was found and made, step by step
   std::vector<std::string> warnings;             ///< what was left out or taken otherwise than asked for
   double load_seconds = 0, navmesh_seconds = 0;  ///< time taken
 };
