@@ -79,9 +79,9 @@ struct EngineFactory {
 extern const EngineFactory serial_engines;
 #if defined(GSNAV_DEVICE_OPENMP)
 extern const EngineFactory openmp_engines;
-/// Threads that a CPU device of so many has, and the name of its SIMD lanes.
+/// Threads that a CPU device of so many has, and the instruction set in use, for people.
 int cpu_threads(int threads);
-const char* cpu_lanes();
+std::string cpu_instruction_set();
 #endif
 #if defined(GSNAV_DEVICE_CUDA)
 extern const EngineFactory cuda_engines;

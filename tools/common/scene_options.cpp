@@ -4,7 +4,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
-#include "device_option.hpp"
 #include "gsnav/core/lower_case.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/scene/prepare.hpp"

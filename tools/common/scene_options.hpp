@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "device_option.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/open.hpp"
 #include "gsnav/render.hpp"

@@ -46,7 +46,8 @@ class Device {
 
   /// As parse takes it: "serial", "cpu", "cpu:4", "cuda:0".
   std::string name() const;
-  /// For people: "CPU, 4 threads, avx2 lanes" or "NVIDIA H100 80GB HBM3 (cuda:0)".
+  /// For people: "CPU, 4 threads, AVX2" or "NVIDIA H100 80GB HBM3 (cuda:0)". The instruction set is the
+  /// one in use; on a processor without FMA the text says how much slower frames are.
   std::string description() const;
 
   bool operator==(const Device&) const = default;
