@@ -18,7 +18,7 @@ namespace gsnav {
 /// World frame: metres, Y up, floor at y = 0, ceiling at 2.7; inside walls x in [0, 10], z in [0, 8].
 /// Four furnished rooms joined by five openings, so that most targets can be reached two ways.
 struct DefaultScene {
-  GaussianCloud cloud;                                  ///< SH degree 0, light baked in
+  GaussianCloud cloud;                                  ///< light baked in
   std::vector<Vec3d> vertices;                          ///< the same surfaces as a mesh
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< counter-clockwise seen from the front
   Aabb<double> bounds{};                                ///< of the Gaussians' means
@@ -33,7 +33,8 @@ struct DefaultView {
 /// Eye-level viewpoints, one a room, the living room first.
 std::array<DefaultView, 4> default_scene_views() noexcept;
 
-/// Most Gaussians that SceneSampling::gaussians may ask for. They take 6 GB while they are made.
+/// Most Gaussians that SceneSampling::gaussians may ask for. They take 6 GB while they are made, 15 GB
+/// with SH degree 3.
 inline constexpr std::size_t kMostSceneGaussians = 50'000'000;
 
 /// How finely the surfaces of a generated scene are covered with Gaussians. Gaussians are as wide as
@@ -44,7 +45,10 @@ struct SceneSampling {
   /// least one for each of its surfaces, some ten thousand: the error says how many.
   std::size_t gaussians = 0;
   double density = 1.0;  ///< scales the number of Gaussians, [0.05, 20]; 1: about 390,000 for the flat
-  int threads = 0;       ///< 0: one a core, at most 16. Does not change the scene.
+  /// 0 to 3. Above 0 surfaces have a sheen: they are brighter where the light of windows and lamps is
+  /// mirrored, and as bright as with degree 0 on average over all directions.
+  int sh_degree = 0;
+  int threads = 0;                       ///< 0: one a core, at most 16. Does not change the scene.
   std::function<void(double)> progress;  ///< called with the share that is done, (0, 1], by one thread
 };
 
