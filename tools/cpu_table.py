@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Makes the table of CPU renderers in docs/benchmarks.md: time, error and memory of gsnav and baselines.
 
-    tools/cpu_table.py --build build/dev            # scenes and baselines next to GSNAV_DATA_DIR
+    tools/cpu_table.py --build build/dev            # the flats that gsnav-scene makes
     tools/cpu_table.py --build build/dev --page     # writes the table into docs/benchmarks.md
     tools/cpu_table.py --build build/dev --scene flat=flat.ply:cameras.json --baseline NAME=BINARY
 
@@ -28,7 +28,6 @@ PROFILES = ("exact", "fast")
 Baseline = collections.namedtuple("Baseline", "source least_gain")
 BASELINES = {"prototype": Baseline("proto.cpp", 2), "row renderer": Baseline("surrogate.cpp", 4)}
 FLATS = {"flat 100K": 100_000, "flat 300K": 300_000, "flat 1M": 1_000_000}
-SHOWROOMS = {"LaCadiere 3": "3_0,3_1", "LaCadiere 2": "2_0,2_1,2_2"}
 MARKS = ("<!-- cpu-table: begin -->", "<!-- cpu-table: end -->")
 TIMEOUT_S = 900
 # Bound on spinning in GNU's OpenMP, for all renderers alike. Without it a waiting thread may occupy the core that
@@ -95,22 +94,15 @@ def data_folder(build):
     return pathlib.Path(found.group(1)) if found else pathlib.Path()
 
 
-def default_scenes(data, cache):
-    """(name, PLY, cameras) of the benchmark flats and of the showroom, as far as their files exist."""
+def default_scenes(build, cache):
+    """(name, PLY, cameras) of the flats that gsnav-scene makes."""
     scenes = []
-    generator = data.parent / "bench_scene" / "make_bench_scene.cpp"
-    if generator.exists():
-        make, cameras = compiled(generator, cache, []), cache / "flat_cameras.json"
-        run([make, "cameras", 64, 256, 256, cameras])
-        for name, count in FLATS.items():
-            ply = cache / f"flat_{count}.ply"
-            if not ply.exists():
-                run([make, "ply", count, ply])
-            scenes.append((name, str(ply), str(cameras)))
-    showroom, cameras = data / "splats/lacadiere_showroom", data / "cameras/lacadiere_eye_level.json"
-    for name, tiles in SHOWROOMS.items():
-        if all((showroom / t).exists() for t in tiles.split(",")) and cameras.exists():
-            scenes.append((name, str(showroom / tiles), str(cameras)))
+    for name, count in FLATS.items():
+        ply, cameras = cache / f"flat_{count}.ply", cache / f"flat_{count}.json"
+        if not (ply.exists() and cameras.exists()):
+            run([program(build, "gsnav-scene"), "flat", "--gaussians", count, "--out", ply, "--cameras", cameras,
+                 "--views", 64, "--width", 256, "--height", 256, "--hfov", 90])
+        scenes.append((name, str(ply), str(cameras)))
     return scenes
 
 
@@ -289,7 +281,7 @@ def put_into_page(text):
 def parse_options():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", type=pathlib.Path, required=True,
-                        help="build folder with bench_render and gsnav-convert")
+                        help="build folder with bench_render, gsnav-convert and gsnav-scene")
     parser.add_argument("--scene", action="append", default=[], metavar="NAME=PATH:CAMERAS.json")
     parser.add_argument("--only", default="", metavar="TEXT", help="only scenes with this in their name")
     parser.add_argument("--baseline", action="append", default=[], metavar="NAME=BINARY",
@@ -321,10 +313,10 @@ def parse_options():
 def main():
     options = parse_options()
     data = data_folder(options.build)
-    scenes = [parse_scene(s) for s in options.scene] or default_scenes(data, options.cache)
+    scenes = [parse_scene(s) for s in options.scene] or default_scenes(options.build, options.cache)
     scenes = [s for s in scenes if options.only in s[0]]
     if not scenes:
-        stop(f"no scene: {data} has none named so; name some by --scene")
+        stop(f"no scene has {options.only} in its name; name some by --scene")
     folder = data.parent / "bench_scene" / "cpu_baseline"
     there = [f"{n}={folder / b.source}" for n, b in BASELINES.items() if (folder / b.source).exists()]
     named = options.baseline or there

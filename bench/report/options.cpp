@@ -38,10 +38,18 @@ const char kDescription[] =
 
 void add_scenes(CLI::App& app, Options& o, std::vector<std::string>& sizes, std::string& knob_size) {
   app.add_option(
-      "--scene", o.scenes,
-      "NAME=PATH[:CAMERAS.json]: a .ply, .sog, SOG folder or a folder's tiles (DIR/2_0,2_1) and an "
-      "INRIA cameras.json; without cameras four views from outside. Repeatable");
-  app.add_flag("--default", o.default_scene, "The embedded flat");
+      "scene,--scene", o.scenes,
+      "[NAME=]SCENE[:CAMERAS.json]: a scene as in all programs (default, the embedded flat; a file, a "
+      "folder, tiles DIR/2_0,2_1; SET.scene_dataset_config.json#NAME), and an INRIA cameras.json in the "
+      "axes of the scene's file; without cameras four views from outside. Repeatable");
+  app.add_flag("--default", o.default_scene, "The embedded flat, as --scene default");
+  app.add_option("--up", o.frame.up,
+                 "Axis of the scenes' files that points up, for views from outside: x, y, z, -x, -y or "
+                 "-z; auto: guessed from the ground")
+      ->check(CLI::IsMember({"auto", "x", "y", "z", "+x", "+y", "+z", "-x", "-y", "-z"}))
+      ->capture_default_str();
+  app.add_option("--time", o.frame.time, "Moment of scenes that move (4D Gaussians), seconds")
+      ->capture_default_str();
   app.add_option("--data", o.data, "Folder of real scenes (GSNAV_DATA_DIR): those that are there")
       ->check(CLI::ExistingDirectory);
   app.add_option("--flat", o.flats, "Benchmark flats, PLY files with a cameras.json beside them");

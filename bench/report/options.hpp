@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "jobs.hpp"
+#include "scenes.hpp"
 
 namespace gsnav_report {
 
@@ -15,6 +16,7 @@ struct Options {
   std::vector<std::string> visible_sets;  ///< SCENE=FILE
   bool default_scene = false;
   std::string data;
+  SceneFrame frame;
   int views = 4;
   std::vector<ImageSize> sizes{{256, 256}, {640, 480}};
   ImageSize knob_size{256, 256};

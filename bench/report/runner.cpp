@@ -84,7 +84,7 @@ Status render_scenes(const Options& o, CsvFile& csv, const Row& stamp) {
   std::size_t total = each * specs->size(), done = 0;
   Progress progress(total);
   for (const SceneSpec& spec : *specs) {
-    const Result<Scene> scene = load(spec, o.views);
+    const Result<Scene> scene = load(spec, o.views, o.frame);
     if (!scene) return scene.status();
     const std::vector<Setting> settings =
         plan(plan_options(o, scene->views.size(), scene->cloud.sh_degree, scene->visible.has_value()));

@@ -2,16 +2,14 @@
 #include "scenes.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <numbers>
 #include <system_error>
 #include <utility>
 
 #include "cache.hpp"
 #include "gsnav/demo.hpp"
 #include "gsnav/io.hpp"
-#include "gsnav/io/scene_file.hpp"
+#include "gsnav/open.hpp"
+#include "gsnav/scene/prepare.hpp"
 
 namespace gsnav_report {
 
@@ -28,41 +26,43 @@ bool is_there(const std::filesystem::path& p) {
   return std::filesystem::exists(p, error);
 }
 
-/// Four views from outside, a quarter turn apart, for scenes without cameras. They look at the median of
-/// the means, from 1.5 times the radius that holds nine tenths of them. Y is up.
-std::vector<ViewPoint> orbit(const GaussianCloud& cloud) {
-  Vec3d center;
-  std::vector<double> values(cloud.size());
-  if (values.empty()) return {look("orbit0", {0, 0, -1}, {}, {0, 1, 0})};
-  const auto quantile = [&](double q) {
-    const auto at =
-        values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), at, values.end());
-    return *at;
-  };
-  for (int k = 0; k < 3; ++k) {
-    for (std::size_t i = 0; i < values.size(); ++i) values[i] = cloud.mean(i)[k];
-    center[k] = quantile(0.5);
+/// Four upright views from outside, a quarter turn apart, for scenes without cameras. `up`: the option
+/// --up.
+Result<std::vector<ViewPoint>> orbit(const OpenedScene& scene, const GaussianCloud& cloud,
+                                     const std::string& up) {
+  Vec3d axis = scene.report.up;
+  if (up != "auto") {
+    const auto turned = upright(up);
+    if (!turned) return Status(turned.code(), "--up: " + turned.message());
+    axis = inverse(*turned) * Vec3d{0, 1, 0};
   }
-  for (std::size_t i = 0; i < values.size(); ++i) values[i] = norm(cloud.mean(i) - center);
-  const double away = 1.5 * std::max(quantile(0.9), 0.1);
   std::vector<ViewPoint> out;
-  for (int k = 0; k < 4; ++k) {
-    const double a = (k + 0.5) * std::numbers::pi / 2;
-    const Vec3d eye = center + Vec3d{std::cos(a), 0.3, std::sin(a)} * away;
-    out.push_back(look(std::string("orbit") + std::to_string(k), eye, center, {0, 1, 0}));
-  }
+  for (const Camera& c : views_around(cloud, axis, 4, 640, 480))
+    out.push_back({std::string("orbit") + std::to_string(out.size()), c.viewmat});
   return out;
+}
+
+/// A name for a scene: that of its file, without extension, or the Habitat scene's.
+std::string name_of(const std::string& scene) {
+  const std::size_t hash = scene.rfind('#');
+  if (hash != scene.npos && hash + 1 < scene.size()) return scene.substr(hash + 1);
+  std::filesystem::path path(scene);
+  if (!path.has_filename()) path = path.parent_path();
+  const std::string name = path.filename().string();
+  return name.substr(0, name.find('.', 1));
 }
 
 }  // namespace
 
 Result<SceneSpec> parse_scene(const std::string& text) {
-  const std::size_t equals = text.find('=');
-  if (equals == text.npos || equals == 0 || equals + 1 == text.size()) {
-    return {Errc::invalid_argument, "--scene " + text + ": use NAME=PATH or NAME=PATH:CAMERAS.json"};
+  std::size_t equals = text.find('=');
+  if (equals != text.npos && text.find('/') < equals) equals = text.npos;  // of the path
+  if (text.empty() || equals == 0 || equals + 1 == text.size()) {
+    return {Errc::invalid_argument, "--scene " + text + ": use [NAME=]SCENE[:CAMERAS.json]"};
   }
-  SceneSpec spec{text.substr(0, equals), text.substr(equals + 1), {}};
+  SceneSpec spec;
+  if (equals != text.npos) spec.name = text.substr(0, equals);
+  spec.path = equals != text.npos ? text.substr(equals + 1) : text;
   const std::size_t colon = spec.path.rfind(':');
   if (colon != spec.path.npos && spec.path.size() > 5 &&
       spec.path.substr(spec.path.size() - 5) == ".json") {
@@ -72,11 +72,18 @@ Result<SceneSpec> parse_scene(const std::string& text) {
       return {Errc::file_not_found, "--scene " + text + ": " + spec.cameras + " does not exist"};
     }
   }
+  if (spec.path == "default") {
+    SceneSpec flat = default_flat();
+    if (!spec.name.empty()) flat.name = spec.name;
+    flat.cameras = spec.cameras;
+    return flat;
+  }
+  if (spec.name.empty()) spec.name = name_of(spec.path);
   return spec;
 }
 
 SceneSpec default_flat() {
-  SceneSpec spec{"embedded_flat", {}, {}};
+  SceneSpec spec{"embedded_flat", "default", {}};
   for (const DefaultView& v : default_scene_views())
     spec.views.push_back(look(v.name, v.eye, v.target, {0, 1, 0}));
   return spec;
@@ -114,29 +121,38 @@ std::vector<SceneSpec> data_scenes(const std::filesystem::path& folder) {
   return out;
 }
 
-Result<Scene> load(const SceneSpec& spec, int views) {
+Result<Scene> load(const SceneSpec& spec, int views, const SceneFrame& frame) {
   Scene scene;
   scene.name = spec.name;
-  std::vector<ViewPoint> all = spec.views;
-  if (!spec.cameras.empty()) {  // before the scene, which may take long to load
+  const auto bad = [&spec](const Status& s) {
+    return Status(s.code(), "scene " + spec.name + ": " + s.message());
+  };
+  std::vector<ViewPoint> all;
+  if (!spec.cameras.empty()) {  // before the scene, which may take long
     const Result<std::vector<Camera>> cameras = io::load_cameras(spec.cameras);
-    if (!cameras) return Status(cameras.code(), "scene " + spec.name + ": " + cameras.message());
-    if (cameras->empty())
-      return {Errc::invalid_file, "scene " + spec.name + ": " + spec.cameras + " holds no camera"};
+    if (!cameras) return bad(cameras.status());
+    if (cameras->empty()) return bad({Errc::invalid_file, spec.cameras + " holds no camera"});
     for (const Camera& c : *cameras) {
       all.push_back({std::string("camera") + std::to_string(all.size()), c.viewmat});
     }
-  }
-  if (spec.path.empty()) {
-    Result<DefaultScene> flat = make_default_scene();
-    if (!flat) return flat.status();
-    scene.cloud = std::move(flat->cloud);
   } else {
-    Result<LoadedCloud> loaded = io::load_scene(spec.path);
-    if (!loaded) return Status(loaded.code(), "scene " + spec.name + ": " + loaded.message());
-    scene.cloud = std::move(loaded->cloud);
+    all = spec.views;
   }
-  scene.path = spec.path;
+  OpenOptions how;
+  how.up = "keep";  // cameras stand in the axes of the file
+  how.time = frame.time;
+  how.navmesh = "none";
+  auto opened = open_scene(spec.path, how);
+  if (!opened) return bad(opened.status());
+  if (opened->scene->assets.empty())
+    return bad({Errc::invalid_argument, spec.path + ": has no Gaussians"});
+  scene.cloud = *opened->scene->assets.front().cloud;
+  if (all.empty()) {
+    auto around = orbit(*opened, scene.cloud, frame.up);
+    if (!around) return bad(around.status());
+    all = std::move(*around);
+  }
+  if (spec.path != "default") scene.path = opened->report.source;
   if (!spec.visible_sets.empty()) {
     Result<VisibleSets> sets = io::load_visible_sets(spec.visible_sets, scene.cloud);
     if (!sets)
@@ -145,7 +161,6 @@ Result<Scene> load(const SceneSpec& spec, int views) {
     scene.visible = std::move(*sets);
   }
   scene.hash = content_hash(scene.cloud);
-  if (all.empty()) all = orbit(scene.cloud);
   const std::size_t wanted = std::min(all.size(), static_cast<std::size_t>(std::max(views, 1)));
   for (std::size_t i = 0; i < wanted; ++i) scene.views.push_back(all[i * all.size() / wanted]);
   return scene;

@@ -22,22 +22,29 @@ struct ViewPoint {
 /// Names and files of a scene to be measured, before it is loaded.
 struct SceneSpec {
   std::string name;
-  std::string path;     ///< a path for io::load_scene; empty: the embedded flat
+  std::string path;     ///< a scene's name for gsnav::open_scene
   std::string cameras;  ///< INRIA cameras.json; empty: use `views`, or make views from the cloud
   std::vector<ViewPoint> views{};
   std::string visible_sets{};  ///< a file of visible sets; empty: none
 };
 
+/// How scenes stand, and when.
+struct SceneFrame {
+  std::string up = "auto";  ///< axis of the file that points up, for views that are made; auto: guessed
+  double time = 0;          ///< moment of a scene that moves, seconds
+};
+
 struct Scene {
   std::string name;
   gsnav::GaussianCloud cloud;
-  std::string path;  ///< of its SceneSpec
+  std::string path;  ///< path of the Gaussians for io::load_scene; empty: made by code
   std::optional<gsnav::VisibleSets> visible;
   std::string hash;  ///< content_hash of the cloud
   std::vector<ViewPoint> views;
 };
 
-/// The scene of `NAME=PATH[:CAMERAS.json]`. Errors: invalid_argument naming option and value.
+/// The scene of `[NAME=]SCENE[:CAMERAS.json]`; without a name it gets that of its file. Errors:
+/// invalid_argument naming option and value; file_not_found naming the cameras.
 gsnav::Result<SceneSpec> parse_scene(const std::string& text);
 
 /// The embedded flat with its own viewpoints.
@@ -50,7 +57,9 @@ gsnav::Result<SceneSpec> benchmark_flat(const std::string& ply);
 std::vector<SceneSpec> data_scenes(const std::filesystem::path& folder);
 
 /// Loads a scene and chooses at most `views` of its viewpoints, evenly spread.
-gsnav::Result<Scene> load(const SceneSpec& spec, int views);
+/// @return the errors of gsnav::open_scene, and those of the files of cameras and visible sets. The
+///   message names the scene.
+gsnav::Result<Scene> load(const SceneSpec& spec, int views, const SceneFrame& frame = {});
 
 /// A pinhole camera with square pixels at `view`. Gaussians nearer than `near` metres are not drawn.
 gsnav::Camera camera_of(const ViewPoint& view, int width, int height, double hfov_degrees, double near);

@@ -16,6 +16,7 @@ std::vector<gsnav::SensorSpec> sensors_of(const Options& options) {
 Result<Setup> prepare(const Options& options) {
   gsnav::OpenOptions how = gsnav_tools::open_options(options);
   how.eye = gsnav::sensor_camera(sensors_of(options)[0], {}, {});
+  gsnav_tools::print_device(options.device, stderr);
   auto opened = gsnav_tools::open_scene(options, how, stderr);
   if (!opened) return opened.status();
   const gsnav::SimulatorScene& scene = *opened->scene;

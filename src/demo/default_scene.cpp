@@ -174,6 +174,10 @@ Status validate(const SceneSampling& s) {
     return {Errc::invalid_argument, "gaussians = " + std::to_string(s.gaussians) + ": must be at most " +
                                         std::to_string(kMostSceneGaussians)};
   }
+  if (s.sh_degree < 0 || s.sh_degree > kMaxShDegree) {
+    return {Errc::invalid_argument,
+            "sh_degree = " + std::to_string(s.sh_degree) + ": must be in [0, 3]"};
+  }
   return {};
 }
 

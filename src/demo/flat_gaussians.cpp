@@ -123,8 +123,8 @@ std::vector<Box> Painter::covers_of(const Patch& patch) const {
   return covers;
 }
 
-void Painter::emit_gaussians(const Patch& patch, const Cut& cut, std::size_t first_row,
-                             std::vector<RawGaussian>& out) const {
+void Painter::emit_gaussians(const Patch& patch, const Cut& cut, std::size_t first_row, int sh_degree,
+                             Made& out) const {
   const std::vector<Box> covers = covers_of(patch);
   const double length_t = column_length(patch.position, 0.5, patch.flat);
   const int rows = count_for(length_t, patch.spacing.v * cut.stretch);
@@ -135,6 +135,7 @@ void Painter::emit_gaussians(const Patch& patch, const Cut& cut, std::size_t fir
   if (!patch.glows) light.emplace(*this, patch, widest, length_t);
 
   Tangents f = tangents(patch.position, 0.5, 0.5);
+  const std::size_t bands = 3 * static_cast<std::size_t>(sh_coefficient_count(sh_degree) - 1);
   RawGaussian raw;
   raw.opacity_logit = kOpacityLogit;
   for (int j = 0; j < rows; ++j) {
@@ -163,7 +164,12 @@ void Painter::emit_gaussians(const Patch& patch, const Cut& cut, std::size_t fir
       for (int k = 0; k < 3; ++k) {
         raw.sh0[static_cast<std::size_t>(k)] = static_cast<float>((display(color[k]) - 0.5) / kSh0);
       }
-      out.push_back(raw);
+      out.rows.push_back(raw);
+      if (bands == 0) continue;
+      out.shN.resize(out.shN.size() + bands);
+      if (!patch.glows) {
+        write_sheen(rooms_[patch.room], p, f.normal, sh_degree, out.shN.data() + out.shN.size() - bands);
+      }
     }
   }
 }
@@ -259,13 +265,15 @@ void Painter::emit_triangles(const Patch& patch, DefaultScene& scene) {
   }
 }
 
-Status Painter::emit(const Cut& cut, const std::function<void(double)>& progress, ThreadPool& pool,
+Status Painter::emit(const Cut& cut, const SceneSampling& sampling, ThreadPool& pool,
                      GaussianCloudBuilder& builder) const {
   constexpr std::size_t kBatch = 1 << 20;  // number of Gaussians that are made before they are written
                                            // in order
   std::size_t first_row = 0, done = 0;
   std::vector<std::size_t> first_rows;
-  std::vector<std::vector<RawGaussian>> made;
+  std::vector<Made> made;
+  const int degree = sampling.sh_degree;
+  const std::size_t bands = 3 * static_cast<std::size_t>(sh_coefficient_count(degree) - 1);
   for (std::size_t begin = 0; begin < patches_.size();) {
     std::size_t end = begin;
     first_rows.clear();
@@ -277,17 +285,22 @@ Status Painter::emit(const Cut& cut, const std::function<void(double)>& progress
     made.assign(end - begin, {});
     const Status s = detail::run_guarded(
         pool, static_cast<std::uint32_t>(end - begin), [&](std::uint32_t p) -> Status {
-          made[p].reserve(cut.patches[begin + p].gaussians);
-          emit_gaussians(patches_[begin + p], cut, first_rows[p], made[p]);
+          made[p].rows.reserve(cut.patches[begin + p].gaussians);
+          made[p].shN.reserve(bands * cut.patches[begin + p].gaussians);
+          emit_gaussians(patches_[begin + p], cut, first_rows[p], degree, made[p]);
           return {};
         });
     if (!s) return s;
-    for (const std::vector<RawGaussian>& patch : made) {
-      for (const RawGaussian& g : patch) builder.add(g);
-      done += patch.size();
+    for (Made& patch : made) {
+      for (std::size_t i = 0; i < patch.rows.size(); ++i) {
+        if (bands > 0) patch.rows[i].shN = patch.shN.data() + bands * i;
+        builder.add(patch.rows[i]);
+      }
+      done += patch.rows.size();
     }
     begin = end;
-    if (progress) progress(static_cast<double>(done) / static_cast<double>(cut.gaussians));
+    if (sampling.progress)
+      sampling.progress(static_cast<double>(done) / static_cast<double>(cut.gaussians));
   }
   return {};
 }
@@ -301,9 +314,9 @@ Result<DefaultScene> Painter::finish(const SceneSampling& sampling) const {
     const Result<Cut> cut = sampling.gaussians > 0 ? cut_into(sampling.gaussians, pool)
                                                    : cut_at(1.07 / std::sqrt(sampling.density), pool);
     if (!cut) return cut.status();
-    GaussianCloudBuilder builder(0, "default scene");
+    GaussianCloudBuilder builder(sampling.sh_degree, "default scene");
     builder.reserve(cut->gaussians);
-    if (Status made = emit(*cut, sampling.progress, pool, builder); !made) return made;
+    if (Status made = emit(*cut, sampling, pool, builder); !made) return made;
     for (const Patch& p : patches_) emit_triangles(p, scene);
     scene.bounds = builder.report().bounds;
     scene.cloud = std::move(builder.cloud());

@@ -124,6 +124,11 @@ class Painter {
     }
   };
   class PatchLight;
+  /// Gaussians of a patch.
+  struct Made {
+    std::vector<RawGaussian> rows;
+    std::vector<float> shN;  ///< theirs, one after the other; empty for degree 0
+  };
 
   Box world_box(const Vec3d& low, const Vec3d& high) const noexcept;
   Vec3d light_at(const Room& room, const Vec3d& p, const Vec3d& n) const;
@@ -133,10 +138,13 @@ class Painter {
   Result<Cut> cut_at(double stretch, ThreadPool& pool) const;
   /// The cut that gives exactly `gaussians`.
   Result<Cut> cut_into(std::size_t gaussians, ThreadPool& pool) const;
-  void emit_gaussians(const Patch& patch, const Cut& cut, std::size_t first_row,
-                      std::vector<RawGaussian>& out) const;
-  Status emit(const Cut& cut, const std::function<void(double)>& progress, ThreadPool& pool,
+  void emit_gaussians(const Patch& patch, const Cut& cut, std::size_t first_row, int sh_degree,
+                      Made& out) const;
+  Status emit(const Cut& cut, const SceneSampling& sampling, ThreadPool& pool,
               GaussianCloudBuilder& builder) const;
+  /// Writes the bands from 1 on of a Gaussian, as RawGaussian::shN has them.
+  void write_sheen(const Room& room, const Vec3d& p, const Vec3d& normal, int sh_degree,
+                   float* shN) const noexcept;
   static void emit_triangles(const Patch& patch, DefaultScene& scene);
 
   std::vector<Room> rooms_;

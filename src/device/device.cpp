@@ -100,8 +100,8 @@ std::string Device::description() const {
     case DeviceKind::cpu: {
 #if defined(GSNAV_DEVICE_OPENMP)
       const int n = detail::cpu_threads(threads_);
-      return "CPU, " + std::to_string(n) + (n == 1 ? " thread, " : " threads, ") + detail::cpu_lanes() +
-             " lanes";
+      return "CPU, " + std::to_string(n) + (n == 1 ? " thread, " : " threads, ") +
+             detail::cpu_instruction_set();
 #else
       break;
 #endif

@@ -79,9 +79,9 @@ struct EngineFactory {
 extern const EngineFactory serial_engines;
 #if defined(GSNAV_DEVICE_OPENMP)
 extern const EngineFactory openmp_engines;
-/// Number of threads of a CPU device that was asked for `threads`, and the name of its SIMD lanes.
+/// Number of threads of a CPU device that was asked for `threads`, and the name of its instruction set.
 int cpu_threads(int threads);
-const char* cpu_lanes();
+std::string cpu_instruction_set();
 #endif
 #if defined(GSNAV_DEVICE_CUDA)
 extern const EngineFactory cuda_engines;

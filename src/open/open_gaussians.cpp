@@ -27,6 +27,8 @@ Result<Gaussians> read_file(OpeningScene& s) {
   Gaussians made;
   io::LoadSceneOptions load;
   load.time = o.time;
+  load.level = o.level;
+  load.keep_zero_bands = o.keep_zero_bands;
   load.storage = o.storage == CloudStorage::compact ? io::Storage::compact : io::Storage::full;
   if (o.levels == SceneLevels::shipped) {
     auto set = io::load_shipped_levels(file, load);
@@ -172,8 +174,10 @@ Status open_gaussians(OpeningScene& s) {
   if (!status) return status;
   const auto shared = []<class T>(T& part) { return std::make_shared<const T>(std::move(part)); };
   SceneAsset asset;
-  SceneBands bands = fit_bands(s, *made);
-  asset.bands = shared(bands);
+  if (!s.options.keep_zero_bands) {
+    SceneBands bands = fit_bands(s, *made);
+    asset.bands = shared(bands);
+  }
   asset.world_from_asset = s.world_from_file;
   if (made->packed) {
     asset.packed = shared(*made->packed);

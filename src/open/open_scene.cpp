@@ -23,6 +23,7 @@ Status validate(const OpenOptions& o) {
     return Status(Errc::invalid_argument, text);
   };
   if (!std::isfinite(o.time)) return bad("time", o.time, "finite");
+  if (o.level < 0) return bad("level", o.level, "0 or more");
   if (!(o.unseen_color >= 0 && std::isfinite(o.unseen_color)))
     return bad("unseen_color", o.unseen_color, "0 or more");
   if (!(o.cell_size > 0 && std::isfinite(o.cell_size)))
@@ -51,6 +52,8 @@ Result<OpenedScene> open(const std::string& name, const OpenOptions& options) {
   s.out.load_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - from).count();
   if (Status status = detail::open_navmesh(s); !status) return status;
   if (Status status = detail::open_visible_sets(s); !status) return status;
+  if (options.keep_triangles)
+    s.out.triangles = std::make_shared<const NavMeshTriangles>(std::move(s.triangles));
   s.out.scene = std::make_shared<const SimulatorScene>(std::move(s.scene));
   return std::move(s.out);
 }

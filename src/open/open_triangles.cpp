@@ -33,7 +33,7 @@ Status add_drawn(OpeningScene& s, const std::string& file, const Similarity& pla
     // Formats without materials are drawn grey.
     if (kind == ".obj" || kind == ".ply") part.material = {{0.5, 0.5, 0.5}, 0, -1, true, false};
   }
-  if (s.wants_navmesh()) {
+  if (s.wants_obstacles()) {
     TriangleMesh all;
     for (const TexturedScene::Instance& i : surface->instances) {
       const TriangleMesh& part = surface->parts[i.part].geometry;
@@ -64,7 +64,7 @@ Status open_triangles(OpeningScene& s) {
   for (const std::string& file : s.options.meshes) {
     if (Status status = add_drawn(s, file, s.world_from_file); !status) return status;
   }
-  if (s.source.collision_mesh.empty() || !s.wants_navmesh()) return {};
+  if (s.source.collision_mesh.empty() || !s.wants_obstacles()) return {};
   const auto mesh = io::load_mesh(s.source.collision_mesh);
   if (!mesh) return mesh.status();
   return add_obstacles(s, *mesh, stage);

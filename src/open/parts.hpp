@@ -24,7 +24,10 @@ struct OpeningScene {
 
   void note(std::string text) { out.notes.push_back(std::move(text)); }
   void warn(std::string text) { out.warnings.push_back(std::move(text)); }
-  bool wants_navmesh() const { return !options.navmesh.empty() && options.navmesh != "none"; }
+  /// Whether the triangles that a NavMesh may be built of are needed.
+  bool wants_obstacles() const {
+    return options.keep_triangles || (!options.navmesh.empty() && options.navmesh != "none");
+  }
 };
 
 /// Reads or makes the Gaussians, decides which axis is up, reads or builds levels of detail.

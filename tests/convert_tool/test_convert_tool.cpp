@@ -13,6 +13,7 @@
 
 #include "compare.hpp"
 #include "gsnav/backends/serial.hpp"
+#include "gsnav/demo.hpp"
 #include "gsnav/detail/io/cameras_file.hpp"
 #include "gsnav/detail/io/ply.hpp"
 #include "gsnav/detail/scene/describe_cloud.hpp"
@@ -448,6 +449,31 @@ TEST_CASE("convert: a SOG folder written again has no bands left of the scene be
   CHECK_FALSE(std::filesystem::exists(folder / "room/shN_labels.webp"));
   CHECK_FALSE(std::filesystem::exists(folder / "room/shN_centroids.webp"));
   CHECK(load(folder, "room").sh_degree == 0);
+}
+
+TEST_CASE("convert: an input is any scene's name") {
+  const TempFolder folder("convert_names");
+  REQUIRE(io::save_ply(folder / "room.ply", cloud_of_random_rows(30, 3, 5)).ok());
+  write_file(folder / "room.stage_config.json", R"({"render_asset":"room.ply"})");
+  write_file(folder / "set.scene_dataset_config.json",
+             R"({"stages":{"paths":{".json":["*.stage_config.json"]}}})");
+  for (const char* name : {"room.ply", "room.stage_config.json", "set.scene_dataset_config.json#room"}) {
+    CAPTURE(name);
+    const Outcome out = run(folder, std::string(name) + " out.ply --views 0");
+    INFO(out.text);
+    REQUIRE(out.ok);
+    const GaussianCloud made = load(folder, "out.ply");
+    CHECK(made.size() == 30);
+    CHECK(made.sh_degree == 3);
+  }
+  const Outcome out = run(folder, "default out.ply --density 0.1 --views 0");
+  INFO(out.text);
+  REQUIRE(out.ok);
+  CHECK(load(folder, "out.ply").size() == make_default_scene(0.1)->cloud.size());
+  write_file(folder / "floor.obj", "v 0 0 0\nv 0 0 4\nv 4 0 4\nf 1 2 3\n");
+  const Outcome none = run(folder, "floor.obj out.ply");
+  CHECK_FALSE(none.ok);
+  CHECK(none.says("floor.obj: has no Gaussians"));
 }
 
 TEST_CASE("convert: what cannot be done is said") {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "gsnav/demo.hpp"
 #include "gsnav/detail/io/mesh_file.hpp"
 #include "gsnav/detail/io/navmesh_settings_file.hpp"
 #include "gsnav/detail/io/ply.hpp"
@@ -323,6 +324,54 @@ TEST_CASE("navmesh tool: from Gaussians") {
   CHECK(wrong.says("has no Gaussians"));
 }
 
+TEST_CASE("navmesh tool: the embedded flat, of its triangles and of its Gaussians") {
+  const TempFolder folder("navmesh_tool_default");
+  const std::string out = " --out " + quoted(folder / "a.navmesh");
+  const DefaultScene flat = make_default_scene().value();
+  const NavMesh want = NavMesh::build({}, flat.vertices, flat.triangles).value();
+  const Outcome made = run(folder, "default" + out);
+  INFO(made.text);
+  REQUIRE(made.ok);
+  CHECK(load_navmesh(folder / "a.navmesh")->navigable_area() ==
+        doctest::Approx(want.navigable_area()).epsilon(1e-6));
+  const Outcome seen = run(folder, "--scene default --navmesh gaussians" + out);
+  INFO(seen.text);
+  REQUIRE(seen.ok);
+  CHECK(seen.says("Gaussians used"));
+  const NavMesh of_gaussians = load_navmesh(folder / "a.navmesh").value();
+  CHECK(of_gaussians.navigable_area() == doctest::Approx(want.navigable_area()).epsilon(0.15));
+}
+
+TEST_CASE("navmesh tool: a Habitat data set's scene stands as the data set says") {
+  const TempFolder folder("navmesh_tool_habitat");
+  write_file(folder / "floors.obj", two_floors_z_up());
+  write_file(folder / "a.stage_config.json",
+             R"({"render_asset":"floors.obj","up":[0,0,1],"front":[0,1,0],"units_to_meters":0.01})");
+  write_file(folder / "b.scene_dataset_config.json",
+             R"({"stages":{"paths":{".json":["*.stage_config.json"]}}})");
+  const std::string out = std::string(" ") + kPlain + " --out " + quoted(folder / "a.navmesh");
+  for (const char* name :
+       {"a.stage_config.json", "b.scene_dataset_config.json", "b.scene_dataset_config.json#a"}) {
+    CAPTURE(name);
+    const Outcome made = run(folder, quoted((folder / name)) + out);
+    INFO(made.text);
+    REQUIRE(made.ok);
+    const NavMesh mesh = load_navmesh(folder / "a.navmesh").value();
+    CHECK(mesh.navigable_area() == doctest::Approx(80).epsilon(0.01));
+    CHECK(mesh.is_navigable({11, 3, -4}));
+  }
+  const std::string set = quoted(folder / "b.scene_dataset_config.json");
+  const Outcome none = run(folder, set + "#kitchen");
+  CHECK_FALSE(none.ok);
+  CHECK(none.says("kitchen"));
+  for (const char* option : {"--navmesh gaussians", "--crop 0 0 0 1 1 1", "--visible-sets seen.vis"}) {
+    CAPTURE(option);
+    const Outcome refused = run(folder, set + " " + option);
+    CHECK_FALSE(refused.ok);
+    CHECK(refused.says("has no Gaussians"));
+  }
+}
+
 TEST_CASE("navmesh tool: what is wrong is said on one line") {
   const TempFolder folder("navmesh_tool_errors");
   write_file(folder / "wall.obj", "v 0 0 0\nv 4 0 0\nv 4 3 0\nv 0 3 0\nf 1 2 3 4\n");
@@ -334,7 +383,7 @@ TEST_CASE("navmesh tool: what is wrong is said on one line") {
     std::vector<const char*> parts;
   };
   const Case cases[] = {
-      {"", {"input"}},
+      {"", {"scene"}},
       {quoted(folder / "none.obj"), {"none.obj"}},
       {quoted(folder / "none.navmesh"), {"none.navmesh"}},
       {quoted(folder / "bad.navmesh"), {"bad.navmesh", "size = 21"}},

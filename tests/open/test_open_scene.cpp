@@ -188,6 +188,37 @@ TEST_CASE("open: a Habitat data set's scene comes as the data set says") {
   CHECK(floor.scene->meshes.size() == 1);
 }
 
+TEST_CASE("open: triangles, and all SH bands of a file, are kept where they are asked for") {
+  const TempFolder folder("open_kept");
+  write_file(folder / "floor.obj", floor_obj(3));
+  OpenOptions o;
+  CHECK(open_scene((folder / "floor.obj").string(), o)->triangles == nullptr);
+  o.keep_triangles = true;
+  const auto floor = open_scene((folder / "floor.obj").string(), o);
+  REQUIRE(floor.ok());
+  REQUIRE(floor->triangles != nullptr);
+  const TriangleMesh want = io::load_obj(folder / "floor.obj").value();
+  CHECK(floor->triangles->triangles == want.triangles);
+  CHECK(floor->scene->navmesh == nullptr);
+  const auto flat = open_scene("default", o);
+  CHECK(flat->triangles->triangles == make_default_scene()->triangles);
+
+  GaussianCloudBuilder builder(2);  // of bands that are all zero
+  for (int i = 0; i < 9; ++i) {
+    RawGaussian g;
+    g.mean = {0.1 * i, 0, 0.2 * (i % 3)};
+    g.log_scales = {-3, -3, -3};
+    builder.add(g);
+  }
+  io::save_ply(folder / "plain.ply", builder.cloud()).throw_if_error();
+  const std::string plain = (folder / "plain.ply").string();
+  CHECK(open_scene(plain, {})->scene->assets[0].cloud->sh_degree == 0);
+  OpenOptions all;
+  all.keep_zero_bands = true;
+  const auto kept = open_scene(plain, all);
+  CHECK(kept->scene->assets[0].cloud->sh_degree == 2);
+}
+
 TEST_CASE("open: levels of detail and visible sets are kept beside the scene's file") {
   const TempFolder folder("open_levels");
   const std::string file = (folder / "room.ply").string();
@@ -240,5 +271,6 @@ TEST_CASE("open: names and options that cannot be are said, and nothing crashes"
   refused("agent_radius", [&](OpenOptions& o) { o.agent_radius = -1; });
   refused("agent_height", [&](OpenOptions& o) { o.agent_height = 0; });
   refused("unseen_color", [&](OpenOptions& o) { o.unseen_color = -1; });
+  refused("level", [](OpenOptions& o) { o.level = -1; });
   refused("people", [&](OpenOptions& o) { o.density = 0.05, o.people = 1; });
 }

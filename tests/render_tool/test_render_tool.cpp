@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -74,6 +75,28 @@ TEST_CASE("render tool: without cameras, views around the scene with its own gro
     }
     CHECK(left == doctest::Approx(right).epsilon(0.2));
   }
+}
+
+TEST_CASE("render tool: the first line names the device and the instruction set in use") {
+  const TempFolder folder("render_says_device");
+  const char* const arguments = "default --density 0.05 --orbit 1 --width 32 --height 32 --png --out o";
+  const auto said = [&](const std::string& device, const char* limit) {
+    if (limit != nullptr) ::setenv("GSNAV_ISA", limit, 1);
+    const Outcome out = run(folder, arguments + (" --device " + device));
+    ::unsetenv("GSNAV_ISA");
+    CAPTURE(out.text);
+    REQUIRE(out.ok);
+    return out.text.substr(0, out.text.find('\n'));
+  };
+  CHECK(said("serial", nullptr) == "device: CPU, 1 thread, portable code");
+#if defined(__x86_64__) && !defined(__FMA__) && defined(_OPENMP)
+  const std::string slow = said("cpu:2", "baseline");
+  CHECK(slow.starts_with("device: CPU, 2 threads, SSE2 (no FMA: a frame takes "));
+  CHECK(slow.find(" times as long") != std::string::npos);
+  __builtin_cpu_init();
+  const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+  if (avx2) CHECK(said("cpu:1", "avx2") == "device: CPU, 1 thread, AVX2");
+#endif
 }
 
 TEST_CASE("render tool: any device draws the same bits, and serial64 those of the float64 reference") {

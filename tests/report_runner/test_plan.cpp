@@ -2,14 +2,18 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <set>
 #include <vector>
 
+#include "gsnav/demo.hpp"
+#include "gsnav/detail/io/ply.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 #include "jobs.hpp"
 #include "runner_timing.hpp"
 #include "scenes.hpp"
 #include "support/files.hpp"
+#include "support/scenes.hpp"
 
 using namespace gsnav;
 using namespace gsnav_report;
@@ -89,10 +93,65 @@ TEST_CASE("scenes: what --scene says") {
   CHECK(with.path == "b.ply");
   CHECK(with.cameras == cameras);
   CHECK(load({"a", {}, cameras}, 4).message().find("camera") != std::string::npos);
-  for (const char* bad : {"", "name", "=path", "name="}) CHECK_FALSE(parse_scene(bad).ok());
+  for (const char* bad : {"", "=path", "name="}) CHECK_FALSE(parse_scene(bad).ok());
+  const char* const named[][2] = {{"/data/flat.compressed.ply", "flat"},
+                                  {"/data/room/", "room"},
+                                  {"set.scene_dataset_config.json#kitchen", "kitchen"},
+                                  {"/a=1/flat.ply", "flat"}};
+  for (const auto& [scene, name] : named) {
+    CHECK(parse_scene(scene).value().name == name);
+    CHECK(parse_scene(scene).value().path == scene);
+  }
+  const SceneSpec flat = parse_scene("default").value(),
+                  own = parse_scene("x=default:" + cameras).value();
+  CHECK(flat.name == "embedded_flat");
+  CHECK(flat.views.size() == default_scene_views().size());
+  CHECK(own.name == "x");
+  CHECK(own.cameras == cameras);
   CHECK(parse_scene("a=b.ply:/none.json").code() == Errc::file_not_found);
   CHECK(benchmark_flat("/none/flat.ply").message().find("--flat") != std::string::npos);
   CHECK(data_scenes("/none").empty());
+}
+
+TEST_CASE("scenes: without cameras a scan is seen upright, by its ground or by the axis that is said") {
+  const gsnav_test::TempFolder folder("report_upright");
+  // A floor in x and y of the file, with a few Gaussians above it: z is up.
+  GaussianCloudBuilder builder(0);
+  for (int i = 0; i < 50; ++i) {
+    for (int k = 0; k < 50; ++k) {
+      RawGaussian g;
+      g.mean = {0.1 * i, 0.1 * k, k == 0 || i == 0 ? 0.05 * (i + k) : 0.0};
+      g.log_scales = {-3, -3, -5};
+      g.opacity_logit = 6;
+      builder.add(g);
+    }
+  }
+  io::save_ply(folder / "floor.ply", builder.cloud()).throw_if_error();
+  const auto up_of = [&](const std::string& up) {
+    SceneFrame frame;
+    frame.up = up;
+    const Scene scene = load({"a", (folder / "floor.ply").string(), {}}, 4, frame).value();
+    REQUIRE(scene.views.size() == 4);
+    const Vec3d down = scene.views[1].viewmat.linear.row[1];  // of the image, in the file's axes
+    return -down;
+  };
+  CHECK(up_of("auto").z > 0.9);
+  CHECK(up_of("x").x > 0.9);
+  CHECK(up_of("-y").y < -0.9);
+}
+
+TEST_CASE("scenes: Gaussians are needed, and a Habitat stage names its file") {
+  const gsnav_test::TempFolder folder("report_habitat");
+  gsnav_test::write_file(folder / "floor.obj", "v 0 0 0\nv 0 0 4\nv 4 0 4\nf 1 2 3\n");
+  const Status none = load({"a", (folder / "floor.obj").string(), {}}, 4).status();
+  CHECK(none.message().find("no Gaussians") != std::string::npos);
+  io::save_ply(folder / "room.ply", gsnav_test::random_cloud(5, {.count = 60})).throw_if_error();
+  gsnav_test::write_file(folder / "a.stage_config.json", R"({"render_asset":"room.ply"})");
+  const std::string stage = (folder / "a.stage_config.json").string();
+  const Scene scene = load(parse_scene(stage).value(), 2).value();
+  CHECK(scene.name == "a");
+  CHECK(std::filesystem::equivalent(scene.path, folder / "room.ply"));
+  CHECK(scene.cloud.size() == 60);
 }
 
 TEST_CASE("timing: percentiles are of values that were seen") {

@@ -47,6 +47,12 @@ TEST_CASE("scene: the flat in as many Gaussians as asked for, with its mesh and 
   CHECK(out.says("flat.ply: 23456 Gaussians"));
   CHECK(io::load_scene(folder / "flat.ply").value().cloud.size() == 23456);
 
+  CHECK(io::load_scene(folder / "flat.ply").value().cloud.sh_degree == 3);
+  REQUIRE(run(folder, "flat --gaussians 12345 --sh-degree 0 --out plain.ply").ok);
+  CHECK(io::load_scene(folder / "plain.ply").value().cloud.sh_degree == 0);
+  REQUIRE(run(folder, "rooms --rooms 2 --gaussians 30000 --sh-degree 2 --out rooms.ply").ok);
+  CHECK(io::load_scene(folder / "rooms.ply").value().cloud.sh_degree == 2);
+
   const DefaultScene scene = make_default_scene(0.05).value();
   const TriangleMesh mesh = io::load_obj(folder / "flat.obj").value();
   REQUIRE(mesh.vertices.size() == scene.vertices.size());
@@ -139,8 +145,9 @@ TEST_CASE("scene: options that cannot be used exit with 2, help and version with
   for (const char* arguments :
        {"", "castle --out a.ply", "flat", "flat --out a.ply --gaussians 10",
         "flat --out a.ply --views 0", "flat --out a.ply --gaussians 99999999999",
-        "flat --out a.ply --gaussians -5", "rooms --out a.ply --rooms 13",
-        "rooms --out a.ply --gaussians 20000 --density 1", "humanoid --gaussians 1 --out a.npz"}) {
+        "flat --out a.ply --gaussians -5", "flat --out a.ply --sh-degree 4",
+        "rooms --out a.ply --rooms 13", "rooms --out a.ply --gaussians 20000 --density 1",
+        "humanoid --gaussians 1 --out a.npz"}) {
     CAPTURE(arguments);
     CHECK(exits_with(folder, arguments, 2));
   }

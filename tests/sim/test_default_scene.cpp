@@ -7,6 +7,7 @@
 
 #include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/detail/nav/gaussian_navmesh.hpp"
+#include "gsnav/frame/sh.hpp"
 
 using namespace gsnav;
 
@@ -52,6 +53,73 @@ TEST_CASE("density changes the Gaussians, never the mesh") {
 
 namespace {
 
+/// Colour of a Gaussian beyond its mean, for a camera that looks along `d`.
+Vec3d sheen(const GaussianCloud& c, std::size_t i, const Vec3d& d) {
+  const std::size_t rest = c.shN.size() / c.size();
+  return evaluate_sh(c.sh_degree, d, [&](int k) {
+    Vec3d out{};
+    for (int channel = 0; k > 0 && channel < 3; ++channel)
+      out[channel] =
+          c.shN[i * rest + 3 * static_cast<std::size_t>(k - 1) + static_cast<std::size_t>(channel)];
+    return out;
+  });
+}
+
+}  // namespace
+
+TEST_CASE("the flat's bands are a sheen: brightest toward the mirror image of the room's light") {
+  SceneSampling sampling;
+  sampling.density = 0.05;
+  const GaussianCloud plain = make_default_scene(sampling).value().cloud;
+  sampling.sh_degree = 3;
+  const GaussianCloud c = make_default_scene(sampling).value().cloud;
+  REQUIRE(c.sh_degree == 3);
+  CHECK(c.means == plain.means);
+  CHECK(c.sh0 == plain.sh0);
+  CHECK(c.opacities == plain.opacities);
+
+  // Directions all over the sphere, 4 degrees apart.
+  std::vector<Vec3d> directions;
+  for (int i = 0; i < 2500; ++i) {
+    const double y = 1 - (2 * i + 1) / 2500.0, a = 2.399963229728653 * i, r = std::sqrt(1 - y * y);
+    directions.push_back({r * std::cos(a), y, r * std::sin(a)});
+  }
+  std::size_t floor = 0, seen = 0;
+  for (std::size_t i = 0; i < c.size(); i += 37) {
+    Vec3d best = directions[0];
+    double most = -1, sum = 0;
+    for (const Vec3d& d : directions) {
+      const double value = sheen(c, i, d).x;
+      sum += value;
+      if (value > most) most = value, best = d;
+    }
+    if (most == 0) continue;  // what glows is as bright from everywhere
+    ++seen;
+    REQUIRE(most == doctest::Approx(0.12).epsilon(0.02));
+    REQUIRE(abs(sum / 2500) < 1e-3);
+    REQUIRE(sheen(c, i, best).z < sheen(c, i, best).x);
+    // The living room's floor: its windows are in the wall z = 0, so from the middle of the room one
+    // sees them mirrored looking down, toward lower z.
+    const Vec3d m = c.mean(i);
+    if (m.y > 0.01 || m.x > 5.8 || m.z < 2.8 || m.z > 4.4) continue;
+    ++floor;
+    REQUIRE(best.y < 0);
+    REQUIRE(best.z < 0);
+  }
+  CHECK(floor > 3);
+  CHECK(seen > c.size() / 37 * 9 / 10);
+
+  // A lower degree leaves the upper bands out.
+  sampling.sh_degree = 1;
+  const GaussianCloud low = make_default_scene(sampling).value().cloud;
+  REQUIRE(low.shN.size() == 9 * low.size());
+  for (std::size_t i = 0; i < c.size(); ++i) {
+    for (std::size_t k = 0; k < 9; ++k) REQUIRE(low.shN[9 * i + k] == c.shN[45 * i + k]);
+  }
+}
+
+namespace {
+
 /// Area of the cells that Gaussians stand for: they are 0.7 of a cell wide, one sigma.
 double covered_area(const GaussianCloud& c) {
   double area = 0;
@@ -77,6 +145,7 @@ TEST_CASE("the flat has exactly as many Gaussians as asked for, which cover its 
 TEST_CASE("the flat is the same on any number of threads, and says how far it is") {
   SceneSampling sampling;
   sampling.gaussians = 60001;
+  sampling.sh_degree = 2;
   sampling.threads = 1;
   const DefaultScene a = make_default_scene(sampling).value();
   sampling.threads = 5;
@@ -86,6 +155,7 @@ TEST_CASE("the flat is the same on any number of threads, and says how far it is
   CHECK(a.cloud.means == b.cloud.means);
   CHECK(a.cloud.scales == b.cloud.scales);
   CHECK(a.cloud.sh0 == b.cloud.sh0);
+  CHECK(a.cloud.shN == b.cloud.shN);
   CHECK(a.cloud.row_ids == b.cloud.row_ids);
   REQUIRE_FALSE(shares.empty());
   CHECK(std::is_sorted(shares.begin(), shares.end()));
@@ -102,6 +172,9 @@ TEST_CASE("a number of Gaussians that cannot be is refused with the limit") {
   REQUIRE(at != std::string::npos);
   sampling.gaussians = std::stoul(few.message().substr(at + 9));
   CHECK(make_default_scene(sampling).value().cloud.size() == sampling.gaussians);
+  sampling.sh_degree = 4;
+  CHECK(make_default_scene(sampling).message().find("sh_degree = 4") != std::string::npos);
+  sampling.sh_degree = 0;
   sampling.gaussians = kMostSceneGaussians + 1;
   CHECK(make_default_scene(sampling).message().find("at most 50000000") != std::string::npos);
 }

@@ -23,4 +23,8 @@ void add_device_option(CLI::App& app, gsnav::Device& device, bool* float64) {
   app.add_option_function<std::string>("--device", read, what)->default_str("best")->force_callback();
 }
 
+void print_device(const gsnav::Device& device, std::FILE* out) {
+  std::fprintf(out, "device: %s\n", device.description().c_str());
+}
+
 }  // namespace gsnav_tools

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdio>
+
 #include "gsnav/device/device.hpp"
 
 namespace CLI {
@@ -13,5 +15,8 @@ namespace gsnav_tools {
 /// rejected with a list of these.
 /// @param float64 Set to true by "serial64". Null: that name is not available.
 void add_device_option(CLI::App& app, gsnav::Device& device, bool* float64 = nullptr);
+
+/// Prints "device: " and the device's description on one line.
+void print_device(const gsnav::Device& device, std::FILE* out);
 
 }  // namespace gsnav_tools

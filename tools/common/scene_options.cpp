@@ -4,7 +4,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
-#include "device_option.hpp"
 #include "gsnav/core/lower_case.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/scene/prepare.hpp"
@@ -16,8 +15,15 @@ namespace {
 
 constexpr const char* kGroup = "Scene";
 
+void add_density_option(CLI::App& app, SceneOptions& o, const char* what) {
+  app.add_option("--density", o.density, what)
+      ->capture_default_str()
+      ->check(CLI::Range(0.05, 20.0))
+      ->group(kGroup);
+}
+
 void add_file_options(CLI::App& app, SceneOptions& o) {
-  app.add_option("--scene", o.scene,
+  app.add_option("scene,--scene", o.scene,
                  "scene to open: default (the embedded flat); a file of Gaussians (.ply, .sog, .spz, "
                  ".splat, .ksplat, .glb); a folder; tiles (DIR/2_0,2_1); triangles (.glb, .obj); or a "
                  "Habitat scene (SET.scene_dataset_config.json#NAME, NAME.stage_config.json)")
@@ -68,11 +74,6 @@ void add_drawing_options(CLI::App& app, SceneOptions& o) {
                  "gsnav-navmesh, or auto to compute the sets and store them next to the scene file")
       ->type_name("FILE")
       ->group(kGroup);
-  app.add_option("--mesh", o.meshes,
-                 "triangle meshes to draw among the Gaussians (.gltf, .glb with colours and textures; "
-                 ".obj, .ply in grey), in the axes of the scene file")
-      ->type_name("FILE")
-      ->group(kGroup);
 }
 
 void add_navmesh_options(CLI::App& app, SceneOptions& o) {
@@ -101,21 +102,31 @@ void add_people_options(CLI::App& app, SceneOptions& o) {
   app.add_option("--seed", o.seed, "seed of people, episodes and random policies")
       ->capture_default_str()
       ->group(kGroup);
-  app.add_option("--density", o.density,
-                 "density of Gaussians in the embedded flat and in people, relative to the default")
-      ->capture_default_str()
-      ->check(CLI::Range(0.05, 20.0))
-      ->group(kGroup);
 }
 
 }  // namespace
+
+void add_scene_file_options(CLI::App& app, SceneOptions& o) {
+  add_file_options(app, o);
+  add_density_option(app, o, "of the embedded flat's Gaussians");
+}
+
+void add_scene_mesh_option(CLI::App& app, SceneOptions& o) {
+  app.add_option("--mesh", o.meshes,
+                 "triangle meshes among the Gaussians (.gltf and .glb with colours and textures; .obj "
+                 "and .ply grey), in the axes of the scene's file (docs/composition.md)")
+      ->type_name("FILE")
+      ->group(kGroup);
+}
 
 void add_scene_options(CLI::App& app, SceneOptions& o, bool* float64) {
   add_file_options(app, o);
   add_storage_option(app, o);
   add_drawing_options(app, o);
+  add_scene_mesh_option(app, o);
   add_navmesh_options(app, o);
   add_people_options(app, o);
+  add_density_option(app, o, "of the embedded flat's Gaussians and of people's");
   add_device_option(app, o.device, float64);
 }
 

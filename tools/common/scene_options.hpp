@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "device_option.hpp"
 #include "gsnav/core/status.hpp"
 #include "gsnav/open.hpp"
 #include "gsnav/render.hpp"
@@ -38,6 +39,10 @@ struct SceneOptions {
   gsnav::Device device;
 };
 
+/// Adds the options that name the scene: --scene (or its name alone), --up, --time and --density.
+void add_scene_file_options(CLI::App& app, SceneOptions& o);
+/// Adds --mesh: triangles next to the Gaussians.
+void add_scene_mesh_option(CLI::App& app, SceneOptions& o);
 /// Adds all scene options, with the values of `o` as defaults. See add_device_option for `float64`.
 void add_scene_options(CLI::App& app, SceneOptions& o, bool* float64 = nullptr);
 /// Converts the options to those of the library.

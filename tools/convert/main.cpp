@@ -14,6 +14,7 @@
 #include "gsnav/core/lower_case.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/io/scene_file.hpp"
+#include "gsnav/open.hpp"
 #include "gsnav/render.hpp"
 #include "gsnav/scene/prepare.hpp"
 
@@ -25,7 +26,7 @@ struct Options {
   std::vector<std::string> paths;
   std::vector<double> crop, rotate, translate;
   std::string cameras, order = "read", up = "keep";
-  double time = 0, scale = 1, min_opacity = 0, max_scale = 0;
+  double time = 0, density = 1, scale = 1, min_opacity = 0, max_scale = 0;
   int level = 0, degree = kMaxShDegree, views = 6, width = 640, height = 480;
 };
 
@@ -34,16 +35,29 @@ int fail(const std::string& message) {
   return 1;
 }
 
+/// Adds the Gaussians of a scene, in the frame of its file.
+Status add_scene(const std::string& name, const Options& o, GaussianCloud& all) {
+  OpenOptions how;
+  how.up = "keep";
+  how.time = o.time;
+  how.level = o.level;
+  how.keep_zero_bands = true;
+  how.navmesh = "none";
+  how.density = o.density;
+  const auto scene = open_scene(name, how);
+  if (!scene) return scene.status();
+  if (scene->scene->assets.empty()) return {Errc::invalid_argument, name + ": has no Gaussians"};
+  std::fputs(io::report_text(scene->report).c_str(), stdout);
+  const Status s = append(all, *scene->scene->assets.front().cloud);
+  return s ? s : Status(s.code(), name + ": " + s.message());
+}
+
 Result<GaussianCloud> load(const Options& o) {
-  GaussianCloud scene;
+  GaussianCloud all;
   for (std::size_t k = 0; k + 1 < o.paths.size(); ++k) {
-    auto loaded =
-        io::load_scene(o.paths[k], {.level = o.level, .time = o.time, .keep_zero_bands = true});
-    if (!loaded) return loaded.status();
-    std::fputs(io::report_text(loaded->report).c_str(), stdout);
-    if (Status s = append(scene, loaded->cloud); !s) return {s.code(), o.paths[k] + ": " + s.message()};
+    if (Status s = add_scene(o.paths[k], o, all); !s) return s;
   }
-  return scene;
+  return all;
 }
 
 /// Checks that a scene can be edited with these values.
@@ -198,11 +212,15 @@ int main(int argc, char** argv) {
       "room.spz --crop -4 -3 -4 4 0 4"};
   app.add_option(
          "paths", o.paths,
-         "IN... OUT; an input is a file, a folder of a SOG or a streamed set, or tiles: DIR/2_0,2_1")
+         "IN... OUT; an input is a file, a folder of a SOG or a streamed set, tiles (DIR/2_0,2_1), a "
+         "Habitat scene (SET.scene_dataset_config.json#NAME), or default, the embedded flat")
       ->required()
       ->expected(2, -1);
   app.add_option("--level", o.level, "level of streamed sets; 0 is the finest");
   app.add_option("--time", o.time, "time of a scene that moves (4D Gaussians), seconds");
+  app.add_option("--density", o.density, "density of the Gaussians of the embedded flat")
+      ->check(CLI::Range(0.05, 20.0))
+      ->capture_default_str();
   app.add_option("--crop", o.crop,
                  "keep Gaussians with their centre in X0 Y0 Z0 X1 Y1 Z1, metres, axes of the input")
       ->expected(6);

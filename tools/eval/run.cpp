@@ -24,6 +24,7 @@ Result<Stage> prepare(const Options& o) {
   const std::vector<gsnav::SensorSpec> sensors =
       gsnav::rgbd_sensors(o.height, o.width, o.hfov, {0, o.eye_height, 0});
   how.eye = gsnav::sensor_camera(sensors[0], {}, {});
+  gsnav_tools::print_device(o.device, stderr);
   auto opened = gsnav_tools::open_scene(o, how, stderr);
   if (!opened) return opened.status();
   if (opened->scene->navmesh == nullptr) {

@@ -14,8 +14,8 @@
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/io/image_file.hpp"
-#include "gsnav/io/scene_file.hpp"
 #include "gsnav/nav.hpp"
+#include "gsnav/open.hpp"
 #include "gsnav/scene/prepare.hpp"
 #include "options.hpp"
 
@@ -44,25 +44,21 @@ Status add_triangles(const std::string& path, const Similarity& placed, NavMeshT
   return {};
 }
 
-/// Triangles of `path`, if given, and of the objects.
-Result<NavMeshTriangles> load_triangles(const Options& o, const std::string& path,
-                                        const Similarity& placed) {
-  NavMeshTriangles all;
-  if (!path.empty()) {
-    if (Status s = add_triangles(path, placed, all); !s) return s;
-  }
+/// Adds the triangles of the objects in the scene.
+Status add_objects(const Options& o, NavMeshTriangles& all) {
   for (const StaticObject& object : o.objects) {
     if (Status s = add_triangles(object.file, object.placed, all); !s) return s;
   }
-  return all;
+  return {};
 }
 
 Result<NavMesh> from_triangles(const Options& o) {
-  const auto placed = placement(o, o.up == "auto" ? "y" : o.up);
+  const auto placed = placement(o, o.up == "auto" || o.up == "keep" ? "y" : o.up);
   if (!placed) return placed.status();
-  auto mesh = load_triangles(o, o.input, *placed);
-  if (!mesh) return mesh.status();
-  return NavMesh::build(o.settings, mesh->vertices, mesh->triangles, o.threads);
+  NavMeshTriangles all;
+  if (Status s = add_triangles(o.scene, *placed, all); !s) return s;
+  if (Status s = add_objects(o, all); !s) return s;
+  return NavMesh::build(o.settings, all.vertices, all.triangles, o.threads);
 }
 
 /// Computes the visible sets for positions on the NavMesh, and writes them.
@@ -92,26 +88,8 @@ Status write_visible_sets(const Options& o, const GaussianCloud& cloud, const Na
   return {};
 }
 
-Result<NavMesh> from_gaussians(const Options& o) {
-  auto scene = io::load_scene(o.input);
-  if (!scene) return scene.status();
-  std::string up = o.up;
-  if (up == "auto") {
-    up = axis_name(scene->report.up);
-    std::printf("up is %s, %s\n", up.c_str(),
-                scene->report.up_seen ? "by the scene's ground" : "as usual for such files");
-  }
-  const auto placed_by = placement(o, up);
-  if (!placed_by) return placed_by.status();
-  const Similarity& placed = *placed_by;
-  const GaussianSet set = scene->cloud.set(placed);
-  const auto beside = load_triangles(o, o.mesh, placed);
-  if (!beside) return beside.status();
-  auto built =
-      build_navmesh(o.settings, std::span(&set, 1), beside->vertices, beside->triangles, o.gaussians);
-  if (!built) return {built.code(), o.input + ": " + built.message()};
-  const GaussianNavReport& r = built->report;
-  std::printf("%s: %zu Gaussians used, %zu faint, %zu outliers\n", printable(o.input).c_str(),
+void print(const std::string& name, const GaussianNavReport& r) {
+  std::printf("%s: %zu Gaussians used, %zu faint, %zu outliers\n", printable(name).c_str(),
               r.gaussians_used, r.gaussians_faint, r.gaussians_outside);
   std::printf(
       "floor at %.3f m; %.0f %% of it under a ceiling; left out: %.2f m2 in small pieces, %.2f m2 "
@@ -121,20 +99,82 @@ Result<NavMesh> from_gaussians(const Options& o) {
     if (r.storeys.size() > 1) std::printf("storey at %.2f m: %.2f m2\n", s.height, s.area);
   }
   if (r.stairs > 0) std::printf("%zu stairs or ramps between storeys\n", r.stairs);
-  if (!o.visible_sets.empty()) {
-    if (Status s = write_visible_sets(o, scene->cloud, built->mesh, placed); !s) return s;
-  }
+}
+
+/// `beside`: triangles that stand among the Gaussians.
+Result<NavMesh> from_gaussians(const Options& o, const GaussianSet& set,
+                               const NavMeshTriangles& beside) {
+  NavMeshSettings settings = o.settings;
+  if (!o.cell_height_given)
+    settings.cell_height = std::max(gaussian_navmesh_settings().cell_height, settings.cell_size);
+  GaussianNavOptions how = o.gaussians;
+  if (o.scene == "default" && !o.solid_alpha_given) how.solid_alpha = 0.2;  // surfaces thin as paper
+  auto built = build_navmesh(settings, std::span(&set, 1), beside.vertices, beside.triangles, how);
+  if (!built) return {built.code(), o.scene + ": " + built.message()};
+  print(o.scene, built->report);
   return std::move(built->mesh);
 }
 
+/// The scene with its Gaussians, and with the triangles that a NavMesh may be built of.
+Result<OpenedScene> open(const Options& o) {
+  OpenOptions how;
+  how.up = o.up;
+  how.time = o.time;
+  how.density = o.density;
+  how.navmesh = "none";
+  how.keep_triangles = true;
+  return gsnav_tools::open_scene(o, how, stdout);
+}
+
+/// Names the option that asks for Gaussians of a scene that has none, or triangles, or ok.
+Status check_parts(const Options& o, bool gaussians, bool triangles) {
+  const auto lacks = [&o](const char* option, const char* what) {
+    return Status(Errc::invalid_argument, std::string(option) + ": " + o.scene + " has no " + what);
+  };
+  if (!triangles && o.navmesh == "mesh") return lacks("--navmesh mesh", "triangles of its own");
+  if (gaussians) return {};
+  if (o.navmesh == "gaussians") return lacks("--navmesh gaussians", "Gaussians");
+  if (!o.visible_sets.empty()) return lacks("--visible-sets", "Gaussians");
+  return o.crop.empty() ? Status() : lacks("--crop", "Gaussians");
+}
+
+Result<NavMesh> from_scene(const Options& o) {
+  const auto scene = open(o);
+  if (!scene) return scene.status();
+  const std::vector<SceneAsset>& assets = scene->scene->assets;
+  const bool own = !scene->triangles->triangles.empty();
+  if (Status s = check_parts(o, !assets.empty(), own); !s) return s;
+  const bool of_gaussians = o.navmesh == "gaussians" || (o.navmesh == "auto" && !own);
+  const auto placed = placement(o, scene->up == "keep" ? "y" : scene->up);
+  if (!placed) return placed.status();
+  NavMeshTriangles all;
+  if (!of_gaussians || o.scene != "default") {  // the flat's triangles are the same surfaces
+    Similarity enlarged;
+    enlarged.scale = o.scale;
+    const NavMeshPart part{scene->triangles->vertices, scene->triangles->triangles, enlarged};
+    auto scaled = gather_parts({}, std::span(&part, 1));
+    if (!scaled) return scaled.status();
+    all = std::move(*scaled);
+  }
+  for (const std::string& file : o.meshes) {
+    if (Status s = add_triangles(file, *placed, all); !s) return s;
+  }
+  if (Status s = add_objects(o, all); !s) return s;
+  auto mesh = of_gaussians ? from_gaussians(o, assets[0].cloud->set(*placed), all)
+                           : NavMesh::build(o.settings, all.vertices, all.triangles, o.threads);
+  if (!mesh || o.visible_sets.empty()) return mesh;
+  if (Status s = write_visible_sets(o, *assets[0].cloud, *mesh, *placed); !s) return s;
+  return mesh;
+}
+
 Result<NavMesh> make(const Options& o) {
-  switch (kind_of(o.input)) {
+  switch (kind_of(o.scene)) {
     case InputKind::navmesh:
-      return load_navmesh(o.input);
-    case InputKind::mesh:
+      return load_navmesh(o.scene);
+    case InputKind::triangles:
       return from_triangles(o);
     default:
-      return from_gaussians(o);
+      return from_scene(o);
   }
 }
 

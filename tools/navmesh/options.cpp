@@ -19,12 +19,12 @@ namespace gsnav_navmesh {
 namespace {
 
 const char kDescription[] =
-    "Builds, inspects, converts and draws NavMeshes.\nINPUT is a NavMesh (.navmesh, .bin: MSET files of "
-    "Habitat and RecastDemo), triangles (.obj, .glb,\n.gltf) or Gaussians (all other files, and glTF "
-    "files that hold Gaussians).\nPrints islands and storeys; --out, --obj and --png write files. "
-    "Lengths are metres, Y points up.\nExit status: 0 success; 1 failure, with a message on one line; 2 "
-    "invalid options.\nExample: gsnav-navmesh apartment.ply --agent-radius 0.2 --out apartment.navmesh "
-    "--png map.png";
+    "Builds, inspects, converts and draws NavMeshes.\nA SCENE that ends in .navmesh or .bin is read as "
+    "a "
+    "NavMesh (MSET files of Habitat and RecastDemo).\nFrom any other scene a NavMesh is built. Prints "
+    "islands and storeys; --out, --obj and --png write files.\nLengths are metres, Y points up.\nExit "
+    "status: 0 success; 1 failure, with a message on one line; 2 invalid options.\nExample: "
+    "gsnav-navmesh apartment.ply --agent-radius 0.2 --out apartment.navmesh --png map.png";
 
 /// Parses FILE[@X,Y,Z[,YAW[,SCALE]]]. Empty if the text after @ is something else.
 std::optional<StaticObject> parse_object(const std::string& text) {
@@ -50,24 +50,26 @@ std::optional<StaticObject> parse_object(const std::string& text) {
 
 /// Options that are checked when all are known.
 struct Given {
-  CLI::Option *up = nullptr, *scale = nullptr, *settings = nullptr, *object = nullptr,
-              *cell_height = nullptr, *tile_size = nullptr, *mesh = nullptr, *visible_sets = nullptr;
+  CLI::Option *scale = nullptr, *settings = nullptr, *object = nullptr, *cell_height = nullptr,
+              *tile_size = nullptr, *solid_alpha = nullptr;
   std::vector<std::string> objects;
 };
 
 void add_input(CLI::App& app, Options& o, Given& given) {
-  app.add_option("input", o.input,
-                 "NavMesh (.navmesh, .bin), triangles (.obj, .glb, .gltf) or Gaussians (.ply, .sog, "
-                 ".spz, .splat, .ksplat, a SOG folder, or tiles: DIR/2_0,2_1)")
-      ->required();
-  given.up = app.add_option("--up", o.up,
-                            "axis of the input that points up; auto guesses it from the ground for "
-                            "Gaussians and takes y for triangles; not for a NavMesh")
-                 ->check(CLI::IsMember({"auto", "x", "y", "z", "+x", "+y", "+z", "-x", "-y", "-z"}))
-                 ->capture_default_str();
+  gsnav_tools::add_scene_file_options(app, o);
+  app.get_option("--scene")->required();
+  app.add_option(
+         "--navmesh", o.navmesh,
+         "what to build from: gaussians, with the triangles of --mesh; mesh, the triangles of the "
+         "scene; auto: mesh if the scene has triangles of its own (default, stages of Habitat)")
+      ->check(CLI::IsMember({"auto", "gaussians", "mesh"}))
+      ->capture_default_str()
+      ->group("Scene");
+  gsnav_tools::add_scene_mesh_option(app, o);
   given.scale = app.add_option("--scale", o.scale, "metres per unit of the input; not for a NavMesh")
                     ->check(CLI::PositiveNumber)
-                    ->capture_default_str();
+                    ->capture_default_str()
+                    ->group("Scene");
 }
 
 void add_outputs(CLI::App& app, Options& o) {
@@ -171,13 +173,13 @@ void add_gaussians(CLI::App& app, Options& o, Given& given) {
   const auto option = [&](const char* name, auto& value, const char* text) {
     app.add_option(name, value, text)->capture_default_str()->group(from);
   };
-  given.mesh = app.add_option("--mesh", o.mesh,
-                              "triangles (.obj, .glb, .gltf) of the same scene; both kinds are "
-                              "obstacles and both can be floor")
-                   ->group(from);
   option("--min-opacity", g.min_opacity, "ignore Gaussians with a lower opacity");
   option("--sigmas", g.sigmas, "size of a solid Gaussian, in standard deviations");
-  option("--solid-alpha", g.solid_alpha, "share of light that a voxel must block to be solid");
+  given.solid_alpha = app.add_option("--solid-alpha", g.solid_alpha,
+                                     "share of light that a voxel must block to be solid; 0.2 for the "
+                                     "embedded flat")
+                          ->capture_default_str()
+                          ->group(from);
   option("--min-support", g.min_support, "drop groups of fewer connected solid voxels (floaters)");
   option("--max-hole", g.max_hole, "close gaps in the floor up to this width");
   option("--floor-band", g.floor_band, "largest distance of the surface from the height of the floor");
@@ -192,14 +194,13 @@ void add_gaussians(CLI::App& app, Options& o, Given& given) {
       ->group(from);
 }
 
-void add_visible_sets(CLI::App& app, Options& o, Given& given) {
+void add_visible_sets(CLI::App& app, Options& o) {
   gsnav::VisibleSettings& v = o.visible;
   const char* seen = "Visible sets of Gaussians";
-  given.visible_sets =
-      app.add_option("--visible-sets", o.visible_sets,
-                     "file to write: the Gaussians that are seen from each cell of the NavMesh that "
-                     "cameras can be in; gsnav-render --visible-sets reads it")
-          ->group(seen);
+  app.add_option("--visible-sets", o.visible_sets,
+                 "file to write: the Gaussians that are seen from each cell of the NavMesh that cameras "
+                 "can be in; gsnav-render --visible-sets reads it")
+      ->group(seen);
   app.add_option("--eye-heights", o.eye_heights, "heights of the cameras above the floor, metres")
       ->capture_default_str()
       ->group(seen);
@@ -223,44 +224,39 @@ void add_visible_sets(CLI::App& app, Options& o, Given& given) {
 
 }  // namespace
 
-InputKind kind_of(const std::string& input) {
-  const std::string extension = gsnav::lower_case(std::filesystem::path(input).extension().string());
+InputKind kind_of(const std::string& scene) {
+  const std::string extension = gsnav::lower_case(std::filesystem::path(scene).extension().string());
   if (extension == ".navmesh" || extension == ".bin") return InputKind::navmesh;
-  if (extension == ".obj") return InputKind::mesh;
+  if (extension == ".obj") return InputKind::triangles;
   const bool gltf = extension == ".glb" || extension == ".gltf";
-  return gltf && !gsnav::io::gltf_holds_gaussians(input) ? InputKind::mesh : InputKind::gaussians;
+  return gltf && !gsnav::io::gltf_holds_gaussians(scene) ? InputKind::triangles : InputKind::scene;
 }
 
 namespace {
 
 /// Rejects options that cannot be combined.
-void check_together(Options& o, const Given& given) {
-  if (kind_of(o.input) != InputKind::gaussians && given.visible_sets->count() > 0) {
-    throw CLI::ValidationError("--visible-sets", o.input + " has no Gaussians");
+void check_together(const CLI::App& app, Options& o, const Given& given) {
+  const auto is_given = [&app](const char* name) { return app.get_option(name)->count() > 0; };
+  const auto refuse = [&is_given](std::initializer_list<const char*> names, const std::string& why) {
+    for (const char* name : names)
+      if (is_given(name)) throw CLI::ValidationError(name, why);
+  };
+  const InputKind kind = kind_of(o.scene);
+  if (o.scale != 1) refuse({"--visible-sets"}, "not with --scale: gsnav-render knows no scale");
+  if (kind == InputKind::navmesh) {
+    refuse(
+        {"--up", "--scale", "--time", "--density", "--navmesh", "--tile-size", "--object", "--settings"},
+        o.scene + " is a NavMesh: it stands as it is");
   }
-  if (o.scale != 1 && given.visible_sets->count() > 0) {
-    throw CLI::ValidationError("--visible-sets", "not with --scale: gsnav-render knows no scale");
-  }
-  if (kind_of(o.input) == InputKind::navmesh && given.up->count() + given.scale->count() > 0) {
-    throw CLI::ValidationError("--up, --scale", o.input + " is a NavMesh: it stands as it is");
-  }
-  if (kind_of(o.input) == InputKind::navmesh && given.tile_size->count() > 0) {
-    throw CLI::ValidationError("--tile-size", o.input + " is a NavMesh already");
-  }
-  if (kind_of(o.input) != InputKind::gaussians && !o.crop.empty()) {
-    throw CLI::ValidationError("--crop", o.input + " has no Gaussians");
-  }
-  if (kind_of(o.input) == InputKind::navmesh && given.object->count() + given.settings->count() > 0) {
-    throw CLI::ValidationError("--object, --settings", o.input + " is a NavMesh: nothing is built");
-  }
+  if (kind != InputKind::scene)
+    refuse({"--visible-sets", "--crop", "--mesh"}, o.scene + " has no Gaussians");
+  if (kind == InputKind::triangles && o.navmesh == "gaussians")
+    throw CLI::ValidationError("--navmesh", o.scene + " has no Gaussians");
   for (const std::string& text : given.objects) {
     const auto one = parse_object(text);
     if (!one) throw CLI::ValidationError("--object", text + " is not FILE[@X,Y,Z[,YAW[,SCALE]]]");
     o.objects.push_back(*one);
     o.settings.include_static_objects = true;
-  }
-  if (kind_of(o.input) != InputKind::gaussians && given.mesh->count() > 0) {
-    throw CLI::ValidationError("--mesh", o.input + " has no Gaussians to go with " + o.mesh);
   }
 }
 
@@ -274,22 +270,20 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   add_outputs(app, o);
   add_build(app, o, given);
   add_gaussians(app, o, given);
-  add_visible_sets(app, o, given);
-  const auto status = gsnav_tools::parse_options(app, argc, argv, [&] { check_together(o, given); });
+  add_visible_sets(app, o);
+  const auto status =
+      gsnav_tools::parse_options(app, argc, argv, [&] { check_together(app, o, given); });
   if (status) {
     exit_code = *status;
     return std::nullopt;
   }
-  if (kind_of(o.input) == InputKind::gaussians) {
-    gsnav::NavMeshSettings& s = o.settings;
-    if (given.cell_height->count() + given.settings->count() == 0)
-      s.cell_height = std::max(gsnav::gaussian_navmesh_settings().cell_height, s.cell_size);
-    if (!o.crop.empty()) o.gaussians.crop = gsnav_tools::box_of(o.crop);
-    o.gaussians.progress = [print = gsnav_tools::progress_printer()](const char* stage, double share) {
-      print(std::string("NavMesh: ") + stage, share);
-    };
-    o.gaussians.threads = o.threads;
-  }
+  o.cell_height_given = given.cell_height->count() + given.settings->count() > 0;
+  o.solid_alpha_given = given.solid_alpha->count() > 0;
+  if (!o.crop.empty()) o.gaussians.crop = gsnav_tools::box_of(o.crop);
+  o.gaussians.progress = [print = gsnav_tools::progress_printer()](const char* stage, double share) {
+    print(std::string("NavMesh: ") + stage, share);
+  };
+  o.gaussians.threads = o.threads;
   return o;
 }
 

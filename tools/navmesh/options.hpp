@@ -5,15 +5,20 @@
 #include <string>
 #include <vector>
 
+#include "../common/scene_options.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/nav.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 
 namespace gsnav_navmesh {
 
-/// Kind of a file, by its name.
-enum class InputKind { navmesh, mesh, gaussians };
-InputKind kind_of(const std::string& input);
+/// Kind of a scene, by its name.
+enum class InputKind {
+  navmesh,    ///< A file of a NavMesh.
+  triangles,  ///< A file of triangles.
+  scene,  ///< Anything else that gsnav::open_scene opens: Gaussians, or triangles of a Habitat scene.
+};
+InputKind kind_of(const std::string& scene);
 
 /// Triangles of an object in the scene.
 struct StaticObject {
@@ -21,18 +26,15 @@ struct StaticObject {
   gsnav::Similarity placed;
 };
 
-struct Options {
-  std::string input;
-  std::string up = "auto";
+struct Options : gsnav_tools::SceneOptions {
   double scale = 1.0;
-  std::string mesh;  ///< Triangles in addition to the Gaussians of the input.
   std::vector<StaticObject> objects;
   std::string out, obj, png, settings_out;
   int mset_version = 2;  ///< Version of `out`.
   gsnav::NavMeshSettings settings;
   int threads = 0;  ///< Threads that build tiles. 0: one per core.
+  bool cell_height_given = false, solid_alpha_given = false;
   gsnav::GaussianNavOptions gaussians;
-  std::vector<double> crop;      ///< World box as x0 y0 z0 x1 y1 z1. Empty: the whole scene.
   std::optional<double> height;  ///< Height of the picture. Empty: that of a level.
   std::optional<std::size_t> level;
   std::string visible_sets;  ///< File to write. Empty: none.

@@ -58,6 +58,7 @@ Result<Scene> load_scene(const Options& o) {
   OpenOptions how = gsnav_tools::open_options(o);
   how.eye.set_hfov(o.width > 0 ? o.width : 640, o.height > 0 ? o.height : 480, o.hfov);
   how.eye.near_plane = o.near_plane;
+  gsnav_tools::print_device(o.device, stdout);
   auto opened = gsnav_tools::open_scene(o, how, stdout);
   if (!opened) return opened.status();
   if (!opened->scene->assets.empty() && o.scene != "default")

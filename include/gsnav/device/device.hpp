@@ -48,7 +48,8 @@ class Device {
 
   /// Name in the form that parse accepts: "serial", "cpu", "cpu:4", "cuda:0".
   std::string name() const;
-  /// Description for people: "CPU, 4 threads, avx2 lanes" or "NVIDIA H100 80GB HBM3 (cuda:0)".
+  /// Description for people: "CPU, 4 threads, AVX2" or "NVIDIA H100 80GB HBM3 (cuda:0)". Names the
+  /// instruction set in use. On a processor without FMA it says how much slower frames are.
   std::string description() const;
 
   /// True if both name the same hardware.

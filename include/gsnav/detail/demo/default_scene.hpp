@@ -18,7 +18,7 @@ namespace gsnav {
 /// World frame: metres, Y up, floor at y = 0, ceiling at 2.7; inside walls x in [0, 10], z in [0, 8].
 /// Four furnished rooms are joined by five openings, so that most targets can be reached in two ways.
 struct DefaultScene {
-  GaussianCloud cloud;                                  ///< SH degree 0, with baked light.
+  GaussianCloud cloud;                                  ///< The Gaussians, with baked light.
   std::vector<Vec3d> vertices;                          ///< The same surfaces as a mesh, metres.
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< Counter-clockwise seen from the front.
   Aabb<double> bounds{};                                ///< Box of the Gaussians' means.
@@ -33,7 +33,8 @@ struct DefaultView {
 /// Viewpoints at eye level, one for each room, the living room first.
 std::array<DefaultView, 4> default_scene_views() noexcept;
 
-/// Upper limit of SceneSampling::gaussians. Making that many takes 6 GB of memory.
+/// Upper limit of SceneSampling::gaussians. Making that many takes 6 GB of memory, or 15 GB with SH
+/// degree 3.
 inline constexpr std::size_t kMostSceneGaussians = 50'000'000;
 
 /// How densely the surfaces of a generated scene are covered with Gaussians. Gaussians are as wide as
@@ -45,8 +46,10 @@ struct SceneSampling {
   std::size_t gaussians = 0;
   double density = 1.0;  ///< Factor on the number of Gaussians, in [0.05, 20]. 1 is about 390,000 for
                          ///< the flat.
-  int threads = 0;       ///< Number of threads; 0: one for each core, at most 16. Does not change the
-                         ///< scene.
+  /// SH degree of the colours, 0 to 3. Above 0, surfaces have a sheen: they are brighter in directions
+  /// that mirror the light of windows and lamps. The average over all directions is as with degree 0.
+  int sh_degree = 0;
+  int threads = 0;  ///< Number of threads; 0: one for each core, at most 16. Does not change the scene.
   std::function<void(double)> progress;  ///< Called with the share of work that is done, in (0, 1], by
                                          ///< one thread.
 };

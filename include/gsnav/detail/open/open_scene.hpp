@@ -18,6 +18,8 @@
 
 namespace gsnav {
 
+struct NavMeshTriangles;  // gsnav/nav/navmesh.hpp
+
 /// How a scene's Gaussians are kept in memory.
 enum class CloudStorage : std::uint8_t {
   full,     ///< Float32.
@@ -44,15 +46,7 @@ struct OpenOptions {
   /// - "keep": the world is the file's frame.
   std::string up = "auto";
   double time = 0;  ///< Seconds: the moment of a scene that moves (4D Gaussians).
-  CloudStorage storage = CloudStorage::full;  ///< How the Gaussians are kept in memory.
-  /// Largest change of a colour for which SH bands are dropped. 0 drops only bands of zeros, which
-  /// changes no image. kUnseenColor drops bands too weak to be seen, for Quality::fast and levels of
-  /// detail.
-  double unseen_color = 0;
-  SceneLevels levels = SceneLevels::none;  ///< Levels of detail. Built ones are stored next to the
-                                           ///< scene's file.
-  /// Paths of triangle meshes to draw among the Gaussians, in the frame of the scene's file: .gltf and
-  /// .glb with colours and textures, .obj and .ply grey.
+  int level = 0;    ///< Level of a streamed set that is opened without `levels`; 0 is the finest.
   std::vector<std::string> meshes{};
 
   // ---- NavMesh
@@ -65,12 +59,11 @@ struct OpenOptions {
   /// - "gaussians": built from the Gaussians, and from triangles if there are any.
   /// - otherwise a file (.navmesh, .bin).
   std::string navmesh{};
-  double cell_size = 0.05;                        ///< Edge of the voxels from which a NavMesh is built,
-                                                  ///< metres.
-  std::optional<Aabb<double>> crop{};             ///< Builds the NavMesh in this box only; world frame,
-                                                  ///< metres.
-  double agent_radius = 0.1, agent_height = 1.5;  ///< Size of the agent for which the NavMesh is built,
-                                                  ///< metres.
+  bool keep_zero_bands = false;            ///< Keep all SH bands of the file, also those of zeros.
+  SceneLevels levels = SceneLevels::none;  ///< Levels of detail. Built ones are stored next to the
+                                           ///< scene's file.
+  /// Paths of triangle meshes to draw among the Gaussians, in the frame of the scene's file: .gltf and
+  /// .glb with colours and textures, .obj and .ply grey.
 
   // ---- Visible sets
   /// Visible sets:
@@ -110,6 +103,7 @@ struct OpenedScene {
   std::vector<std::string> warnings;  ///< A line for each thing that was left out, or done
                                       ///< differently than asked for.
   double load_seconds = 0, navmesh_seconds = 0;  ///< Seconds taken.
+  bool keep_triangles = false;                   ///< Fill OpenedScene::triangles.
 };
 
 /// Opens a scene by its name:
