@@ -10,7 +10,7 @@ namespace gsnav_report {
 
 struct SkinningOptions {
   int gaussians = 100000;  ///< of the embedded humanoid that is timed, about
-  int sampled = 6000;      ///< of the humanoid that errors are measured on
+  int sampled = 6000;      ///< Gaussians of the humanoid that errors are measured on
   int poses = 8;           ///< poses of walking, and the same number of random poses
   int threads = 0;         ///< of the openmp backend; 0: all
   int runs = 15;

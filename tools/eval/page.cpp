@@ -124,7 +124,7 @@ std::string page(const Options& o, const gsnav::MetricsSummary& s, const std::ve
            ", SPL " + format(m.spl) + ", " + std::to_string(m.steps) + " actions, CR " +
            format(m.collision_rate) + ", PSI " + format(m.psi) + ", reward " + format(e.record->reward) +
            "</summary>\n";
-    out += figure(e.strip, "Images of the agent in episode " + e.record->id +
+    out += figure(e.strip, "Camera images in episode " + e.record->id +
                                ", from its begin to its end: colour, and below it depth.");
     out += figure(e.map, "Episode " + e.record->id + " from above.");
     out += "</details>\n";

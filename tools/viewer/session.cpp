@@ -328,7 +328,7 @@ std::string Session::describe(const Controls& c, std::uint64_t number) const {
 Result<std::string> Session::frame(std::string_view message) {
   std::unique_lock lock(mutex_);
   if (Status s = apply(message, controls_); !s) return s;
-  // A number from another process is ignored.
+  // A frame number from another process is ignored.
   const bool knows = controls_.seen && *controls_.seen <= begun_;
   const std::uint64_t seen = knows ? *controls_.seen : begun_;
   if (controls_.walks) last_message_ = Clock::now();

@@ -60,7 +60,7 @@ inline RealColumns rotation_columns(Real w, Real x, Real y, Real z) noexcept {
 inline Real spherical_harmonic(int l, int m, const Real3& d) noexcept {
   const Real pi = 3.14159265358979323846264338327950288L;
   const int order = m < 0 ? -m : m;
-  // P_order^order / sin^order, then upwards in degree.
+  // Starts with P_order^order / sin^order. The recurrence then raises the degree.
   Real below = 0, legendre = 1, cosine = 1, sine = 0, ratio = 1;
   for (int i = 1; i <= order; ++i) {
     legendre *= -(2 * i - 1);
