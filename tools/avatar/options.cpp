@@ -51,7 +51,7 @@ void add_clip(CLI::App& app, ClipSource& c) {
 
 void add_mesh(CLI::App& app, MeshCommand& m, bool makehuman) {
   app.add_option("input", m.input,
-                 makehuman ? "MakeHuman base mesh (.obj)" : "Rigged glTF 2.0 (.glb, .gltf)")
+                 makehuman ? "MakeHuman base mesh (.obj)" : "rigged glTF 2.0 file (.glb, .gltf)")
       ->required();
   app.add_option("--out", m.out, "avatar file to write (.npz with the keys of Habitat-GS)")->required();
   if (makehuman) m.scale = 0.1;
@@ -88,7 +88,7 @@ CLI::App* add_walk(CLI::App& app, WalkCommand& walk, std::string& from, std::str
                    std::vector<std::string>& via) {
   CLI::App* walks =
       app.add_subcommand("walk", "plan a path on a NavMesh and write a driver that walks along it");
-  walks->add_option("--avatar", walk.avatar, "Avatar (.npz)")->required();
+  walks->add_option("--avatar", walk.avatar, "avatar file (.npz)")->required();
   CLI::Option* mesh = walks->add_option("--navmesh", walk.navmesh, "NavMesh (.navmesh, .bin)");
   walks
       ->add_flag("--flat", walk.flat,
@@ -97,7 +97,7 @@ CLI::App* add_walk(CLI::App& app, WalkCommand& walk, std::string& from, std::str
   walks->add_option("--from", from, "start: X,Y,Z")->required();
   walks->add_option("--to", to, "end: X,Y,Z")->required();
   walks->add_option("--via", via, "point on the way: X,Y,Z; may be repeated, in order");
-  walks->add_option("--out", walk.out, "Driver to write (.npz)")->required();
+  walks->add_option("--out", walk.out, "driver file to write (.npz)")->required();
   walks
       ->add_option("--speed", walk.speed,
                    "walking speed, metres per second; 0 takes the speed of the clip")
@@ -122,8 +122,8 @@ CLI::App* add_walk(CLI::App& app, WalkCommand& walk, std::string& from, std::str
 
 CLI::App* add_strip(CLI::App& app, StripCommand& strip, std::string& eye, std::string& target) {
   CLI::App* strips = app.add_subcommand("strip", "draw images of a walk from one camera, side by side");
-  strips->add_option("--avatar", strip.avatar, "Avatar (.npz)")->required();
-  strips->add_option("--driver", strip.driver, "Driver (.npz)")->required();
+  strips->add_option("--avatar", strip.avatar, "avatar file (.npz)")->required();
+  strips->add_option("--driver", strip.driver, "driver file (.npz)")->required();
   CLI::Option* scene = strips->add_option(
       "--scene", strip.scene,
       "scene of Gaussians to draw around the person: .ply, .sog, a SOG folder, DIR/2_0,2_1");
