@@ -69,7 +69,8 @@ of() { # 300000 -> 300K
 scenes=()
 for count in ${gaussians//,/ }; do
   if [[ ! -f $out/flat_$count.ply ]]; then
-    "$scene" flat --gaussians "$count" --out "$out/flat_$count.ply" --cameras "$out/cameras.json"
+    "$scene" flat --gaussians "$count" --out "$out/flat_$count.ply" --cameras "$out/cameras.json" \
+      --views 64 --hfov 90 --width 256 --height 256
   fi
   scenes+=(--scene "flat $(of "$count")=$out/flat_$count.ply:$out/cameras.json")
 done

@@ -114,7 +114,7 @@ void add_scene_file_options(CLI::App& app, SceneOptions& o) {
 void add_scene_mesh_option(CLI::App& app, SceneOptions& o) {
   app.add_option("--mesh", o.meshes,
                  "triangle meshes among the Gaussians (.gltf and .glb with colours and textures; .obj "
-                 "and .ply grey), in the axes of the scene's file (docs/composition.md)")
+                 "and .ply grey), in the axes of the scene's file (docs/reference/composition.md)")
       ->type_name("FILE")
       ->group(kGroup);
 }

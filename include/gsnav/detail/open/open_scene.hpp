@@ -47,6 +47,16 @@ struct OpenOptions {
   std::string up = "auto";
   double time = 0;  ///< Seconds: the moment of a scene that moves (4D Gaussians).
   int level = 0;    ///< Level of a streamed set that is opened without `levels`; 0 is the finest.
+  CloudStorage storage = CloudStorage::full;
+  /// Largest change of a colour for which SH bands are dropped. 0 drops only bands of zeros, which
+  /// changes no image. kUnseenColor drops bands too weak to be seen, for Quality::fast and levels of
+  /// detail.
+  double unseen_color = 0;
+  bool keep_zero_bands = false;            ///< Keep all SH bands of the file, also those of zeros.
+  SceneLevels levels = SceneLevels::none;  ///< Levels of detail. Built ones are stored next to the
+                                           ///< scene's file.
+  /// Paths of triangle meshes to draw among the Gaussians, in the frame of the scene's file: .gltf and
+  /// .glb with colours and textures, .obj and .ply grey.
   std::vector<std::string> meshes{};
 
   // ---- NavMesh
@@ -59,11 +69,13 @@ struct OpenOptions {
   /// - "gaussians": built from the Gaussians, and from triangles if there are any.
   /// - otherwise a file (.navmesh, .bin).
   std::string navmesh{};
-  bool keep_zero_bands = false;            ///< Keep all SH bands of the file, also those of zeros.
-  SceneLevels levels = SceneLevels::none;  ///< Levels of detail. Built ones are stored next to the
-                                           ///< scene's file.
-  /// Paths of triangle meshes to draw among the Gaussians, in the frame of the scene's file: .gltf and
-  /// .glb with colours and textures, .obj and .ply grey.
+  double cell_size = 0.05;                        ///< Edge of the voxels from which a NavMesh is built,
+                                                  ///< metres.
+  std::optional<Aabb<double>> crop{};             ///< Builds the NavMesh in this box only; world frame,
+                                                  ///< metres.
+  double agent_radius = 0.1, agent_height = 1.5;  ///< Size of the agent for which the NavMesh is built,
+                                                  ///< metres.
+  bool keep_triangles = false;                    ///< Fill OpenedScene::triangles.
 
   // ---- Visible sets
   /// Visible sets:
@@ -95,15 +107,17 @@ struct OpenedScene {
   std::shared_ptr<const SimulatorScene> scene;  ///< assets[0] of it are the Gaussians, if there are any.
   LoadReport report;                            ///< Report of reading the Gaussians.
   std::string up = "y";                         ///< The file's up axis, in the form of OpenOptions::up.
-  bool up_guessed = false;            ///< Whether `up` was guessed from the ground; report.up_confidence
-                                      ///< then applies.
-  std::string navmesh_source;         ///< Origin of the NavMesh, such as "from the mesh" or "from FILE";
-                                      ///< empty without one.
-  std::vector<std::string> notes;     ///< A line for each thing that was found or built.
-  std::vector<std::string> warnings;  ///< A line for each thing that was left out, or done
-                                      ///< differently than asked for.
+  bool up_guessed = false;     ///< Whether `up` was guessed from the ground; report.up_confidence
+                               ///< then applies.
+  std::string navmesh_source;  ///< Origin of the NavMesh, such as "from the mesh" or "from FILE";
+                               ///< empty without one.
+  /// World frame: the triangles that a NavMesh may be built from. Null without
+  /// OpenOptions::keep_triangles.
+  std::shared_ptr<const NavMeshTriangles> triangles;
+  std::vector<std::string> notes;                ///< A line for each thing that was found or built.
+  std::vector<std::string> warnings;             ///< A line for each thing that was left out, or done
+                                                 ///< differently than asked for.
   double load_seconds = 0, navmesh_seconds = 0;  ///< Seconds taken.
-  bool keep_triangles = false;                   ///< Fill OpenedScene::triangles.
 };
 
 /// Opens a scene by its name:
