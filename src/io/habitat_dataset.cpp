@@ -79,7 +79,7 @@ std::string name_of(const fs::path& file, std::string_view ending) {
 class DatasetReader {
  public:
   explicit DatasetReader(const fs::path& path)
-      : folder_(path.parent_path()), at_(path.string()), path_(path) {}
+      : folder_(path.has_parent_path() ? path.parent_path() : "."), at_(path.string()), path_(path) {}
 
   Result<HabitatDataset> run() {
     const auto json = load_object(path_);
