@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <array>
+
 #include "files.hpp"
 #include "gsnav/demo.hpp"
 #include "gsnav/io/scene_file.hpp"
@@ -203,11 +205,13 @@ TEST_CASE("open: triangles, and all SH bands of a file, are kept where they are 
   const auto flat = open_scene("default", o);
   CHECK(flat->triangles->triangles == make_default_scene()->triangles);
 
-  GaussianCloudBuilder builder(2);  // of bands that are all zero
+  const std::array<float, 24> zeros{};
+  GaussianCloudBuilder builder(2);
   for (int i = 0; i < 9; ++i) {
     RawGaussian g;
     g.mean = {0.1 * i, 0, 0.2 * (i % 3)};
     g.log_scales = {-3, -3, -3};
+    g.shN = zeros.data();
     builder.add(g);
   }
   io::save_ply(folder / "plain.ply", builder.cloud()).throw_if_error();
