@@ -108,13 +108,13 @@ void add_people_options(CLI::App& app, SceneOptions& o) {
 
 void add_scene_file_options(CLI::App& app, SceneOptions& o) {
   add_file_options(app, o);
-  add_density_option(app, o, "of the embedded flat's Gaussians");
+  add_density_option(app, o, "density of Gaussians in the embedded flat, relative to the default");
 }
 
 void add_scene_mesh_option(CLI::App& app, SceneOptions& o) {
   app.add_option("--mesh", o.meshes,
-                 "triangle meshes among the Gaussians (.gltf and .glb with colours and textures; .obj "
-                 "and .ply grey), in the axes of the scene's file (docs/reference/composition.md)")
+                 "triangle meshes to draw among the Gaussians (.gltf, .glb with colours and textures; "
+                 ".obj, .ply in grey), in the axes of the scene file")
       ->type_name("FILE")
       ->group(kGroup);
 }
@@ -126,7 +126,8 @@ void add_scene_options(CLI::App& app, SceneOptions& o, bool* float64) {
   add_scene_mesh_option(app, o);
   add_navmesh_options(app, o);
   add_people_options(app, o);
-  add_density_option(app, o, "of the embedded flat's Gaussians and of people's");
+  add_density_option(app, o,
+                     "density of Gaussians in the embedded flat and in people, relative to the default");
   add_device_option(app, o.device, float64);
 }
 
