@@ -126,7 +126,7 @@ void add_scene_options(CLI::App& app, SceneOptions& o, bool* float64) {
   add_scene_mesh_option(app, o);
   add_navmesh_options(app, o);
   add_people_options(app, o);
-  add_density_option(app, o, "of the embedded flat's Gaussians and of people's");
+  add_density_option(app, o, "density of Gaussians of the embedded flat and of people");
   add_device_option(app, o.device, float64);
 }
 
