@@ -3,8 +3,8 @@
 // BasicRenderer, whose backend the compiler knows, in turn. usage: bench_device [side [pairs [threads]]]
 //
 // A row: the medians of both in processor time, and the median of the differences of neighbours, as a
-// share of a frame. The row "template twice" has the same renderer on both sides: what differs there is
-// noise.
+// share of a frame. The row "template twice" has the same renderer on both sides:
+// differences there are noise.
 #include <time.h>
 
 #include <algorithm>

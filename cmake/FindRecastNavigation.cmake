@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Finds Recast and Detour where no CMake config of theirs is installed (Debian's librecast-dev).
+# Finds Recast and Detour without a CMake config of Recast (Debian's librecast-dev).
 # Defines the imported targets Recast::Recast and Recast::Detour.
 
 find_path(RecastNavigation_INCLUDE_DIR NAMES Recast.h PATH_SUFFIXES recastnavigation)

@@ -40,7 +40,7 @@ if(GSNAV_BUILD_CUDA)
   if(NOT DEFINED CMAKE_CUDA_COMPILER AND NOT DEFINED ENV{CUDACXX})
     set(CMAKE_CUDA_COMPILER "${GSNAV_NVCC}")
   endif()
-  # All that the toolkit knows from 75 on, the newest also as PTX for what comes after it.
+  # All that the toolkit knows from 75 on, the newest also as PTX for later ones.
   if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
     set(_arches 75 80 86 89 90)
     if(_nvcc_version VERSION_GREATER_EQUAL 12.8)
@@ -57,7 +57,7 @@ endif()
 
 # gsnav_cuda_options(target): how device code is compiled.
 function(gsnav_cuda_options target)
-  # No contraction: what the kernels fuse they fuse themselves, and the bits are the CPU's.
+  # No contraction: kernels call fma themselves, which gives the same bits as the CPU.
   # -std by hand: CMake 3.25 does not know that nvcc has C++20.
   # 2810: nvcc takes the assignment of a nodiscard class for a value dropped.
   target_compile_options(${target} PRIVATE

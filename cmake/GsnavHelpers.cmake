@@ -45,7 +45,7 @@ function(gsnav_brief_test target)
 endfunction()
 
 # gsnav_test(name SOURCES ... LIBS ...): a doctest executable that ctest runs. tests/support has main(), helpers and
-# what all tests render with, compiled once; GSNAV_DATA_DIR reaches the tests as a definition.
+# the renderers of all tests, compiled once; GSNAV_DATA_DIR reaches the tests as a definition.
 function(gsnav_test name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
   if(NOT TARGET gsnav_test_support)

@@ -2,7 +2,7 @@
 # pkg-config files: gsnav.pc (headers only) and gsnav-<component>.pc for each compiled component. Paths are relative to
 # the file, so that the tree can be moved. Included by GsnavInstall.cmake.
 
-# What a component links, as pkg-config knows it: modules, or else flags for the compiler and the linker.
+# Dependencies of a component for pkg-config: modules, or else flags for the compiler and the linker.
 set(_pc_module_PNG libpng)
 set(_pc_module_JPEG libjpeg)
 set(_pc_module_ZLIB zlib)

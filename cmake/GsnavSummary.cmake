@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # The table that ends a configure: each part, on or off, and why.
 
-# _gsnav_part(name condition on off): a row; `condition` is a target, or a variable that holds true or false. `on` says
-# what the part is, `off` what would turn it on.
+# _gsnav_part(name condition on off): a row; `condition` is a target, or a variable that holds true or false. `on`
+# describes the part, `off` how to turn it on.
 function(_gsnav_part name condition on off)
   if(TARGET ${condition} OR ${condition})
     set(_row "on   ${on}")
@@ -15,7 +15,8 @@ function(_gsnav_part name condition on off)
   message(STATUS "  ${name}${_padding}${_row}")
 endfunction()
 
-# _gsnav_why(variable option needs...): why a component is off: its option, or the first of `needs` that is no target.
+# _gsnav_why(variable option needs...) says why a component is off: its option, or the first of `needs` that is no
+# target.
 function(_gsnav_why variable option)
   set(_why "${option}=OFF")
   if(${option})

@@ -1,10 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# Checks the layout of text: C++ and CUDA sources are as clang-format 14 writes them (105 columns, literals may be
-# longer), no line of prose in Markdown is longer than 105 columns (tables, code and links may be), and no line of
-# Python, shell or CMake, nor any of C++ with its literals, is longer than 120. The wording of folders that
-# tools/check_words.py names follows the rules in CONTRIBUTING.md.
+# Checks the layout and the wording of text. C++ and CUDA sources are as clang-format 14 writes them, with 105 columns,
+# or 120 with literals. Prose in Markdown has at most 105 columns; tables, code and links may be longer. Python, shell
+# and CMake have at most 120. Wording follows CONTRIBUTING.md in all folders that tools/check_words.py names.
 #
 #   tools/check_format.sh          names what is wrong; exit status 1 where anything is
 #   tools/check_format.sh --fix    formats the sources in place

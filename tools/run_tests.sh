@@ -7,7 +7,7 @@
 # --cuda (without a GPU, for the oldest architecture). ccache is used if it is installed.
 #
 # GSNAV_NO_APT=1      never call apt-get
-# GSNAV_DEPS          set of packages: demo, tests or ci (default: by preset); see tools/install_deps.sh
+# GSNAV_DEPS          set of packages (demo, tests or ci; default: by preset); see tools/install_deps.sh
 # GSNAV_PRESET        configure preset (default: tests, which compiles fastest)
 # GSNAV_CUDA          AUTO (if nvcc is found), ON (as --cuda) or OFF
 # GSNAV_JOBS=N        compile N files and run N tests at a time (default: see tools/build_jobs.sh)

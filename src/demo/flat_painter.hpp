@@ -127,7 +127,7 @@ class Painter {
   /// Gaussians of a patch.
   struct Made {
     std::vector<RawGaussian> rows;
-    std::vector<float> shN;  ///< theirs, one after the other; empty for degree 0
+    std::vector<float> shN;  ///< SH of the rows, one after the other; empty for degree 0
   };
 
   Box world_box(const Vec3d& low, const Vec3d& high) const noexcept;

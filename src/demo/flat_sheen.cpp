@@ -13,7 +13,7 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kSheen = 0.12;  // display value that is added where the mirror image of the light is
 const Vec3d kTint{1.0, 0.97, 0.90};
-/// Of the added value, what bands 1, 2 and 3 have. They add up to 1.
+/// Shares of the added value in bands 1, 2 and 3. They add up to 1.
 constexpr double kBandShare[] = {0.5, 0.3, 0.2};
 
 /// All 16 basis functions at a direction.

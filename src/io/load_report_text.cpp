@@ -35,7 +35,7 @@ std::string report_text(const LoadReport& r) {
     if (r.up_seen) {
       line("up: %s, seen from the ground (confidence %.2f)", axis, r.up_confidence);
     } else {
-      line("up: %s, guessed by what is usual in such files", axis);
+      line("up: %s, the usual axis of such files", axis);
     }
   }
   line("filter %s, eps2d %.3g, sorted by %s", r.filter == Filter::mip ? "mip" : "classic",

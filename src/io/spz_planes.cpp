@@ -195,7 +195,7 @@ class PlanesReader {
                     std::to_string(records.size() - 8) + " are there");
       }
       if (type == kAxesExtension) {
-        planes_.warnings.push_back("an extension names other axes than SPZ's, which is not heeded");
+        planes_.warnings.push_back("an extension that names other axes is ignored");
       }
       records = records.part(8 + std::uint64_t{size}, records.size() - 8 - size);
     }

@@ -417,7 +417,7 @@ TEST_CASE("convert: what was read, dropped and repaired is said line by line") {
                                 "  6 left out: opacity below 1/255, never visible",
                                 "  5 repaired: log-scale clamped to [-20, 20]",
                                 "  means from (-1, -2, -3) to (4, 5, 6) m",
-                                "  up: -y, guessed by what is usual in such files",
+                                "  up: -y, the usual axis of such files",
                                 "  filter classic, eps2d 0.3, sorted by depth"};
   std::string line;
   for (const char* want : wanted) {

@@ -154,7 +154,7 @@ int run(const Options& o, const Scene& scene, HostView& host, const Draw& draw) 
     }
     if (const Status s = write_images(f, cameras[c], c, o); !s.ok()) return fail(s.message());
     if (terminal || c + 1 == cameras.size()) {
-      std::printf("%s%zu/%zu views, %.1f ms a view", terminal ? "\r" : "", c + 1, cameras.size(),
+      std::printf("%s%zu/%zu views, %.1f ms per view", terminal ? "\r" : "", c + 1, cameras.size(),
                   total_ms / static_cast<double>(c + 1));
       std::fflush(stdout);
     }

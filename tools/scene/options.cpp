@@ -41,9 +41,9 @@ void add_scene_file(CLI::App& app, SceneCommand& c) {
 
 CLI::Option* add_gaussians(CLI::App& app, SceneCommand& c, const char* what) {
   c.sampling.sh_degree = gsnav::kMaxShDegree;
-  app.add_option(
-         "--sh-degree", c.sampling.sh_degree,
-         "Of colours: 0, the same from everywhere, or up to 3, with a sheen of windows and lamps")
+  app.add_option("--sh-degree", c.sampling.sh_degree,
+                 "degree of the colours: 0, the same from everywhere, or up to 3, with a sheen of "
+                 "windows and lamps")
       ->check(CLI::Range(0, gsnav::kMaxShDegree))
       ->capture_default_str();
   return app.add_option("--gaussians", c.sampling.gaussians, what)

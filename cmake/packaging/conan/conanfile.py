@@ -49,7 +49,7 @@ class Gsnav(ConanFile):
             self.options.sim = True
 
     def requirements(self):
-        # Where gsnav is static, who links it finds these too, by find_package.
+        # Programs that link a static gsnav find these too, by find_package.
         if self.options.io:
             self.requires("libpng/[>=1.6 <2]", transitive_headers=True)
             self.requires("libjpeg/[>=9e]", transitive_headers=True)

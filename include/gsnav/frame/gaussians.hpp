@@ -71,8 +71,8 @@ struct SeenRows {
   }
 };
 
-/// Of row i, its place in a list of values for each origin. `ids`: [N], or empty: all rows have the
-/// first.
+/// Place of row i in a list of values per origin. `ids` is [N], or empty if all rows have the first
+/// origin.
 GSNAV_HD std::size_t origin_id(const View<const std::uint32_t>& ids, std::size_t i) noexcept {
   return ids.empty() ? 0 : ids[i];
 }

@@ -169,8 +169,8 @@ GSNAV_HD Vec3<float> packed_coefficient(const ColorRows& rows, std::size_t i, in
           band_value(rows, at + 2, chunk, k)};
 }
 
-/// f(coefficient) of what reads row i of any colours: coefficient(k) is its Vec3<float> k. The encoding
-/// is looked up once, before.
+/// Calls f(coefficient), where coefficient(k) reads coefficient k of row i as a Vec3<float>. The
+/// encoding is looked up once, before.
 template <class F>
 GSNAV_HD auto with_coefficients(const ColorRows& rows, std::size_t i, const F& f) noexcept {
   if (rows.packed()) return f([&](int k) GSNAV_INLINED { return packed_coefficient(rows, i, k); });

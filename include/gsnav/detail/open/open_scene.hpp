@@ -47,7 +47,7 @@ struct OpenOptions {
   std::string up = "auto";
   double time = 0;  ///< Seconds: the moment of a scene that moves (4D Gaussians).
   int level = 0;    ///< Level of a streamed set that is opened without `levels`; 0 is the finest.
-  CloudStorage storage = CloudStorage::full;
+  CloudStorage storage = CloudStorage::full;  ///< How Gaussians are kept in memory.
   /// Largest change of a colour for which SH bands are dropped. 0 drops only bands of zeros, which
   /// changes no image. kUnseenColor drops bands too weak to be seen, for Quality::fast and levels of
   /// detail.

@@ -47,7 +47,7 @@ Status draw_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaussia
     if (config.composite == Composite::hard_depth) {
       return {
           Errc::unsupported,
-          "Composite::hard_depth has one layer a pixel: a mesh with MeshAlpha::blend is drawn merged"};
+          "Composite::hard_depth has one layer per pixel: a mesh with MeshAlpha::blend is drawn merged"};
     }
     if (Status s = draw_fragments<S>(backend, ws.fragments, meshes.instances, camera, meshes.light,
                                      tile_size, color, linear, ws.mesh.depth.data(), layer, drawn);

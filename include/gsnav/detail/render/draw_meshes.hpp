@@ -101,7 +101,7 @@ inline Status validate(const MeshInstance& instance) {
                std::to_string(m.vertices.size) + " are needed, or none");
   };
   if (m.indices.size % 3 != 0)
-    return bad("indices has " + std::to_string(m.indices.size) + " values: three a triangle");
+    return bad("indices has " + std::to_string(m.indices.size) + " values: it needs three per triangle");
   if (m.vertices.size > std::numeric_limits<std::uint32_t>::max() ||
       m.triangle_count() > std::numeric_limits<std::uint32_t>::max()) {
     return bad("more than 2^32 vertices or triangles");

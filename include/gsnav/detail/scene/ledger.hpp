@@ -101,8 +101,8 @@ inline std::string ledger_text(const FrameLedger& l) {
   const CullCounts& n = l.culled;
   line(
       "skipped: %llu of %llu Gaussians in chunks out of view or not in the cut (%.1f %% of all, %.1f %% "
-      "of what could "
-      "be); "
+      "of those that "
+      "could be); "
       "%llu touched, %.2f for each that reaches a tile%s",
       count(n.removed()), count(n.rows), share(n.removed(), n.rows), share(n.removed(), n.removable()),
       count(n.touched), n.touched_per_emitting(),
