@@ -88,7 +88,7 @@ class Rules(unittest.TestCase):
         for name, form in (("README.md", "{}\n"), ("a.hpp", "// {}\n")):
             self.assertIn("columns", rules(name, form.format(wide)), name)
         for name in ("a.py", "a.sh", "a.cmake"):
-            self.assertIn("columns", rules(name, f"# {wide} {'x' * 9}\n"), name)
+            self.assertIn("columns", rules(name, f"# {wide} {'x' * 12}\n"), name)
             self.assertNotIn("columns", rules(name, f"# {wide}\n"), name)
         self.assertNotIn("columns", rules("README.md", wide[:105]))
         self.assertNotIn("columns", rules("README.md", f"| {wide} |\n|---|\n\n```\n{wide}\n```\n\n    {wide}\n"))
