@@ -346,6 +346,10 @@ def check_text(name, text, goal=False):
     suffix, strings = pathlib.PurePath(name).suffix, []
     if suffix == ".md":
         paragraphs, wide = markdown(lines)
+    elif name.endswith("help.txt"):
+        paragraphs, wide = [], []
+        for number, line in enumerate(lines, 1):
+            add_string(paragraphs, line, number, False)
     else:
         if suffix in CPP:
             comments, strings = cpp(text)
@@ -367,7 +371,7 @@ def check_text(name, text, goal=False):
 
 def wanted(path):
     name = path.name
-    return (path.suffix in CPP or path.suffix in {".md", ".py", ".sh", ".cmake"} or name == "CMakeLists.txt" or
+    return (path.suffix in CPP | {".md", ".py", ".sh", ".cmake"} or name in {"CMakeLists.txt", "help.txt"} or
             name.endswith(".cmake.in") or path.parts[-2:] == (".ci", "run"))
 
 

@@ -45,7 +45,7 @@ PARTS = {"render/quality.hpp": ("Exponential", "Quality"), "render/tuning.hpp": 
 NOT_FOR_USERS = {"policy.hpp"}
 # Folders of pages, in the order of the menu.
 SECTIONS = (("Guide", "docs/guide"), ("Concepts", "docs/concepts"), ("Reference", "docs/reference"),
-            ("Topics", "docs"), ("Notes", "docs/notes"))
+            ("Notes", "docs/notes"))
 ABOUT = ("CONTRIBUTING.md", "CHANGELOG.md")
 FENCE = re.compile(r"\s*(```|~~~)")
 REFERENCE = re.compile(r"\[([^\]]*)\]\(@ref [^)]*\)")
@@ -264,7 +264,8 @@ def write_layout(out):
     tabs = ['<tab type="mainpage" visible="yes" title="Overview"/>']
     known = [p for p in pages() if p != "README.md"]
     sections = [(title, [p for p in known if pathlib.PurePath(p).parent.as_posix() == folder])
-                for title, folder in SECTIONS] + [("Project", [p for p in ABOUT if p in known])]
+                for title, folder in (*SECTIONS, ("Project", "docs"))]
+    sections[-1][1].extend(p for p in ABOUT if p in known)
     for title, listed in sections:
         if listed:
             entries = "".join(f'<tab type="user" url="@ref {label(p)}" title={quoteattr(title_of(p))}/>'

@@ -116,6 +116,7 @@ class Text(unittest.TestCase):
         self.assertIn("what", rules("tools/a.cpp", f'add("--a", "{said}");\n'))
         self.assertIn("what", rules("tools/a.cpp", 'add("--a", "Skips all of what"\n    " is hidden.");\n'))
         self.assertIn("what", rules("tools/a.py", f'parser.add_argument("-a", help="{said}")\n'))
+        self.assertIn("what", rules("examples/a/help.txt", f"  --a    {said}\n"))
         self.assertFalse(rules("tests/a.cpp", f'TEST_CASE("{said}") {{}}\n'))
         self.assertFalse(rules("tools/a.cpp", f'auto a = R"html({said})html";\n'))
         self.assertFalse(rules("tools/a.cpp", "const int a = 1'000'000;  // rows\n"))
