@@ -32,7 +32,7 @@ const std::array<Section, 10> kSections{{
      "the "
      "two. Dashed: the best that a given time buys. Hollow: measured on fewer views than the others, so "
      "that "
-     "it beats nobody. Response and compat modes change what is right and are left out here.",
+     "it beats no other setting. Response and compat modes change what is right and are left out here.",
      pareto_section},
     {"knobs", "One knob at a time",
      "Everything else as in the exact profile, which each chart shows beside its values. Means over "
@@ -56,7 +56,7 @@ constexpr const char* kHowToRead =
     "error "
     "is that of its image against an oracle, which computes the same image in float64. PSNR: above 60 "
     "dB "
-    "nobody sees a difference, above 100 dB it is rounding. LSB: a step of 8 bits. Depth errors are in "
+    "no difference is visible, above 100 dB it is rounding. LSB: a step of 8 bits. Depth errors are in "
     "millimetres, over pixels where both have a depth. Compare settings within a scene, a size and a "
     "backend; times of two machines do not compare.</p>\n</section>\n";
 

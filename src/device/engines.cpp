@@ -30,7 +30,8 @@ Result<const detail::EngineFactory*> engines_of(const Device& device) {
 }
 
 Status moved_from(const char* what) {
-  return {Errc::invalid_argument, std::string("this ") + what + " was moved from: use what it became"};
+  return {Errc::invalid_argument,
+          std::string("this ") + what + " was moved from; use the object that it was moved to"};
 }
 
 /// Calls f(*engine) and turns exceptions into a status. A missing engine means that its owner, a `what`,

@@ -83,7 +83,7 @@ Status check(const fs::path& path, const GaussianCloud& m, const std::vector<Nod
     };
     if (!(std::abs(length - 1) < 1e-4)) return row("a quaternion that is not of unit length");
     for (const auto& p : m.scales) {
-      if (!(p[i] >= 0 && std::isfinite(p[i]))) return row("a scale that cannot be");
+      if (!(p[i] >= 0 && std::isfinite(p[i]))) return row("a scale out of range");
     }
     if (!(m.opacities[i] >= 0 && m.opacities[i] <= 1)) {
       return row("opacity " + std::to_string(m.opacities[i]) + ", must be in [0, 1]");

@@ -100,7 +100,7 @@ class AsfReader {
         const std::string_view w = lines_.word(k);
         const char kind = static_cast<char>(std::toupper(static_cast<unsigned char>(w.front())));
         if (w.size() != 2 || (kind != 'T' && kind != 'R') || axis_of(w[1]) < 0)
-          return lines_.bad(in_quotes(w) + " is no channel");
+          return lines_.bad(in_quotes(w) + " is not a channel");
         out_.root_order.emplace_back(kind == 'R', axis_of(w[1]));
       }
     }

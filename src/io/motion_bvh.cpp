@@ -58,7 +58,7 @@ class BvhReader {
     const std::string_view word = next();
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), out);
     if (error != std::errc{} || end != word.data() + word.size() || !std::isfinite(out)) {
-      return bad(detail::in_quotes(word) + " is no number");
+      return bad(detail::in_quotes(word) + " is not a number");
     }
     return {};
   }
@@ -115,7 +115,7 @@ class BvhReader {
       const std::string_view word = next();
       const std::string_view kind = word.empty() ? word : word.substr(1);
       if ((kind != "rotation" && kind != "position") || word[0] < 'X' || word[0] > 'Z') {
-        return bad(detail::in_quotes(word) + " is no channel");
+        return bad(detail::in_quotes(word) + " is not a channel");
       }
       channels.push_back({kind == "rotation", word[0] - 'X'});
     }

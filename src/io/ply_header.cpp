@@ -111,7 +111,7 @@ class HeaderParser {
     e.name = name;
     const auto [end, error] = std::from_chars(count.data(), count.data() + count.size(), e.count);
     if (name.empty() || count.empty() || error != std::errc{} || end != count.data() + count.size()) {
-      return fail("element " + in_quotes(name) + ": " + in_quotes(count) + " is no count");
+      return fail("element " + in_quotes(name) + ": " + in_quotes(count) + " is not a count");
     }
     for (const PlyElement& other : header_.elements) {
       if (other.name == e.name) return fail("element " + in_quotes(name) + " comes twice");

@@ -229,7 +229,8 @@ class PlanesReader {
     for (const std::size_t width : planes_.header.widths())
       total += std::uint64_t{planes_.header.count} * width;
     if (total <= kInflationSlack + kMostInflation * bytes_.size()) return {};
-    return fail(gaussians() + " from " + std::to_string(bytes_.size()) + " bytes are not believed");
+    return fail(gaussians() + " from " + std::to_string(bytes_.size()) +
+                " bytes are implausible; the file is damaged");
   }
 
   /// Floats of shN in each row.

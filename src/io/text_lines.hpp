@@ -42,7 +42,7 @@ class TextLines {
   }
   /// Reads word k as a finite number.
   Status number(std::size_t k, double& out) const {
-    return parse(word(k), out) ? Status() : bad(in_quotes(word(k)) + " is no number");
+    return parse(word(k), out) ? Status() : bad(in_quotes(word(k)) + " is not a number");
   }
   /// Parses the whole of `word` as a finite number.
   static bool parse(std::string_view word, double& out) {

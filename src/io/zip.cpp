@@ -218,7 +218,7 @@ Result<std::vector<std::byte>> ZipReader::read(const std::string& name, std::uin
   if (e.method == kStored ? e.size != e.packed
                           : e.size > slack && (e.size - slack) / kMostInflation > e.packed) {
     return {Errc::invalid_file, what + ": a size of " + std::to_string(e.size) + " bytes from " +
-                                    std::to_string(e.packed) + " is not believed"};
+                                    std::to_string(e.packed) + " is implausible; the file is damaged"};
   }
   const std::span<const std::byte> packed = bytes_.subspan(data, e.packed);
   std::vector<std::byte> out;

@@ -169,7 +169,7 @@ inline const char* read_lod(const std::string& input) {
   for (const LodNode& n : tree->nodes) {
     bool ok = std::isfinite(n.error) && n.error >= 0 && std::isfinite(n.grain) && n.grain >= 0;
     for (int k = 0; k < 3; ++k) ok = ok && n.reach.low[k] <= n.reach.high[k];
-    if (!ok) return "a node that cannot be";
+    if (!ok) return "a node out of range";
   }
   return nullptr;
 }

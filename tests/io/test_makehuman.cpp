@@ -82,7 +82,7 @@ TEST_CASE("makehuman: what is wrong is named") {
     CHECK(s.code() == Errc::invalid_file);
     CHECK(contains(s.message(), part));
   };
-  fails(&Files::obj, "v 1 2 0", "v 1 two 0", "line 4: 'two' is no number");
+  fails(&Files::obj, "v 1 2 0", "v 1 two 0", "line 4: 'two' is not a number");
   fails(&Files::obj, "f 4 3 5", "f 4 3 7", "'7', must be 1 to 6");
   fails(&Files::obj, "f 4 3 5", "f 4 3", "a face of 2 corners");
   fails(&Files::obj, "g body", "g head", "no faces in the group 'body'");
@@ -97,7 +97,7 @@ TEST_CASE("makehuman: what is wrong is named") {
   fails(&Files::weights, "[2, 0.5]", "[2, -0.5]", "is no vertex with a weight");
   fails(&Files::weights, "[2, 0.5]", "[2]", "is no vertex with a weight");
   fails(&Files::target, "2 .5", "8 .5", "vertex '8' of 6");
-  fails(&Files::target, "-1e-1", "x", "'x' is no number");
+  fails(&Files::target, "-1e-1", "x", "'x' is not a number");
   CHECK(io::load_makehuman("/none/a.obj", {}).code() == Errc::file_not_found);
   io::MakeHumanOptions options;
   options.scale = -1;

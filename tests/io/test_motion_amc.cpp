@@ -136,7 +136,7 @@ TEST_CASE("amc: what is wrong is named with its file and line") {
     CHECK(contains(s.message(), first ? "some.asf" : "some.amc"));
     CHECK(contains(s.message(), part));
   };
-  fails("length 4", "length four", "line 18: 'four' is no number");
+  fails("length 4", "length four", "line 18: 'four' is not a number");
   fails("length 0.5", "length 0", "length is not positive");
   fails("angle deg", "angle grad", "'grad'");
   fails("name hand", "name arm", "bone 'arm' twice");
@@ -145,11 +145,11 @@ TEST_CASE("amc: what is wrong is named with its file and line") {
   fails("arm hand\n", "arm leg\n", "there is no bone 'leg'");
   fails("arm hand\n", "arm hand\n hand arm\n", "hangs on two bones");
   fails("root arm fixed", "root fixed\n hand arm", "is in no hierarchy");
-  fails("order TX", "order QX", "'QX' is no channel");
+  fails("order TX", "order QX", "'QX' is not a channel");
   fails("hand 1 2\n", "", "a frame of 2 bones, must be 3");
   fails("hand 1 2\n", "hand 1\n", "line 9: bone 'hand' has 1 values, must be 2");
   fails("hand 1 2\n", "tail 1 2\n", "there is no bone 'tail'");
-  fails("hand 1 2\n", "hand 1 nan\n", "'nan' is no number");
+  fails("hand 1 2\n", "hand 1 nan\n", "'nan' is not a number");
   fails("hand 1 2\n", "hand 1 2\nhand 1 2\n", "twice in a frame");
   fails("1\nroot 5", "root 5", "before the first frame");
   CHECK(contains(load(kSkeleton, ":DEGREES\n").status().message(), "no frames"));

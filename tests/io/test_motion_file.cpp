@@ -125,13 +125,13 @@ TEST_CASE("bvh: what is wrong is named with its line") {
     CHECK(contains(s.message(), part));
   };
   fails("HIERARCHY", "HIERARCHIE", "line 1");
-  fails("OFFSET 0 5 0", "OFFSET 0 five 0", "line 8: 'five' is no number");
-  fails("OFFSET 0 5 0", "OFFSET 0 nan 0", "'nan' is no number");
-  fails("CHANNELS 1 Yrotation", "CHANNELS 1 Wrotation", "'Wrotation' is no channel");
+  fails("OFFSET 0 5 0", "OFFSET 0 five 0", "line 8: 'five' is not a number");
+  fails("OFFSET 0 5 0", "OFFSET 0 nan 0", "'nan' is not a number");
+  fails("CHANNELS 1 Yrotation", "CHANNELS 1 Wrotation", "'Wrotation' is not a channel");
   fails("CHANNELS 1 Yrotation", "CHANNELS 7 Yrotation", "must be 0 to 6");
   fails("JOINT hand", "JOINT arm", "name of another joint");
   fails("JOINT hand", "JOINTS hand", "'JOINTS'");
-  fails("Frames: 2", "Frames: 3", "is no number");
+  fails("Frames: 2", "Frames: 3", "is not a number");
   fails("Frames: 2", "Frames: 1", "behind the last frame");
   fails("Frames: 2", "Frames: 1.5", "frames of 10 channels");
   fails("Frames: 2", "Frames: 1e12", "frames of 10 channels");

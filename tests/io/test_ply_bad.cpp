@@ -112,8 +112,9 @@ TEST_CASE("ply: headers that make no sense") {
   check_fails(with("binary_little_endian", "binary_middle_endian"), Errc::invalid_file,
               "binary_middle_endian");
   check_fails(with("1.0", "2.0"), Errc::invalid_file, "'2.0'");
-  check_fails(with("element vertex 5", "element vertex -5"), Errc::invalid_file, "'-5' is no count");
-  check_fails(with("element vertex 5", "element vertex 5e9"), Errc::invalid_file, "'5e9' is no count");
+  check_fails(with("element vertex 5", "element vertex -5"), Errc::invalid_file, "'-5' is not a count");
+  check_fails(with("element vertex 5", "element vertex 5e9"), Errc::invalid_file,
+              "'5e9' is not a count");
   check_fails(with("element vertex 5", "element vertex 99999999999999999999"), Errc::invalid_file,
               "no count");
   check_fails(with("element vertex 5", "element vertex"), Errc::invalid_file, "no count");

@@ -133,7 +133,7 @@ TEST_CASE("pareto: dominated is what another setting of the backend beats in bot
   CHECK(p[2].dominated);
 }
 
-TEST_CASE("pareto: a setting measured on fewer views beats nobody") {
+TEST_CASE("pareto: a setting measured on fewer views beats no other") {
   std::vector<ParetoPoint> p{at("some views", 1, 99), at("all views", 2, 50)};
   p[0].partial = true;
   mark_dominated(p, true);

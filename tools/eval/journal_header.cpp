@@ -144,7 +144,7 @@ Status compare_contents(const fs::path& path, const Header& header, const Option
                              : name == "episodes"                    ? o.episode_file
                              : name == "navmesh" && names_navmesh(o) ? o.navmesh
                                                                      : std::string();
-    return {Errc::invalid_argument, path.string() + " is of other contents: the " + name +
+    return {Errc::invalid_argument, path.string() + " was made from other contents: the " + name +
                                         (file.empty() ? " that gsnav made" : " in " + file) +
                                         (name == "scene" || name == "navmesh" ? " has" : " have") +
                                         " changed (content hash " + hash + ", recorded " +

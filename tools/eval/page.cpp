@@ -55,7 +55,7 @@ std::string metrics_table(const gsnav::MetricsSummary& s) {
   row(out, "personal space compliance (PSC)", s.psc, "", "share of steps outside of personal space");
   row(out, "H-Coll", s.human_collision_episode_rate, "",
       "share of episodes in which a person was touched");
-  row(out, "stopped by somebody", s.human_blocked_episode_rate, "",
+  row(out, "stopped by a person", s.human_blocked_episode_rate, "",
       "share of episodes with a move stopped by a person");
   row(out, "wall collisions", s.collisions, "", "an episode");
   row(out, "actions", s.steps, "", "an episode");

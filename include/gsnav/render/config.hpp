@@ -48,7 +48,7 @@ inline Status validate(const RenderConfig& c) {
     return bad("outputs", c.outputs, "name at least one known output");
   }
   const auto unknown = [&](const char* field, auto value) {
-    return bad(field, static_cast<int>(value), "there is none of this number");
+    return bad(field, static_cast<int>(value), "must be a value of the enumeration");
   };
   if (c.sort_order > SortOrder::camera_distance) return unknown("sort_order", c.sort_order);
   if (c.response > Response::ray) return unknown("response", c.response);

@@ -50,7 +50,7 @@ inline Status validate(const Quality& q) {
   const BadArgument bad{"RenderConfig.quality."};
   if (q.exponential != Exponential::exact && q.exponential != Exponential::fast) {
     return bad("exponential", std::to_string(static_cast<int>(q.exponential)),
-               "there is none of this number");
+               "must be a value of the enumeration");
   }
   if (q.max_sh_degree < 0 || q.max_sh_degree > kMaxShDegree) {
     return bad("max_sh_degree", q.max_sh_degree, "must be in [0, 3]");

@@ -118,10 +118,10 @@ inline Status validate(const GaussianSet& set) {
   };
   if (set.filter > Filter::mip)
     return bad("filter = " + std::to_string(static_cast<int>(set.filter)) +
-               ": there is none of this number");
+               ": must be a value of the enumeration");
   if (set.color_space > ColorSpace::linear) {
     return bad("color_space = " + std::to_string(static_cast<int>(set.color_space)) +
-               ": there is none of this number");
+               ": must be a value of the enumeration");
   }
   if (color.degree < 0 || color.degree > kMaxShDegree) {
     return bad("color.degree = " + std::to_string(color.degree) + ": must be in [0, 3]");
