@@ -65,7 +65,7 @@ void row(LodViews& views, const GaussianCloud& cloud, const LodTree& tree, const
       if (cell) seen = whole.selection.seen = visible->seen_from(*cell);
       const std::span<const GaussianSet> sets =
           draw == LodDraw::lod ? cut.select(camera, choice, {}, seen) : std::span(&whole, 1);
-      RenderConfig rules = draw == LodDraw::lod ? lod_config(config, cut.stats()) : config;
+      RenderConfig rules = draw == LodDraw::lod ? lod_config(config) : config;
       rules.outputs = outputs;
       renderer.set_config(rules);
       renderer.render(sets, std::span(&camera, 1), into).throw_if_error();

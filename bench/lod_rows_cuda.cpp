@@ -32,8 +32,7 @@ class GpuRows {
         cloud_(cloud),
         arrays_(cuda, cloud),
         merged_(cuda, tree.merged),
-        direct_(cuda, fast()),
-        closing_(cuda, closing()),
+        renderer_(cuda, fast()),
         chunks_(cuda),
         tree_(&tree),
         visible_(&visible),
@@ -86,14 +85,11 @@ class GpuRows {
     std::vector<std::vector<std::uint32_t>> lists(n);
     std::vector<View<const std::uint32_t>> bits(n);
     std::vector<BatchCamera> batch;
-    bool closes = draw == LodDraw::lod;
     std::uint64_t drawn = 0;
     for (std::size_t c = 0; c < n; ++c) {
       batch.push_back({views_.cameras[c], {}, {}});
       if (draw == LodDraw::lod) {
         cuts[c].select(detail_, {}, views_.cameras[c]);
-        closes =
-            closes && cuts[c].rules(fast()).quality.transmittance_min > fast().quality.transmittance_min;
         drawn += cuts[c].cut(0).stats().drawn;
       } else {
         drawn += cloud_.size();
@@ -113,7 +109,7 @@ class GpuRows {
         batch[c].sets = lists[c];
       }
     }
-    CudaBatchRenderer& renderer = closes ? closing_ : direct_;
+    CudaBatchRenderer& renderer = renderer_;
     memory_.resize_discard(4 * n * kPixels);
     BatchImages images, depths;
     images.floats.rgb = memory_.data();
@@ -149,12 +145,6 @@ class GpuRows {
     config.quality = Quality::fast();
     return config;
   }
-  /// lod_config of a cut that consists mostly of merged Gaussians.
-  static RenderConfig closing() {
-    LodStats merged;
-    merged.shown = merged.merged = 1;
-    return lod_config(fast(), merged);
-  }
   double draw_once(LodDraw draw, const Camera& camera, const BatchImages& images, double& pairs) {
     const BatchCamera view{camera, {}, {}};
     const GaussianSet own = arrays_.set();
@@ -162,14 +152,11 @@ class GpuRows {
     photo.gaussians = own.gaussians;
     std::span<const GaussianSet> sets(draw == LodDraw::direct || draw == LodDraw::seen ? &own : &photo,
                                       1);
-    CudaBatchRenderer* renderer = &direct_;
+    CudaBatchRenderer* const renderer = &renderer_;
     drawn_ = cloud_.size();
     const bool chosen = draw == LodDraw::lod || detail_.assets[0].visible != nullptr;
     if (chosen) sets = cut_.select(detail_, sets, camera);
     if (draw == LodDraw::lod) {
-      renderer = cut_.rules(fast()).quality.transmittance_min > fast().quality.transmittance_min
-                     ? &closing_
-                     : &direct_;
       drawn_ = cut_.cut(0).stats().drawn;
     } else if (chosen) {
       drawn_ -= cut_.unseen();
@@ -187,7 +174,7 @@ class GpuRows {
   LodViews& views_;
   const GaussianCloud& cloud_;
   GaussianArrays<CudaBackend> arrays_, merged_;
-  CudaBatchRenderer direct_, closing_;
+  CudaBatchRenderer renderer_;
   ChosenChunks<CudaBackend> chunks_;
   const LodTree* tree_;
   const VisibleSets* visible_;

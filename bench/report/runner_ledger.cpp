@@ -42,8 +42,6 @@ Row entry(const char* profile, const char* name, const char* knob, double error,
 
 std::vector<Row> ledger_rows() {
   const RenderConfig c;
-  LodStats merged;
-  merged.shown = merged.merged = 1;
   const double rounding = static_cast<double>(std::numeric_limits<float>::epsilon()) / 2;
   std::vector<Row> rows{
       entry("exact", "float32 arithmetic", "", rounding, "relative, a rounding",
@@ -58,7 +56,10 @@ std::vector<Row> ledger_rows() {
       entry("exact", "transmittance stop", "transmittance_min", c.quality.transmittance_min,
             "alpha, a pixel", "part of the contract: what lies behind a closed pixel is left out"),
       entry("fast", "exp2 by a cubic", "", exp2_error<Exp2::degree3>(), "relative, of alpha",
-            "in place of degree 5; all else as in exact"),
+            "in place of degree 5"),
+      entry("fast", "transmittance stop", "transmittance_min", Quality::fast().transmittance_min,
+            "alpha, a pixel",
+            "the colour of a closed pixel is divided by its alpha; all else as in exact"),
       entry("fast", "SH bands left out", "", kUnseenColor, "colour, a Gaussian",
             "bands of a chunk that change none of its colours by more, seen from anywhere; in tools "
             "that profile a "
@@ -66,9 +67,6 @@ std::vector<Row> ledger_rows() {
       entry(
           "lod", "merged Gaussians", "", LodChoice{}.pixels, "pixels, root mean square",
           "what was merged lies no farther from where it is shown, on this sensor; all else as in fast"),
-      entry("lod", "transmittance stop", "transmittance_min",
-            lod_config(c, merged).quality.transmittance_min, "alpha, a pixel",
-            "where at least half of what is in view is merged"),
   };
   return rows;
 }

@@ -63,7 +63,7 @@ Result<SceneRunner::Outcome> SceneRunner::render_on(B& backend, const Setting& s
   Status status;
   const auto draw = [&] {
     const std::span<const GaussianSet> sets = cut ? cut->select(c) : std::span(&set, 1);
-    if (cut) renderer.set_config(lod_config(renderer.config(), cut->stats()));
+    if (cut) renderer.set_config(lod_config(renderer.config()));
     if (Status next = renderer.render(sets, std::span(&c, 1), out.frames); !next) status = next;
   };
   reset_peak_memory();

@@ -8,6 +8,7 @@
 
 #include "flat_painter.hpp"
 #include "gsnav/detail/core/run_guarded.hpp"
+#include "gsnav/detail/math/curves.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/frame/sh.hpp"
 
@@ -65,10 +66,7 @@ bool hidden(const std::vector<Box>& covers, const Vec3d& p) noexcept {
 }
 
 /// Tone mapping with a filmic shoulder, then sRGB encoding.
-double display(double x) noexcept {
-  const double c = 1.0 - std::exp(-x);
-  return c <= 0.0031308 ? 12.92 * c : 1.055 * std::pow(c, 1.0 / 2.4) - 0.055;
-}
+double display(double x) noexcept { return srgb_from_linear(1.0 - std::exp(-x)); }
 
 }  // namespace
 

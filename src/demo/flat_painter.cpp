@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "gsnav/detail/math/curves.hpp"
+
 namespace gsnav::flat {
 namespace {
 
@@ -14,8 +16,7 @@ constexpr double kPi = 3.14159265358979323846;
 
 Vec3d srgb(unsigned hex) noexcept {
   const auto channel = [hex](int shift) {
-    const double c = static_cast<double>((hex >> shift) & 255u) / 255.0;
-    return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
+    return linear_from_srgb(static_cast<double>((hex >> shift) & 255u) / 255.0);
   };
   return {channel(16), channel(8), channel(0)};
 }

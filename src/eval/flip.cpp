@@ -8,6 +8,7 @@
 
 #include "flip_color.hpp"
 #include "flip_filters.hpp"
+#include "gsnav/detail/math/curves.hpp"
 #include "plane.hpp"
 #include "statistics.hpp"
 
@@ -36,7 +37,7 @@ Seen see(const Samples& rgb, int width, int height, double pixels_per_degree) {
   };
   for (std::size_t p = 0; p < n; ++p) {
     Vec3d linear = pixel(image, p);
-    for (int c = 0; c < 3; ++c) linear[c] = detail::linear_from_srgb(linear[c]);
+    for (int c = 0; c < 3; ++c) linear[c] = linear_from_srgb(linear[c]);
     const Vec3d opponent = detail::ycxcz_from_xyz(detail::xyz_from_linear(linear));
     for (int c = 0; c < 3; ++c) image[static_cast<std::size_t>(c)].values[p] = opponent[c];
   }

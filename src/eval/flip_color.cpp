@@ -50,10 +50,6 @@ double lab_curve(double t) {
 
 }  // namespace
 
-double linear_from_srgb(double x) {
-  return x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4);
-}
-
 Vec3d xyz_from_linear(const Vec3d& rgb) { return matrices().xyz_from_linear * rgb; }
 Vec3d linear_from_xyz(const Vec3d& xyz) { return matrices().linear_from_xyz * xyz; }
 

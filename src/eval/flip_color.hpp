@@ -7,8 +7,6 @@ namespace gsnav::eval::detail {
 
 // Colour spaces of FLIP. XYZ is relative to the white of sRGB, which is (1, 1, 1).
 
-/// Converts an sRGB-encoded value in [0, 1] to linear (IEC 61966-2-1).
-double linear_from_srgb(double x);
 Vec3d xyz_from_linear(const Vec3d& rgb);
 Vec3d linear_from_xyz(const Vec3d& xyz);
 /// Opponent space of the contrast sensitivity filters. It is linear in XYZ.

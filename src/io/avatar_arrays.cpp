@@ -6,6 +6,7 @@
 #include <tuple>
 #include <utility>
 
+#include "gsnav/detail/math/curves.hpp"
 #include "gsnav/frame/sh.hpp"
 
 namespace gsnav::io::detail {
@@ -69,7 +70,6 @@ class AvatarArrayReader {
       if (!v) return v.status();
       limits[k] = *v;
     }
-    const auto sigmoid = [](double x) { return 1.0 / (1.0 + std::exp(-x)); };
     for (double& v : out.scales.values) v = limits[0] + sigmoid(v) * (limits[1] - limits[0]);
     for (double& v : out.opacities.values) v = sigmoid(v);
     // Weights are trilinear samples plus corrections, which may make them slightly negative.

@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 
+#include "gsnav/detail/math/curves.hpp"
 #include "gsnav/io/image_file.hpp"
 #include "gsnav/math/functions.hpp"
 
@@ -12,8 +13,7 @@ using Rgb8 = std::array<std::uint8_t, 3>;
 
 std::uint8_t srgb_byte(double linear) {
   const double x = std::fmin(std::fmax(linear, 0.0), 1.0);
-  const double encoded = x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1.0 / 2.4) - 0.055;
-  return to_byte(encoded);
+  return to_byte(srgb_from_linear(x));
 }
 
 /// Converts a colour of the Oklab space (lightness, chroma, hue in radians) to sRGB.

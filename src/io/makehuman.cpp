@@ -9,6 +9,7 @@
 
 #include "file.hpp"
 #include "gsnav/detail/io/skinned_mesh_file.hpp"
+#include "gsnav/detail/math/curves.hpp"
 #include "json.hpp"
 #include "text_lines.hpp"
 
@@ -282,11 +283,10 @@ Result<LoadedSkinnedMesh> load(const fs::path& path, const MakeHumanOptions& opt
   for (const std::uint32_t v : used) mesh.positions.push_back(base->vertices[v]);
   for (const auto& t : base->triangles)
     mesh.triangles.push_back({place[t[0]], place[t[1]], place[t[2]]});
-  const auto linear = [](double c) {
-    return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
-  };
-  mesh.materials.push_back(
-      {{linear(options.color.x), linear(options.color.y), linear(options.color.z)}, 0.0, -1});
+  mesh.materials.push_back({{linear_from_srgb(options.color.x), linear_from_srgb(options.color.y),
+                             linear_from_srgb(options.color.z)},
+                            0.0,
+                            -1});
   out.pose = mesh.skeleton.rest_pose();
   SkinnedMeshReport& report = out.report;
   report.vertices = mesh.positions.size();

@@ -7,6 +7,7 @@
 #include "file.hpp"
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/detail/io/ply.hpp"
+#include "gsnav/detail/math/curves.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 
 namespace gsnav::io {
@@ -48,7 +49,7 @@ float logit_of(float opacity) {
   float logit = static_cast<float>(std::log(p / (1.0 - p)));
   // Rounding must not move a Gaussian below the threshold at which loaders drop it.
   constexpr float kVisible = 1.0f / 255.0f;
-  const auto back = [&logit] { return static_cast<float>(1.0 / (1.0 + std::exp(-double{logit}))); };
+  const auto back = [&logit] { return static_cast<float>(sigmoid(logit)); };
   while (opacity >= kVisible && back() < kVisible) logit = std::nextafter(logit, 0.0f);
   return logit;
 }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "gsnav/core/rng.hpp"
+#include "gsnav/detail/math/curves.hpp"
 #include "gsnav/detail/rigging/mesh_surface.hpp"
 #include "gsnav/frame/sh.hpp"
 #include "mesh_weights.hpp"

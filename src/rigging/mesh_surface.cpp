@@ -7,15 +7,9 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "gsnav/detail/math/curves.hpp"
+
 namespace gsnav {
-
-double srgb_from_linear(double c) noexcept {
-  return c <= 0.0031308 ? 12.92 * c : 1.055 * std::pow(c, 1 / 2.4) - 0.055;
-}
-
-double linear_from_srgb(double c) noexcept {
-  return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
-}
 
 MeshColors::MeshColors(const SkinnedMesh& mesh) : mesh_(mesh) {
   for (std::size_t k = 0; k < linear_.size(); ++k)

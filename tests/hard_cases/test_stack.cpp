@@ -146,6 +146,21 @@ TEST_CASE("normalize_closed: a closed pixel is divided by its alpha, an open one
   }
 }
 
+TEST_CASE("normalize_closed: a pixel does not close before it has the depths that are asked for") {
+  const GaussianCloud cloud = layers(std::vector<double>(12, 0.6), 422);
+  RenderConfig config = all_outputs();
+  config.quality.normalize_closed = true;
+  config.first_hit_tau = 0.9995;           // 1 - 0.4^9 is the first alpha above it
+  for (const double stop : {1e-3, 0.7}) {  // 1 - 0.4^8 and 1 - 0.4 are below the depths' levels
+    config.quality.transmittance_min = stop;
+    render_everywhere({&cloud}, axis_camera(kSize, 64), config, [&](const auto& f, const auto&) {
+      CHECK(f.alpha[kMiddle] == 1);
+      CHECK(std::abs(static_cast<double>(f.median_depth[kMiddle]) - 2.0) < 1e-4);
+      CHECK(std::abs(static_cast<double>(f.first_hit_depth[kMiddle]) - 2.008) < 1e-4);
+    });
+  }
+}
+
 TEST_CASE("N43_faint_fog") {
   const auto nothing = [](double alpha, double red, const auto&) {
     CHECK(alpha == 0);

@@ -13,6 +13,7 @@
 #include "gsnav/detail/demo/humanoid.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
+#include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 #include "hard_cases/cases.hpp"
 #include "lod/level_support.hpp"
@@ -87,11 +88,11 @@ class SceneList {
     scene.config.background = {0.25, 0.5, 0.75};
     if (configure) configure(scene.config);
     const std::string name = scene.name;
-    for (const Exponential profile : {Exponential::exact, Exponential::fast}) {
-      scene.name = name + (profile == Exponential::exact ? ", exact" : ", fast");
-      scene.config.quality.exponential = profile;
-      scenes.push_back(scene);
-    }
+    scene.name = name + ", exact";
+    scenes.push_back(scene);
+    scene.name = name + ", fast";
+    scene.config = lod_config(scene.config);  // the members in which Quality::fast() is another
+    scenes.push_back(scene);
   }
 };
 

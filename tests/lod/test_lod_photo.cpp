@@ -94,7 +94,7 @@ TEST_CASE("lod photo: nearer to the photo than direct rendering, in every view (
       const auto truth = eval::oracle_photo(backend, std::span(&whole, 1), camera, 4).value();
       const auto direct = renderer.render(whole, camera).value();
       const auto sets = cut.select(camera);
-      lods.set_config(lod_config(config, cut.stats()));
+      lods.set_config(lod_config(config));
       const auto lod = lods.render(sets, std::span(&camera, 1)).value();
       const double before = image_error(truth.rgb, direct.rgb, 3).psnr,
                    after = image_error(truth.rgb, lod.rgb, 3).psnr;
@@ -131,7 +131,7 @@ TEST_CASE(
     const auto truth = eval::oracle_photo(backend, std::span(&whole, 1), camera, 4).value();
     const auto direct = renderer.render(whole, camera).value();
     const auto sets = cut.select(camera);
-    lods.set_config(lod_config(config, cut.stats()));
+    lods.set_config(lod_config(config));
     const auto lod = lods.render(sets, std::span(&camera, 1)).value();
     const double before = image_error(truth.rgb, direct.rgb, 3).psnr,
                  after = image_error(truth.rgb, lod.rgb, 3).psnr;

@@ -72,10 +72,10 @@ TEST_CASE("cuda batch: the serial backend's bits; profiles and compat modes") {
   const GaussianArrays<CudaBackend> arrays(cuda, cloud);
   const Camera camera = Camera::look_at({0, 0, 0}, {0, 0, 4}, {0, -1, 0}, 97, 64, 70);
   for (const Compat compat : {Compat::none, Compat::inria, Compat::gsplat, Compat::habitat_gs}) {
-    for (const Exponential profile : {Exponential::exact, Exponential::fast}) {
+    for (const Quality& quality : {Quality::exact(), Quality::fast()}) {
       RenderConfig config;
       config.compat = compat;
-      config.quality.exponential = profile;
+      config.quality = quality;
       CudaBatchRenderer renderer(cuda, config);
       for (const unsigned outputs :
            {unsigned{kRgb}, unsigned{kAlpha}, unsigned{kMedianDepth}, kMedianOnly, kAll}) {
@@ -83,7 +83,7 @@ TEST_CASE("cuda batch: the serial backend's bits; profiles and compat modes") {
         const Batch got = draw_batch(cuda, renderer, {arrays.set()}, {camera}, {}, outputs, false);
         check_same(got.frames, singly(cuda, {arrays.set()}, {camera}, {}, config, outputs));
         // On the GPU `fast` has the exponential of the hardware.
-        if (profile == Exponential::fast) continue;
+        if (quality == Quality::fast()) continue;
         check_same(got.frames, render<float>(serial, {cloud.set()}, camera, config));
       }
     }

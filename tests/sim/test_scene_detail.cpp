@@ -79,7 +79,7 @@ TEST_CASE(
   CHECK(cut.stats().merged > 0);
   std::vector<GaussianSet> sets(chosen.begin(), chosen.end());
   for (std::size_t i = 1; i < by_hand.sets(0).size(); ++i) sets.push_back(by_hand.sets(0)[i]);
-  RenderConfig rules = lod_config({}, cut.stats());
+  RenderConfig rules = lod_config({});
   rules.outputs = kRgb | kMedianDepth;
   BasicRenderer<float, OpenMPBackend> renderer(backend, rules);
   const auto frames = renderer.render(sets, std::span(&camera, 1)).value();
@@ -205,7 +205,7 @@ TEST_CASE(
     sets[0].selection.seen = visible->seen_from(*cell);
   }
   for (std::size_t i = 1; i < by_hand.sets(0).size(); ++i) sets.push_back(by_hand.sets(0)[i]);
-  RenderConfig rules = lod_config({}, levels ? cut.stats() : LodStats{});
+  RenderConfig rules = lod_config({});
   rules.outputs = kRgb | kMedianDepth;
   BasicRenderer<float, OpenMPBackend> renderer(backend, rules);
   const auto frames = renderer.render(sets, std::span(&camera, 1)).value();

@@ -83,8 +83,7 @@ std::string map_legend() {
   for (const auto& [color, what] : marks) {
     char swatch[96];
     std::snprintf(swatch, sizeof swatch, "<span style=\"background:rgb(%d,%d,%d)\"></span>",
-                  static_cast<int>(255 * color.r), static_cast<int>(255 * color.g),
-                  static_cast<int>(255 * color.b));
+                  gsnav::to_byte(color.r), gsnav::to_byte(color.g), gsnav::to_byte(color.b));
     out += std::string(swatch) + what + " ";
   }
   return out + "</p>\n";

@@ -14,6 +14,7 @@
 #include "gsnav/core/status.hpp"
 #include "gsnav/detail/core/huge_pages.hpp"
 #include "gsnav/detail/frame/projection_camera.hpp"
+#include "gsnav/detail/math/curves.hpp"
 #include "gsnav/detail/math/half.hpp"
 #include "gsnav/detail/scene/load_report.hpp"
 #include "gsnav/frame/gaussians.hpp"
@@ -135,7 +136,7 @@ inline RowFate activate(const RawGaussian& raw, std::size_t rest, ActiveGaussian
   if (!finite) return RowFate::non_finite;
   Quatd quat = raw.quat;
   if (!normalize(quat)) return RowFate::zero_quat;
-  out.opacity = static_cast<float>(1.0 / (1.0 + std::exp(-raw.opacity_logit)));
+  out.opacity = static_cast<float>(sigmoid(raw.opacity_logit));
   if (out.opacity < 1.0f / 255.0f) return RowFate::transparent;
   out.clamped = false;
   for (int k = 0; k < 3; ++k) {

@@ -49,16 +49,12 @@ struct LodStats {
   double error_px = 0;       ///< Largest LodNode::error of a node that is drawn, pixels.
 };
 
-/// Returns `config` with the settings of the profile `lod`: the fast exponential, and if at least half
-/// of the shown Gaussians are merged, pixels that close at a transmittance of 0.001 or more. With fewer
-/// merged Gaussians, direct rendering reaches a PSNR of at least 60 dB against the photo, and closing
-/// pixels that early would dominate its error.
-inline RenderConfig lod_config(RenderConfig config, const LodStats& stats = {}) noexcept {
-  config.quality.exponential = Exponential::fast;
-  if (stats.shown > 0 && 2 * stats.merged >= stats.shown) {
-    config.quality.transmittance_min = std::max(config.quality.transmittance_min, 0.001);
-    config.quality.normalize_closed = true;
-  }
+/// Render settings of the profile `lod`: those of Quality::fast(), with the other settings of `config`.
+inline RenderConfig lod_config(RenderConfig config) noexcept {
+  const Quality fast = Quality::fast();
+  config.quality.exponential = fast.exponential;
+  config.quality.transmittance_min = std::max(config.quality.transmittance_min, fast.transmittance_min);
+  config.quality.normalize_closed = fast.normalize_closed;
   return config;
 }
 

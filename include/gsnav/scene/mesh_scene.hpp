@@ -14,6 +14,7 @@
 
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/detail/math/curves.hpp"
 #include "gsnav/detail/mesh/mesh.hpp"
 #include "gsnav/detail/scene/triangle_mesh.hpp"
 #include "gsnav/math/functions.hpp"
@@ -22,8 +23,7 @@ namespace gsnav {
 
 /// Linear value, in [0, 1], of an sRGB-encoded byte.
 inline float srgb_decoded(std::uint8_t byte) noexcept {
-  const double v = byte / 255.0;
-  return static_cast<float>(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
+  return static_cast<float>(linear_from_srgb(byte / 255.0));
 }
 
 /// A base-colour texture with its mip chain. Each texel of a level is the mean, in linear light, of the
@@ -88,10 +88,7 @@ class MeshTexture {
       }
     }
   }
-  static std::uint8_t encoded(double linear) noexcept {
-    const double v = linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
-    return to_byte(v);
-  }
+  static std::uint8_t encoded(double linear) noexcept { return to_byte(srgb_from_linear(linear)); }
 
   std::vector<std::uint8_t> texels_;
   std::array<float, 256> decode_{};

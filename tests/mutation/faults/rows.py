@@ -14,7 +14,7 @@ FINITE = "  bool finite = is_finite(raw.mean) && !std::isnan(raw.opacity_logit);
 UNIT = ("  Quat<S> n{q.w / m, q.x / m, q.y / m, q.z / m};\n"
         "  q = n * (S(1) / sqrt(dot(n, n)));\n")
 ZERO = "  if (!normalize(quat)) return RowFate::zero_quat;\n"
-SIGMOID = "1.0 / (1.0 + std::exp(-raw.opacity_logit))"
+SIGMOID = "1.0 / (1.0 + std::exp(-x))"
 LIMITED = "const double limited = std::isinf(s) && s < 0 ? s : clamp(s, -20.0, 20.0);"
 
 FAULTS = [
@@ -59,8 +59,8 @@ FAULTS = [
           ROWS, "N33_logscale_extreme", why="a flat axis is legal"),
     fault("log_scale_nan_limited", "finite", "finite = finite && !std::isnan(raw.log_scales[k]) &&",
           "finite = finite &&", ROWS, "N33_logscale_extreme"),
-    fault("sigmoid_of_growing_exp", "activate", SIGMOID,
-          "std::exp(raw.opacity_logit) / (1.0 + std::exp(raw.opacity_logit))",
+    fault("sigmoid_of_growing_exp", "sigmoid", SIGMOID,
+          "std::exp(x) / (1.0 + std::exp(x))",
           ROWS, "N34_opacity_inf", why="infinity over infinity"),
     fault("opacity_infinity_dropped", "activate", FINITE,
           "  bool finite = is_finite(raw.mean) && is_finite(raw.opacity_logit);\n",

@@ -109,11 +109,14 @@ OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> ga
   const bool truncated = config.kind != OracleKind::untruncated;
   const double infinity = std::numeric_limits<double>::infinity();
   OracleScene<Model> scene;
+  const bool normalized = c.quality.normalize_closed && c.compat == Compat::none;
+  double stop = truncated ? c.quality.transmittance_min : 0.0;
+  if (normalized) stop = std::min({stop, 0.5, 1 - c.first_hit_tau});  // the pixel then has both depths
   scene.rules = {truncated ? std::log2(c.quality.alpha_min) : -infinity,
                  c.quality.max_alpha,
-                 truncated ? c.quality.transmittance_min : 0.0,
+                 stop,
                  c.first_hit_tau,
-                 c.quality.normalize_closed,
+                 normalized,
                  c.background};
   scene.rect = oracle_rect(config, camera);
   scene.boxed = config.boxed;

@@ -23,10 +23,10 @@ namespace gsnav {
 /// computed.
 enum Output : unsigned {
   kRgb = 1u << 0,            ///< [H][W][3], not clamped, over the background
-  kAlpha = 1u << 1,          ///< [H][W], 1 - transmittance
+  kAlpha = 1u << 1,          ///< [H][W], 1 - transmittance; 1 if Quality::normalize_closed applies
   kMedianDepth = 1u << 2,    ///< [H][W] metres, where transmittance falls through 1/2; 0 if it does not
   kExpectedDepth = 1u << 3,  ///< [H][W] metres, sum(w z) / sum(w); 0 if sum(w) = 0
-  kAccumulatedDepth = 1u << 4,  ///< [H][W] metres, sum(w z)
+  kAccumulatedDepth = 1u << 4,  ///< [H][W] metres, sum(w z); divided as colours are
   kFirstHitDepth = 1u << 5,     ///< [H][W] metres, where alpha first reaches first_hit_tau; 0 if it does
                                 ///< not
 };

@@ -26,7 +26,8 @@ struct Quality {
   /// Stop blending a pixel once its transmittance is lower. Range [0, 1).
   double transmittance_min = 1e-4;
   /// Treat a closed pixel as opaque: divide its colour and its accumulated depth by its alpha, then set
-  /// its alpha to 1. The background does not show through it. Ignored with a Compat.
+  /// its alpha to 1. The background does not show through it. A mesh behind the pixel takes the
+  /// remaining transmittance before that, so nothing is divided there. Ignored with a Compat.
   bool normalize_closed = false;
   int max_sh_degree = kMaxShDegree;  ///< highest SH degree to evaluate, 0 to 3
   int key_bits = 32;                 ///< bits of the depth key that sorting compares, 8 to 32

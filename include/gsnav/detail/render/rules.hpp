@@ -61,7 +61,12 @@ BlendRules<S> blend_rules(const RenderConfig& c) noexcept {
   r.transmittance_min = static_cast<S>(c.quality.transmittance_min);
   r.first_hit_tau = static_cast<S>(c.first_hit_tau);
   r.log2_alpha_min = static_cast<S>(log2_alpha_min(c.quality));
-  r.normalize_closed = c.quality.normalize_closed && c.compat == Compat::none;
+  if (c.quality.normalize_closed && c.compat == Compat::none) {
+    r.normalize_closed = true;
+    // A pixel that counts as opaque has a median and a first hit, so it must not close before it has
+    // them.
+    r.transmittance_min = std::min({r.transmittance_min, kMedianLevel<S>, S(1) - r.first_hit_tau});
+  }
   detail::follow(c.compat, r);
   return r;
 }

@@ -8,10 +8,6 @@
 
 namespace gsnav {
 
-/// The sRGB transfer function and its inverse, for one channel in [0, 1].
-double srgb_from_linear(double c) noexcept;
-double linear_from_srgb(double c) noexcept;  ///< Linear value of an sRGB component, both in [0, 1].
-
 /// Colour of a point of a surface, and whether it is a hole.
 struct SurfaceColor {
   Vec3d rgb{1, 1, 1};  ///< Linear light.

@@ -87,7 +87,7 @@ class DetailSets {
   std::span<const GaussianSet> sets() const noexcept { return sets_; }
   /// Render settings for these sets. Valid until the next call.
   const RenderConfig& rules(const RenderConfig& config) {
-    rules_ = lod_config(config, stats_);
+    rules_ = lod_config(config);
     return rules_;
   }
 
