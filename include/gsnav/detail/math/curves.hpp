@@ -19,8 +19,6 @@ inline double linear_from_srgb(double encoded) noexcept {
 }
 
 /// Opacity of a logit: 1 / (1 + exp(-x)).
-inline double sigmoid(double x) noexcept {
-  return 1.0 / (1.0 + std::exp(-x));
-}
+inline double sigmoid(double x) noexcept { return 1.0 / (1.0 + std::exp(-x)); }
 
 }  // namespace gsnav
