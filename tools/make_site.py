@@ -4,9 +4,9 @@
 
 usage: make_site.py [--out FOLDER] [--doxygen PROGRAM]
 
-Writes FOLDER/html/index.html (default: build/site). Fails where a public entity has no documentation or a
-page has a broken reference. Headers for users are those of include/gsnav outside detail/, those that a
-module header includes, and those of the backends.
+Writes FOLDER/html/index.html (default: build/site). Fails where a public entity has no documentation, or a
+page has a broken reference, lost headings or markup that is shown as text. Headers for users are those of
+include/gsnav outside detail/, those that a module header includes, and those of the backends.
 """
 import argparse
 import os
@@ -97,6 +97,11 @@ def title_of(page):
     return page
 
 
+def joined(text):
+    """A link or span on one line: Doxygen loses the rest of a page behind one that wraps."""
+    return re.sub(r"[ \t]*\n\s*", " ", text)
+
+
 def page_text(name, known):
     """A page with labels on its headings and links that Doxygen resolves."""
     folder, code, seen, out = (ROOT / name).parent, False, set(), []
@@ -104,19 +109,19 @@ def page_text(name, known):
     def link(m):
         text, target = m.group(1), m.group(2)
         if re.match(r"\w+:", target):
-            return m.group()
+            return joined(m.group())
         file, _, anchor = target.partition("#")
         path = pathlib.Path(os.path.normpath(folder / file)) if file else ROOT / name
         linked = path.relative_to(ROOT).as_posix() if path.is_relative_to(ROOT) else ""
         if linked not in known:  # not on the site: a folder, a source
             return text if "`" in text else f"`{linked}`" if text == linked else text
-        return f"[{text}](@ref {label(linked, anchor)})"
+        return f"[{joined(text)}](@ref {label(linked, anchor)})"
 
     source = (ROOT / name).read_text(encoding="utf-8")
     title = re.search(r"^# .*\n", source, re.MULTILINE)  # Doxygen takes it for the title where it is first
     source = title.group() + source[:title.start()] + source[title.end():] if title else source
     parts = re.split(r"(^ *```.*?^ *```|^    [^\n]*)", source, flags=re.DOTALL | re.MULTILINE)
-    parts[::2] = (SPAN.sub(lambda m: m.group().replace("\n", " "), LINK.sub(link, part)) for part in parts[::2])
+    parts[::2] = (SPAN.sub(lambda m: joined(m.group()), LINK.sub(link, part)) for part in parts[::2])
     source = "".join(parts)
     for line in source.splitlines():
         code ^= bool(FENCE.match(line))
@@ -284,6 +289,36 @@ def version():
     return ".".join(re.findall(r"#define GSNAV_VERSION_(?:MAJOR|MINOR|PATCH) (\d+)", text))
 
 
+def headings(name):
+    """Number of headings of a page behind its title."""
+    code, found = False, 0
+    for line in (ROOT / name).read_text(encoding="utf-8").splitlines():
+        code ^= bool(FENCE.match(line))
+        found += not code and bool(re.match(r"#{1,6} \S", line))
+    return found - 1
+
+
+RAW = re.compile(r"@(?:sub)*section\b|@ref\b|&lt;/?tt&gt;")
+
+
+def html_of(name):
+    """The file that Doxygen makes of a page."""
+    return "index.html" if name == "README.md" else f"{label(name)}.html"
+
+
+def wrong_pages(html):
+    """Lines for pages on which Doxygen took commands for text, or lost or made headings."""
+    found = []
+    for name in pages():
+        text = (html / html_of(name)).read_text(encoding="utf-8")
+        prose = re.sub(r"<pre\b.*?</pre>|<div class=\"fragment\">.*?</div><!-- fragment -->", "", text, flags=re.DOTALL)
+        found += [f"{name}: error: Doxygen left {m} as text" for m in sorted(set(RAW.findall(prose)))]
+        made = len(re.findall(r"<h[1-6]\b", prose))
+        if made != headings(name):
+            found.append(f"{name}: error: {headings(name)} headings, but {made} on the site")
+    return found
+
+
 def make(out, doxygen):
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
@@ -300,6 +335,10 @@ def make(out, doxygen):
     said = (done.stdout + done.stderr).replace(f"{out}/input/", "")
     print(said, end="")
     if done.returncode != 0 or "warning:" in said or "error:" in said:
+        return 1
+    wrong = wrong_pages(out / "html")
+    if wrong:
+        print("\n".join(wrong))
         return 1
     print(f"{out}/html/index.html")
     return 0

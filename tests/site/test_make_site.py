@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tests of tools/make_site.py: links and headings of pages, groups and lines of headers, errors of Doxygen."""
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -63,7 +64,7 @@ class Tree(unittest.TestCase):
     def test_links_lead_to_pages_and_headings(self):
         text = make_site.page_text("README.md", {"README.md", "docs/a.md"})
         self.assertTrue(text.startswith("# Name {#page_README}"))
-        self.assertIn("[the\npage](@ref page_docs_a__two-words) and code.", text)
+        self.assertIn("[the page](@ref page_docs_a__two-words) and code.", text)
         text = make_site.page_text("docs/a.md", {"README.md", "docs/a.md"})
         self.assertIn("## Two words {#page_docs_a__two-words}", text)
         self.assertIn("[not](a-link.md)", text)
@@ -105,6 +106,32 @@ class Tree(unittest.TestCase):
             self.assertNotEqual(done.returncode, 0)
             self.assertIn(said, done.stdout)
             self.assertIn("include/gsnav/nav/place.hpp:", done.stdout)
+
+    @unittest.skipUnless(shutil.which("doxygen"), "no doxygen here")
+    def test_markup_that_wraps(self):
+        page = "# Page\n\nSee [the\n  name](../README.md), [two\nwords](#two-words), `a\nb` and " \
+               "[it\nall](https://a.b/).\n\n" \
+               "| a | b |\n|---|---|\n| `c` | d |\n\n## Two words\n\n- see [the\n  name](../README.md)\n\n" \
+               "```\n# @ref of code\n```\n\n### Three\n"
+        self.write("docs/a.md", page)
+        done = self.run_doxygen()
+        self.assertEqual(done.returncode, 0, done.stdout)
+        text = (self.root / "out/html/page_docs_a.html").read_text()
+        self.assertEqual(len(re.findall(r'href="index.html[^"]*">the name</a>', text)), 2)
+        self.assertIn("<code>a b</code>", text)
+        self.assertEqual(text.count("<table class=\"markdownTable\">"), 1)
+        self.assertEqual((text.count("<h1>"), text.count("<h2>")), (1, 1))
+
+    def test_pages_that_doxygen_wrecks_are_errors(self):
+        html = self.root / "out/html"
+        heading = '<h1><a id="x"></a>Two words</h1>'
+        wrong = lambda text: self.write("out/html/page_docs_a.html", text) or make_site.wrong_pages(html)  # noqa: E731
+        self.write("out/html/index.html", "<p>See it</p>")
+        self.assertEqual(wrong(f"{heading}<pre>@ref @section &lt;tt&gt;</pre>"), [])
+        for said in ("@section", "@subsection", "@ref", "&lt;tt&gt;"):
+            self.assertEqual(wrong(f"{heading}<p>{said} a</p>"), [f"docs/a.md: error: Doxygen left {said} as text"])
+        self.assertEqual(wrong("<p>Two words</p>"), ["docs/a.md: error: 1 headings, but 0 on the site"])
+        self.assertEqual(wrong(heading * 2), ["docs/a.md: error: 1 headings, but 2 on the site"])
 
 
 if __name__ == "__main__":
