@@ -5,7 +5,7 @@
 usage: make_site.py [--out FOLDER] [--doxygen PROGRAM]
 
 Writes FOLDER/html/index.html (default: build/site). Fails where a public entity has no documentation, or a
-page has a broken reference, lost headings or markup that is shown as text. Headers for users are those of
+page has a dead link, lost headings or markup that is shown as text. Headers for users are those of
 include/gsnav outside detail/, those that a module header includes, and those of the backends.
 """
 import argparse
@@ -15,6 +15,8 @@ import re
 import shutil
 import subprocess
 import sys
+import urllib.parse
+from html import unescape
 from xml.sax.saxutils import quoteattr
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
@@ -50,6 +52,7 @@ ABOUT = ("CONTRIBUTING.md", "CHANGELOG.md")
 FENCE = re.compile(r"\s*(```|~~~)")
 REFERENCE = re.compile(r"\[([^\]]*)\]\(@ref [^)]*\)")
 SPAN = re.compile(r"`(?:[^`\n]|\n(?!\n))+`")  # on one line, because Doxygen may take a second one for a list
+IMAGE = re.compile(r"!\[([^\]]*)\]\(([^)\s]+)\)")
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s]+)\)")
 
 
@@ -117,11 +120,14 @@ def page_text(name, known):
             return text if "`" in text else f"`{linked}`" if text == linked else text
         return f"[{joined(text)}](@ref {label(linked, anchor)})"
 
+    def image(m):  # Doxygen puts all pictures beside the pages
+        return f"![{joined(m.group(1))}]({pathlib.PurePath(m.group(2)).name})"
+
     source = (ROOT / name).read_text(encoding="utf-8")
     title = re.search(r"^# .*\n", source, re.MULTILINE)  # Doxygen takes it for the title where it is first
     source = title.group() + source[:title.start()] + source[title.end():] if title else source
     parts = re.split(r"(^ *```.*?^ *```|^    [^\n]*)", source, flags=re.DOTALL | re.MULTILINE)
-    parts[::2] = (SPAN.sub(lambda m: joined(m.group()), LINK.sub(link, part)) for part in parts[::2])
+    parts[::2] = (SPAN.sub(lambda m: joined(m.group()), LINK.sub(link, IMAGE.sub(image, part))) for part in parts[::2])
     source = "".join(parts)
     for line in source.splitlines():
         code ^= bool(FENCE.match(line))
@@ -319,13 +325,40 @@ def wrong_pages(html):
     return found
 
 
+# Anchors that Doxygen 1.9.4 links on the page of a type without making them.
+DOXYGENS_OWN = {"nested-classes"}
+
+
+def dead_links(html):
+    """Lines for pictures, files and anchors that a page names and that are not on the site."""
+    texts = {p.name: p.read_text(encoding="utf-8") for p in html.glob("*.html")}
+    anchors = {name: set(re.findall(r'\b(?:id|name)="([^"]+)"', text)) for name, text in texts.items()}
+    found = []
+    for name, text in sorted(texts.items()):
+        for target in sorted(set(re.findall(r'\b(?:href|src)="([^"]*)"', text))):
+            target = urllib.parse.unquote(unescape(target))
+            if re.match(r"\w+:", target):
+                continue
+            file, _, anchor = target.partition("#")
+            if not (html / (file or name)).is_file():
+                found.append(f"{name}: error: {target}: there is no such file")
+            elif anchor and anchor not in anchors.get(file or name, ()) and anchor not in DOXYGENS_OWN:
+                found.append(f"{name}: error: {target}: there is no such anchor")
+    return found
+
+
 def make(out, doxygen):
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
     write_groups(out)
     write_layout(out)
     inputs = [*write_inputs(out), out / "groups.dox"]
-    images = {p.parent for p in (ROOT / "docs").rglob("*") if p.suffix in {".png", ".svg", ".webp"}}
+    pictures = [p for p in (ROOT / "docs").rglob("*") if p.suffix in {".png", ".svg", ".webp"}]
+    names = [p.name for p in pictures]
+    if len(set(names)) != len(names):
+        print(f"docs: error: two pictures are called {max(names, key=names.count)}")
+        return 1
+    images = {p.parent for p in pictures}
     values = {"OUT": out, "IMAGES": " ".join(f'"{p}"' for p in sorted(images)),
               "ROOT": ROOT, "SITE": SITE, "VERSION": version(),
               "INPUT": " \\\n  ".join(f'"{p}"' for p in inputs)}
@@ -336,7 +369,7 @@ def make(out, doxygen):
     print(said, end="")
     if done.returncode != 0 or "warning:" in said or "error:" in said:
         return 1
-    wrong = wrong_pages(out / "html")
+    wrong = wrong_pages(out / "html") + dead_links(out / "html")
     if wrong:
         print("\n".join(wrong))
         return 1

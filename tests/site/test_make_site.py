@@ -29,6 +29,9 @@ struct Place {
   bool operator==(const Place&) const = default;
 };
 
+/// Finds a place.
+Place find();
+
 }  // namespace gsnav
 """
 
@@ -132,6 +135,34 @@ class Tree(unittest.TestCase):
             self.assertEqual(wrong(f"{heading}<p>{said} a</p>"), [f"docs/a.md: error: Doxygen left {said} as text"])
         self.assertEqual(wrong("<p>Two words</p>"), ["docs/a.md: error: 1 headings, but 0 on the site"])
         self.assertEqual(wrong(heading * 2), ["docs/a.md: error: 1 headings, but 2 on the site"])
+
+    @unittest.skipUnless(shutil.which("doxygen"), "no doxygen here")
+    def test_pictures_in_other_folders(self):
+        self.write("docs/images/b.png", "a picture")
+        self.write("docs/guide/c.md", "# Guide\n\nText.\n\n![Two\nrooms](../images/b.png)\n")
+        done = self.run_doxygen()
+        self.assertEqual(done.returncode, 0, done.stdout)
+        text = (self.root / "out/html/page_docs_guide_c.html").read_text()
+        self.assertRegex(text, r'<img src="b.png"[^>]*/>(?s:.{0,40})Two rooms')
+        self.assertTrue((self.root / "out/html/b.png").is_file())
+        self.write("docs/guide/c.md", "# Guide\n\n![Two rooms](../images/d.png)\n")
+        done = self.run_doxygen()
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("d.png", done.stdout)
+        self.write("docs/guide/b.png", "another picture")
+        self.assertIn("two pictures are called b.png", self.run_doxygen().stdout)
+
+    def test_dead_links(self):
+        html = self.root / "out/html"
+        self.write("out/html/b.html", '<a id="it"></a>')
+        for link, said in (('<a href="b.html#it">', ""), ('<a href="#own">', ""), ('<a href="https://a.b/#c">', ""),
+                           ('<a href="b.html#nested-classes">', ""),
+                           ('<a href="c.html">', "c.html: there is no such file"),
+                           ('<img src="../b.png"/>', "../b.png: there is no such file"),
+                           ('<a href="b.html#own">', "b.html#own: there is no such anchor"),
+                           ('<a href="#it">', "#it: there is no such anchor")):
+            self.write("out/html/a.html", f'<h1 id="own">A</h1>{link}')
+            self.assertEqual(make_site.dead_links(html), [f"a.html: error: {said}"] if said else [])
 
 
 if __name__ == "__main__":
