@@ -18,10 +18,12 @@ case ${1:-} in
     exit $([[ $1 == --help || $1 == -h ]] && echo 0 || echo 2)
     ;;
 esac
-if ! command -v clang-format > /dev/null; then
-  echo "clang-format is not installed (Debian: clang-format)" >&2
-  exit 1
-fi
+for program in clang-format python3; do
+  if ! command -v "$program" > /dev/null; then
+    echo "$program is not installed (Debian: $program)" >&2
+    exit 1
+  fi
+done
 failed=0
 git ls-files -z '*.hpp' '*.cpp' '*.cu' '*.cuh' | xargs -0 -n 64 -P "$(nproc)" clang-format "${options[@]}" || failed=1
 git ls-files -z '*.md' | xargs -0 awk '
@@ -34,9 +36,7 @@ git ls-files -z '*.md' | xargs -0 awk '
 git ls-files -z '*.hpp' '*.cpp' '*.cu' '*.cuh' '*.py' '*.sh' '*.cmake' '*.cmake.in' '*CMakeLists.txt' | xargs -0 awk '
   length($0) > 120 { printf "%s:%d: %d columns\n", FILENAME, FNR, length($0); wrong = 1 }
   END { exit wrong }' || failed=1
-if command -v python3 > /dev/null; then
-  python3 tools/check_words.py || failed=1
-fi
+python3 tools/check_words.py || failed=1
 if [[ $failed -ne 0 ]]; then
   echo "Lines above: run tools/check_format.sh --fix for sources; wrap prose at 105 columns, the rest at 120" >&2
 fi

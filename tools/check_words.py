@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks the wording of pages, comments and messages against the style rules in CONTRIBUTING.md.
 
-Reads Markdown, comments of C++, CUDA, Python, shell and CMake, Python docstrings, and string literals of
-at least four words outside tests/ (help texts and messages). Skips code, inline code, link targets and
-short quotations.
+Reads Markdown, the text of SVG files, comments of C++, CUDA, Python, shell and CMake, Python docstrings, and
+string literals of at least four words outside tests/ (help texts and messages). Skips code, inline code, link
+targets and quotations of up to three words.
 
 usage: check_words.py                 check the folders that must be clean (CLEAN in this script)
        check_words.py PATH...         check these files and folders
@@ -22,6 +22,7 @@ stay are listed in tools/check_words_exceptions.txt, each with a reason.
 import argparse
 import bisect
 import collections
+import html
 import io
 import pathlib
 import re
@@ -30,9 +31,9 @@ import tokenize
 
 # Files and folders without findings. A path is added once it is clean, and no finding may come back.
 CLEAN = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", ".ci", ".github", "backends", "cmake", "docs", "examples",
-         "include", "src", "tests/site", "tests/words", "tools")
-# Files that quote what this script looks for.
-SKIPPED = {"tools/check_words.py", "tests/words/test_check_words.py"}
+         "include", "src", "bench", "tests/site", "tests/words", "tools")
+# Files that quote what this script looks for, and a log that is rewritten separately.
+SKIPPED = {"bench/cuda/NOTES.md", "tools/check_words.py", "tests/words/test_check_words.py"}
 MOST_COLUMNS, MOST_COLUMNS_OF_SCRIPTS = 105, 120
 MOST_WORDS, GOAL_WORDS, MOST_WORDS_OF_COMMENT = 30, 25, 45
 CPP = {".hpp", ".cpp", ".cu", ".cuh", ".h", ".inl"}
@@ -98,7 +99,7 @@ DEVICES = {
 DEVICES = {rule: [re.compile(p) for p in patterns] for rule, patterns in DEVICES.items()}
 ABBREVIATION = re.compile(r"(?:\b(?:e\.g|i\.e|vs|etc|cf|Fig|Eq|Sec|No|approx|al|resp|incl|max|min)|^\W*\d+|\b[A-Z])$")
 SENTENCE_END = re.compile(r"[.!?][\"')\]*_]*\s+")
-INLINE_CODE = re.compile(r"(`+)(?!`).*?(?<!`)\1(?!`)|(?<!\w)\"[^\"]{1,60}\"(?!\w)")
+INLINE_CODE = re.compile(r"(`+)(?!`).*?(?<!`)\1(?!`)|(?<!\w)\"[^\s\"]{1,60}(?: [^\s\"]+){0,2}\"(?!\w)")
 LINK = re.compile(r"\]\([^)\s]*(?: \"[^\"]*\")?\)|<?https?://[^\s>)]+>?")
 LIST_ITEM = re.compile(r"\s*(?:[-*+]|\d+[.)])\s+|\s*-{1,2}\w")
 Finding = collections.namedtuple("Finding", "path line rule text")
@@ -305,6 +306,24 @@ def hashes(lines):
     return comments, []
 
 
+SVG_TEXT = re.compile(r"<(text|title|desc)\b([^>]*)>(.*?)</\1>", re.DOTALL)
+
+
+def svg(text):
+    """Text of a drawing. Lines below each other at the same x are one paragraph."""
+    found, before = [], (None, 0)
+    for m in SVG_TEXT.finditer(text):
+        place = [re.search(rf'\b{key}="([-\d.]+)"', m.group(2)) for key in "xy"]
+        x, y = (float(p.group(1)) if p else 0 for p in place)
+        style = (m.group(1), x, re.sub(r'\by="[^"]*"', "", m.group(2)))
+        if style != before[0] or not 0 < y - before[1] <= 20:
+            found.append(Paragraph("cell"))
+        words = html.unescape(re.sub(r"<[^>]*>", " ", m.group(3)))
+        found[-1].add(text.count("\n", 0, m.start()) + 1, " ".join(words.split()))
+        before = (style, y)
+    return found
+
+
 def count_words(text):
     return sum(1 for word in text.split() if re.search(r"\w", word))
 
@@ -346,6 +365,8 @@ def check_text(name, text, goal=False):
     suffix, strings = pathlib.PurePath(name).suffix, []
     if suffix == ".md":
         paragraphs, wide = markdown(lines)
+    elif suffix == ".svg":
+        paragraphs, wide = svg(text), []
     elif name.endswith("help.txt"):
         paragraphs, wide = [], []
         for number, line in enumerate(lines, 1):
@@ -371,7 +392,7 @@ def check_text(name, text, goal=False):
 
 def wanted(path):
     name = path.name
-    return (path.suffix in CPP | {".md", ".py", ".sh", ".cmake"} or name in {"CMakeLists.txt", "help.txt"} or
+    return (path.suffix in CPP | {".md", ".py", ".sh", ".cmake", ".svg"} or name in {"CMakeLists.txt", "help.txt"} or
             name.endswith(".cmake.in") or path.parts[-2:] == (".ci", "run"))
 
 

@@ -177,7 +177,7 @@ std::string approximations_page(const Table& table, const std::string& command) 
   out += "\n## Budgets\n\n" + budget_part(table);
   out += "\n## Targets\n\n";
   out +=
-      "What is to be reached on large scenes (docs/notes/lod.md), of each scene, size and backend, over "
+      "Targets on large scenes (docs/notes/lod.md), for each scene, size and backend, over "
       "the "
       "views that have "
       "both of the rows that are compared.\n\n"
@@ -188,16 +188,16 @@ std::string approximations_page(const Table& table, const std::string& command) 
       "PSNR, its mean and its least.\n"
       "- *culling*: Gaussians touched are those of the chunks, or parts of chunks, that projecting "
       "reads; those that reach "
-      "a tile have a pair. Removed of all: 1 - touched / Gaussians; removed of what could be: that "
+      "a tile have a pair. Removed of all: 1 - touched / Gaussians; removed of the removable: that "
       "beside "
       "1 - in a tile / Gaussians. Nothing that is removed changes a bit.\n"
       "- *depth alone*: frames of the sensor depth beside rgbd, and the bytes of a Gaussian that each "
       "reads.\n"
       "- *packed*: bytes of the packed cloud, bounds and ids included, without its SH bands, and its "
       "PSNR against "
-      "contract; the largest resident memory while the file is read, less what was there before, beside "
-      "what the "
-      "packed cloud takes (files whose cloud takes 16 MB and more).\n\n";
+      "contract; the growth of the resident memory while the file is read, at most, beside the size of "
+      "the "
+      "packed cloud (files whose cloud takes 16 MB and more).\n\n";
   out += target_part(table);
   out += "\n## What each profile approximates\n\n" + ledger_part(table);
   out += "\n## One knob at a time\n\n" + knob_part(table);

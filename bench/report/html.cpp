@@ -32,7 +32,8 @@ const std::array<Section, 10> kSections{{
      "the "
      "two. Dashed: the best that a given time buys. Hollow: measured on fewer views than the others, so "
      "that "
-     "it beats no other setting. Response and compat modes change what is right and are left out here.",
+     "it beats no other setting. Response and compat modes change the correct image and are left out "
+     "here.",
      pareto_section},
     {"knobs", "One knob at a time",
      "Everything else as in the exact profile, which each chart shows beside its values. Means over "
@@ -42,7 +43,7 @@ const std::array<Section, 10> kSections{{
      knob_section},
     {"settings", "All settings", "Means over views, the worst view in parentheses.", settings_section},
     {"images", "Difference images of the worst views", "", image_section},
-    {"ledger", "Approximation ledger", "What each profile does not compute exactly.", ledger_section},
+    {"ledger", "Approximation ledger", "Approximations of each profile.", ledger_section},
     {"skinning", "Skinning", "", skinning_section},
     {"sweeps", "Capsule distances and sweeps", "", sweep_section},
     {"kernels", "Kernels", "Microbenchmarks, with the error against float64 beside the time.",

@@ -54,7 +54,7 @@ std::vector<Row> ledger_rows() {
       entry("exact", "alpha cut", "alpha_min", c.quality.alpha_min, "alpha, a Gaussian and pixel",
             "part of the contract: a Gaussian is not blended where its alpha is below"),
       entry("exact", "transmittance stop", "transmittance_min", c.quality.transmittance_min,
-            "alpha, a pixel", "part of the contract: what lies behind a closed pixel is left out"),
+            "alpha, a pixel", "part of the contract: Gaussians behind a closed pixel are left out"),
       entry("fast", "exp2 by a cubic", "", exp2_error<Exp2::degree3>(), "relative, of alpha",
             "in place of degree 5"),
       entry("fast", "transmittance stop", "transmittance_min", Quality::fast().transmittance_min,
@@ -64,9 +64,9 @@ std::vector<Row> ledger_rows() {
             "bands of a chunk that change none of its colours by more, seen from anywhere; in tools "
             "that profile a "
             "scene (docs/notes/lod.md)"),
-      entry(
-          "lod", "merged Gaussians", "", LodChoice{}.pixels, "pixels, root mean square",
-          "what was merged lies no farther from where it is shown, on this sensor; all else as in fast"),
+      entry("lod", "merged Gaussians", "", LodChoice{}.pixels, "pixels, root mean square",
+            "merged Gaussians lie no farther from where they are shown, on this sensor; all else as in "
+            "fast"),
   };
   return rows;
 }

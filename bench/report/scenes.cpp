@@ -42,7 +42,7 @@ Result<std::vector<ViewPoint>> orbit(const OpenedScene& scene, const GaussianClo
   return out;
 }
 
-/// A name for a scene: that of its file, without extension, or the Habitat scene's.
+/// A name for a scene: the name of its file, without extension, or of the Habitat scene.
 std::string name_of(const std::string& scene) {
   const std::size_t hash = scene.rfind('#');
   if (hash != scene.npos && hash + 1 < scene.size()) return scene.substr(hash + 1);

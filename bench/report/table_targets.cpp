@@ -97,7 +97,7 @@ class Place {
     if (n == 0 || !(emitting > 0)) return;
     add("culling: Gaussians touched for each that reaches a tile", 1.3, touched / emitting, false, n,
         "removed " + percent((all - touched) / all) + " of all, " +
-            percent(all > emitting ? (all - touched) / (all - emitting) : 1) + " of what could be");
+            percent(all > emitting ? (all - touched) / (all - emitting) : 1) + " of the removable");
   }
 
   void depths_alone(const RowRefs& rows) {
@@ -136,7 +136,7 @@ class Place {
         note);
     constexpr double kLeast = 1.6e7;  // below this, threads and pages dominate the peak
     if (const auto peak = packed.front()->number("read_peak"); peak && *bytes >= kLeast)
-      add("packed: most memory while it is read, of what stays", 2, *peak / *bytes, false,
+      add("packed: most memory while it is read, relative to its size", 2, *peak / *bytes, false,
           packed.size());
   }
 

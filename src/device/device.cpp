@@ -24,7 +24,7 @@ int gpu_count() noexcept {
 #endif
 }
 
-/// Text for errors: "; there are: serial cpu cuda:0".
+/// Text for errors: `; there are: serial cpu cuda:0`.
 std::string there_are() {
   std::string text = "; there are:";
   for (const std::string& name : Device::available()) text += " " + name;

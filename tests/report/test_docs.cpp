@@ -73,7 +73,7 @@ TEST_CASE("docs: targets stand beside what was found, the ledger names what it i
   const std::string page = approximations_page(Table({r, entry}, {}), "x");
   CHECK(page.find("| box | 64x48 | serial | culling: Gaussians touched for each that reaches a tile | "
                   "<= 1.3 | 1.500 | "
-                  "**missed** | 1 | removed 70.0 % of all, 87.5 % of what could be |") !=
+                  "**missed** | 1 | removed 70.0 % of all, 87.5 % of the removable |") !=
         std::string::npos);
   CHECK(page.find("| fast | cut | alpha\\_min | 0.250 | alpha | faint |") != std::string::npos);
   CHECK(approximations_page(Table({}, {}), "x").find("No row has a target in this report.") !=

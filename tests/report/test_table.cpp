@@ -199,7 +199,7 @@ TEST_CASE("targets: one setting beside another, over the views that have both") 
   CHECK(value("lod: times").views == 2);
   CHECK(value("culling").value == doctest::Approx(800.0 / 600));
   CHECK(!value("culling").met());
-  CHECK(value("culling").note == "removed 60.0 % of all, 85.7 % of what could be");
+  CHECK(value("culling").note == "removed 60.0 % of all, 85.7 % of the removable");
   CHECK(value("depth alone: times").value == doctest::Approx(2));
   CHECK(value("depth alone: fewer").value == doctest::Approx(75));
   CHECK(value("packed: bytes").value == doctest::Approx(38));

@@ -58,6 +58,7 @@ class Rules(unittest.TestCase):
     def test_sentences_in_every_kind_of_file(self):
         wrap = {"docs/a.md": "# Title\n\nText.\n\n{}\n", "include/a.hpp": "/// {}\nint f();\n",
                 "src/a.cu": "int a;  // {}\n", "src/b.cpp": "/* {} */\n", "tools/a.py": '"""{}"""\n',
+                "docs/a.svg": '<svg><text x="1" y="2" class="note">{}</text></svg>\n',
                 "tools/b.py": "a = 1  # {}\n", "tools/a.sh": "# {}\n",
                 "cmake/a.cmake": "set(a b)\n# {}\n", "CMakeLists.txt": "# {}\n"}
         for rule, (wrong, right) in SENTENCES.items():
@@ -106,6 +107,23 @@ class Text(unittest.TestCase):
         self.assertFalse(rules("a.hpp", f"/// Reads it.\n/// @code\n/// {said}\n/// @endcode\nint f();\n"))
         self.assertFalse(rules("a.sh", f"cat << 'END'\n# {said}\nEND\n"))
         self.assertIn("what", rules("a.sh", f"cat << 'END'\n# {said}\nEND\n# {said}\n"))
+
+    def test_only_short_quotations_and_code_are_skipped(self):
+        self.assertFalse(rules("a.md", 'It says "of what is" and `skips what is hidden from view`.\n'))
+        self.assertIn("what", rules("a.md", 'It says "skips what is hidden".\n'))
+        self.assertIn("what", rules("a.hpp", '/// It says "skips what is hidden".\n'))
+        self.assertIn("what", rules("a.md", "It skips `rows` of what is hidden.\n"))
+
+    def test_text_of_drawings(self):
+        lines = ('<text x="1" y="20" class="note">skips all of what</text>\n'
+                 '<text x="{}" y="{}" class="note">is hidden</text>')
+        self.assertIn("what", rules("docs/a.svg", lines.format(1, 35)))
+        self.assertFalse(rules("docs/a.svg", lines.format(90, 35)) | rules("docs/a.svg", lines.format(1, 90)))
+        self.assertIn("what", rules("docs/a.svg", "<svg>\n<title>all of what is hidden</title></svg>"))
+        self.assertIn("what", rules("docs/a.svg", '<text x="1" y="2">what <tspan>is</tspan> hidden</text>'))
+        self.assertFalse(rules("docs/a.svg", '<path d="M1,2" class="what is hidden"/><text x="1" y="2">rows</text>'))
+        found = check_words.check_text("docs/a.svg", "<svg>\n<text x='1'>a</text>\n<text x='2'>what is left</text>")
+        self.assertEqual([(f.line, f.rule) for f in found], [(3, "what")])
 
     def test_headings_and_heads_of_tables_may_ask(self):
         self.assertFalse(rules("a.md", "# What is guaranteed\n\n| a | what it shows |\n|---|---|\n| b | rows |\n"))

@@ -26,7 +26,7 @@ struct Record {
 std::string line_of(const Record& record);
 /// Reads a record from a line. Its index and id must be those of an episode of `stage`, and all fields
 /// must exist with the right type.
-/// @return invalid_file: "WHERE: FIELD = VALUE: RULE".
+/// @return invalid_file: `WHERE: FIELD = VALUE: RULE`.
 gsnav::Result<Record> record_of(const std::string& line, const std::string& where, const Stage& stage);
 
 /// Repeats the actions of a record in `world` and compares the result with check_outcome().
@@ -34,7 +34,7 @@ gsnav::Status play_again(gsnav::World& world, const gsnav::PointNavEpisode& epis
                          const Record& record);
 /// Compares a record with a world in which its actions were repeated. The episode must have ended, and
 /// reward and metrics may differ by at most 1e-6 (relative for values above 1).
-/// @return invalid_file: "FIELD = VALUE: RULE".
+/// @return invalid_file: `FIELD = VALUE: RULE`.
 gsnav::Status check_outcome(const Record& record, const gsnav::World& world, double reward);
 
 }  // namespace gsnav_eval

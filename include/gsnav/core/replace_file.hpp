@@ -19,7 +19,7 @@
 
 namespace gsnav {
 
-/// Status for an output path that cannot be written: "PATH: cannot be written: WHY".
+/// Status for an output path that cannot be written: `PATH: cannot be written: WHY`.
 inline Status unwritable(const std::filesystem::path& path, const std::string& why,
                          Errc code = Errc::file_not_found) {
   return {code, path.string() + ": cannot be written: " + why};
