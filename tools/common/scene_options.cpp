@@ -52,9 +52,11 @@ void add_storage_option(CLI::App& app, SceneOptions& o) {
 }
 
 void add_drawing_options(CLI::App& app, SceneOptions& o) {
-  app.add_option("--profile", o.profile,
-                 "quality: exact (rounding only), fast (a cheaper exponential) or lod (a level of "
-                 "detail for each part of the scene)")
+  app.add_option(
+         "--profile", o.profile,
+         "quality: exact (rounding only), fast (a cheaper exponential; a pixel that lets less than "
+         "1/1000 of the light through is made opaque) or lod (a level of detail for each part of the "
+         "scene)")
       ->check(CLI::IsMember({"exact", "fast", "lod"}))
       ->capture_default_str()
       ->group(kGroup);

@@ -25,10 +25,10 @@ struct LoadSpzOptions {
 /// warning. Versions 3 and 4 are tested on bytes that Niantic's own library wrote; versions 1 and 2 are
 /// untested on a real file.
 ///
-/// Memory is at most 100 times the file's size plus the resulting cloud. Never throws. Errors:
-/// file_not_found; invalid_file (a stream that is damaged or has another size, a bad header, fewer bytes
-/// than the count needs, more Gaussians than the number of bytes makes plausible); unsupported (other
-/// versions); out_of_memory.
+/// No allocation exceeds 1 MiB plus 1000 times the file's size: streams may grow 100 times, and bytes
+/// become floats. Never throws. Errors: file_not_found; invalid_file (a stream that is damaged or has
+/// another size, a bad header, fewer bytes than the count needs, more Gaussians than the number of bytes
+/// makes plausible); unsupported (other versions); out_of_memory.
 Result<LoadedCloud> load_spz(const std::filesystem::path& path, const LoadSpzOptions& options = {});
 
 /// Reads the bytes of a file. `source` names them in messages and in the report.
