@@ -22,7 +22,8 @@ struct NpyLayout {
   std::string dictionary;     ///< The header's text, for messages.
 };
 
-/// Product of the dimensions. Nothing if that number of 8-byte values would exceed the address space.
+/// Product of the dimensions; 1 for an empty shape. std::nullopt if an array of that number of 8-byte
+/// values would be larger than the address space.
 std::optional<std::size_t> npy_count(std::span<const std::size_t> shape);
 
 /// Everything before the values of a version 1.0 file. `name` is for messages. Errors: invalid_argument

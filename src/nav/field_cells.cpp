@@ -185,7 +185,8 @@ class CellsBuilder {
   std::vector<Candidate> candidates_;
   std::vector<double> tangents_, lengths_;  ///< At the corners of the part. `lengths_` has one block per
                                             ///< kept source.
-  std::vector<std::uint64_t> windows_;      ///< Appended after the points of the cell.
+  std::vector<std::uint64_t> windows_;      ///< Sources with both sides of their cone, seven
+                                            ///< numbers each; written after the points.
 };
 
 }  // namespace

@@ -90,7 +90,7 @@ class GeodesicSearch {
 
  private:
   struct Cone {
-    Flat right, left;  ///< Directions of the sides.
+    Flat right, left;  ///< Directions from the root along the right and the left side.
   };
 
   void begin(const UnfoldedMesh& mesh, double bound = kFar);

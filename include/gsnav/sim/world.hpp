@@ -81,8 +81,9 @@ class World {
                               BodySource bodies = {});
 
   /// Places the agent at the start of an episode and sets the clock to its start time.
-  /// @return nothing_navigable, with the episode, if the start or goal is off the NavMesh or the goal
-  /// cannot be reached; invalid_argument if a value is not finite; the errors of CapsuleSet::create.
+  /// @return nothing_navigable, with the episode, if the start or goal is off the NavMesh or not finite,
+  /// or the goal cannot be reached; invalid_argument if the start's time or rotation is not finite; the
+  /// errors of CapsuleSet::create.
   Status reset(const PointNavEpisode& episode);
 
   /// Performs one action for one control period. Action::stop ends the episode and takes no time.

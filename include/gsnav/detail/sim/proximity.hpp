@@ -11,9 +11,9 @@ namespace gsnav {
 /// Computes the smallest distance from an agent to each avatar during a tick. Distances are between
 /// surfaces, in metres, negative in overlap.
 ///
-/// Errors: at most 1e-6 m plus 1e-4 of the motion of agent and body in the tick above the true value.
-/// For an avatar that stays outside the agent's personal space and farther away than another avatar, the
-/// result is only a lower bound, which is all that the metrics need.
+/// A result exceeds the true distance by at most 1e-6 m plus 1e-4 of the motion of agent and avatar in
+/// the tick. An avatar that stays outside the agent's personal space (kPersonalSpace) and farther away
+/// than another avatar may get a smaller value than its distance. The metrics need no more.
 /// @param path Path of the agent (StepResult::path). It stands still after the last point.
 /// @param radius, height Size of the agent, metres.
 /// @param bodies Motion of the avatars during the tick, one group per avatar.

@@ -12,7 +12,8 @@
 namespace gsnav {
 
 /// Sets a start time for each episode: a random multiple of the control period in [0, 600) s at which no
-/// avatar is within 0.6 m of the start. After a hundred attempts, the last one is used.
+/// avatar is within 0.6 m of the surface of an agent at the start. After a hundred attempts, the last
+/// time is used.
 /// @return the errors of CapsuleSet::create.
 Status draw_start_times(std::span<PointNavEpisode> episodes, const SimulatorScene& scene,
                         const TaskConfig& task, std::uint64_t seed);
