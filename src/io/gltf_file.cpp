@@ -249,7 +249,7 @@ Result<const Json*> GltfFile::item(const char* list, std::size_t index) const {
 Result<std::size_t> GltfFile::index(const Json& object, const char* key, const char* list,
                                     const std::string& at) const {
   const std::size_t n = count(list);
-  if (n == 0) return {Errc::invalid_file, at + ": '" + key + "' names one of no " + list};
+  if (n == 0) return {Errc::invalid_file, at + ": '" + key + "' is given, but the file has no " + list};
   const auto v = get_integer(object, key, 0, static_cast<std::int64_t>(n) - 1, at);
   if (!v) return v.status();
   return static_cast<std::size_t>(*v);

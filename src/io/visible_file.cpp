@@ -92,9 +92,10 @@ Status check(const fs::path& path, const VisibleSets& v, std::size_t cloud_rows)
     const auto bad = [&path, c](const char* what) {
       return invalid_file(path, "cell " + std::to_string(c) + ": " + what);
     };
-    if (c > 0 && !(v.keys[c - 1] < v.keys[c])) return bad("its place is not behind the one before");
+    if (c > 0 && !(v.keys[c - 1] < v.keys[c]))
+      return bad("its key is not greater than that of the cell before");
     if (v.ends[c] < (c == 0 ? 0 : v.ends[c - 1]) || v.ends[c] > v.bits.size())
-      return bad("its words are not behind those before");
+      return bad("its end is less than that of the cell before, or beyond the bits of the file");
     if (const char* flaw = flaw_of(v, c, cloud_rows)) return bad(flaw);
   }
   if (v.bits.size() != (v.ends.empty() ? 0 : v.ends.back()))

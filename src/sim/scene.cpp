@@ -32,7 +32,7 @@ Status validate_assets(const SimulatorScene& scene) {
       return bad("packed and cloud are both set: set only one of them");
     const std::size_t chunks = (a.packed != nullptr ? a.packed->view() : a.cloud->view()).chunk_count();
     if (a.bands != nullptr && a.bands->chunk_sh_degrees.size() != chunks)
-      return bad("bands are of another cloud");
+      return bad("bands have another number of chunks than the cloud");
   }
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
     if (scene.meshes[i].surface == nullptr) {

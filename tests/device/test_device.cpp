@@ -223,7 +223,7 @@ TEST_CASE("renderer: assets that cannot be drawn so are named") {
   CHECK(has(message({}), "assets[0].cloud is null"));
   SceneAsset asset{cloud};
   asset.bands = std::make_shared<const SceneBands>();
-  CHECK(has(message(asset), "assets[0].bands are of another cloud"));
+  CHECK(has(message(asset), "assets[0].bands have another number of chunks than the cloud"));
   asset = {cloud};
   asset.packed = std::make_shared<const PackedCloud>(pack_cloud(*cloud));
   CHECK(has(message(asset), "assets[0].packed"));
