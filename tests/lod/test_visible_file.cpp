@@ -115,7 +115,7 @@ TEST_CASE("visible sets file: values that cannot be are refused though the check
           "cell 1: chunks that are not counted");
   refused([](auto& v) { v.ends[1] -= 1; }, "cell 1: not as many rows");
   refused([](auto& v) { std::swap(v.ends[0], v.ends[1]); }, "cell");
-  refused([](auto& v) { v.ends[2] = ~std::uint64_t{0}; }, "cell 2: its words");
+  refused([](auto& v) { v.ends[2] = ~std::uint64_t{0}; }, "cell 2: its end");
   refused([](auto& v) { v.bits.push_back(0); }, "words of no cell");
   refused(
       [](auto& v) {
