@@ -75,7 +75,7 @@ for count in ${gaussians//,/ }; do
   scenes+=(--scene "flat $(of "$count")=$out/flat_$count.ply:$out/cameras.json")
 done
 
-"$root/tools/cpu_table.py" --build "$build" --no-baselines --sizes "$sizes" --rounds "$rounds" --cache "$out/cpu" \
+"$root/tools/cpu_table.py" --build "$build" --sizes "$sizes" --rounds "$rounds" --cache "$out/cpu" \
   --out "$out/cpu.md" "${scenes[@]}"
 
 # A row of bench_batch: profile batch ms p90 frames/s rgb_max p99.9 psnr depth_p99 pairs scratch host_us

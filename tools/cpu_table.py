@@ -89,11 +89,6 @@ def compiled(source, cache, flags):
     return binary
 
 
-def data_folder(build):
-    found = re.search(r"^GSNAV_DATA_DIR:\w+=(.*)$", (build / "CMakeCache.txt").read_text(), re.M)
-    return pathlib.Path(found.group(1)) if found else pathlib.Path()
-
-
 def default_scenes(build, cache):
     """(name, PLY, cameras) of the flats that gsnav-scene makes."""
     scenes = []
@@ -286,7 +281,8 @@ def parse_options():
     parser.add_argument("--only", default="", metavar="TEXT", help="only scenes with this in their name")
     parser.add_argument("--baseline", action="append", default=[], metavar="NAME=BINARY",
                         help="baseline; NAME=SOURCE.cpp compiles it")
-    parser.add_argument("--no-baselines", action="store_true")
+    parser.add_argument("--baselines", type=pathlib.Path, metavar="FOLDER",
+                        help="folder of the baselines' sources: " + ", ".join(b.source for b in BASELINES.values()))
     parser.add_argument("--sizes", default="256x256,640x480,1920x1080", help="sizes that bench_render has")
     parser.add_argument("--threads", default="1,2", help="thread counts that bench_render has")
     parser.add_argument("--repeats", type=int, default=1, help="frames per view")
@@ -312,15 +308,14 @@ def parse_options():
 
 def main():
     options = parse_options()
-    data = data_folder(options.build)
     scenes = [parse_scene(s) for s in options.scene] or default_scenes(options.build, options.cache)
     scenes = [s for s in scenes if options.only in s[0]]
     if not scenes:
         stop(f"no scene has {options.only} in its name; name some by --scene")
-    folder = data.parent / "bench_scene" / "cpu_baseline"
-    there = [f"{n}={folder / b.source}" for n, b in BASELINES.items() if (folder / b.source).exists()]
-    named = options.baseline or there
-    baselines = [] if options.no_baselines else [parse_baseline(b, options.cache) for b in named]
+    named = list(options.baseline)
+    if options.baselines:
+        named += [f"{n}={options.baselines / b.source}" for n, b in BASELINES.items()]
+    baselines = [parse_baseline(b, options.cache) for b in named]
     rows = measure(options, scenes, baselines)
     names = [b[0] for b in baselines]
     text = caption(options, names) + "\n\n" + table(rows, options.threads, names)

@@ -13,6 +13,7 @@
 # GSNAV_JOBS=N        compile N files and run N tests at a time (default: see tools/build_jobs.sh)
 # GSNAV_WERROR=ON     treat warnings as errors (default: as in the preset)
 # GSNAV_DATA_DIR=DIR  folder of real scenes; tests that need them are skipped without it
+# GSNAV_FLAT_GENERATOR=FILE  source of the generator that test_flat draws; it is skipped without it
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -27,6 +28,7 @@ jobs=${GSNAV_JOBS:-$("$root/tools/build_jobs.sh")}
 options=()
 [[ -n ${GSNAV_WERROR:-} ]] && options+=("-DGSNAV_WERROR=$GSNAV_WERROR")
 [[ -n ${GSNAV_DATA_DIR:-} ]] && options+=("-DGSNAV_DATA_DIR=$GSNAV_DATA_DIR")
+[[ -n ${GSNAV_FLAT_GENERATOR:-} ]] && options+=("-DGSNAV_FLAT_GENERATOR=$GSNAV_FLAT_GENERATOR")
 if [[ $preset != asan-ubsan && $preset != cuda ]]; then
   cuda=${GSNAV_CUDA:-}
   if [[ ${1:-} == --cuda ]]; then

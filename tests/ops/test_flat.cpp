@@ -34,7 +34,7 @@ namespace {
 
 TEST_CASE("the benchmark flat at 300K") {
 #if !defined(GSNAV_BENCH_SCENE_GENERATOR)
-  std::printf("SKIP: the generator of the benchmark flat is not there\n");
+  std::printf("SKIP: the generator of the benchmark flat is not there (GSNAV_FLAT_GENERATOR)\n");
 #else
   const TempFolder dir("test_flat");
   const std::string ply = (dir / "flat.ply").string(), cameras_path = (dir / "cameras.json").string();
