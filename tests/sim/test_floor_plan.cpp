@@ -167,7 +167,7 @@ TEST_CASE("floor plans: a seed gives one scene on any number of threads, another
 TEST_CASE("floor plans: what is built stays on the footprints and within the walls") {
   SceneSampling sampling;
   sampling.density = 0.05;
-  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+  for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
     CAPTURE(seed);
     const FloorPlan plan = plan_of(seed, 6);
     const DefaultScene scene = make_planned_scene(plan, sampling).value();
@@ -197,9 +197,13 @@ TEST_CASE("floor plans: what is built stays on the footprints and within the wal
 TEST_CASE("floor plans: one island of the NavMesh covers all rooms") {
   SceneSampling sampling;
   sampling.density = 0.05;
-  for (const auto& [seed, rooms] : {std::pair{7, 5}, {8, 1}, {9, 3}, {10, 8}, {11, 12}}) {
-    CAPTURE(seed);
-    const FloorPlan plan = plan_of(static_cast<std::uint64_t>(seed), rooms);
+  struct Case {
+    std::uint64_t seed;
+    int rooms;
+  };
+  for (const Case c : {Case{7, 5}, {8, 1}, {9, 3}, {10, 8}, {11, 12}}) {
+    CAPTURE(c.seed);
+    const FloorPlan plan = plan_of(c.seed, c.rooms);
     const DefaultScene scene = make_planned_scene(plan, sampling).value();
     NavMeshSettings settings;
     settings.agent_radius = 0.2;
