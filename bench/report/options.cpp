@@ -50,8 +50,6 @@ void add_scenes(CLI::App& app, Options& o, std::vector<std::string>& sizes, std:
       ->capture_default_str();
   app.add_option("--time", o.frame.time, "Moment of scenes that move (4D Gaussians), seconds")
       ->capture_default_str();
-  app.add_option("--data", o.data, "Folder of real scenes (GSNAV_DATA_DIR): those that are there")
-      ->check(CLI::ExistingDirectory);
   app.add_option("--flat", o.flats, "Benchmark flats, PLY files with a cameras.json beside them");
   app.add_option(
       "--visible-sets", o.visible_sets,
@@ -191,9 +189,8 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     return fail("--backends cuda: this build has no CUDA backend");
   }
 #endif
-  if (o.wants("render") && o.scenes.empty() && o.flats.empty() && o.data.empty() && !o.default_scene) {
-    return fail(
-        "no scene: name one by --scene, --default, --data or --flat, or leave `render` out of --kinds");
+  if (o.wants("render") && o.scenes.empty() && o.flats.empty() && !o.default_scene) {
+    return fail("no scene: name one by --scene, --default or --flat, or leave `render` out of --kinds");
   }
   if (o.cache.empty()) o.cache = o.out + "/references";
   if (o.cache == "none") o.cache.clear();

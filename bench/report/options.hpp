@@ -15,7 +15,6 @@ struct Options {
   std::vector<std::string> scenes, flats;
   std::vector<std::string> visible_sets;  ///< SCENE=FILE
   bool default_scene = false;
-  std::string data;
   SceneFrame frame;
   int views = 4;
   std::vector<ImageSize> sizes{{256, 256}, {640, 480}};

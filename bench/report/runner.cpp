@@ -43,9 +43,6 @@ Result<std::vector<SceneSpec>> scene_specs(const Options& o) {
     specs.push_back(std::move(*spec));
   }
   if (o.default_scene) specs.push_back(default_flat());
-  if (!o.data.empty()) {
-    for (SceneSpec& spec : data_scenes(o.data)) specs.push_back(std::move(spec));
-  }
   std::map<std::string, SceneSpec*> names;
   for (SceneSpec& spec : specs) {
     if (!names.emplace(spec.name, &spec).second)
@@ -62,8 +59,6 @@ Result<std::vector<SceneSpec>> scene_specs(const Options& o) {
     }
     scene->second->visible_sets = text.substr(equals + 1);
   }
-  if (specs.empty())
-    return {Errc::file_not_found, "--data " + o.data + ": none of the known scenes is there"};
   return specs;
 }
 

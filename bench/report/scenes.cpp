@@ -2,6 +2,7 @@
 #include "scenes.hpp"
 
 #include <algorithm>
+#include <filesystem>
 #include <system_error>
 #include <utility>
 
@@ -96,29 +97,6 @@ Result<SceneSpec> benchmark_flat(const std::string& ply) {
       return {Errc::file_not_found, "--flat " + ply + ": " + p.string() + " does not exist"};
   }
   return SceneSpec{path.stem().string(), ply, cameras.string()};
-}
-
-std::vector<SceneSpec> data_scenes(const std::filesystem::path& folder) {
-  std::vector<SceneSpec> out;
-  const std::filesystem::path showroom = folder / "splats/lacadiere_showroom",
-                              cameras = folder / "cameras/lacadiere_eye_level.json";
-  std::string tiles;
-  for (const char* tile : {"2_0", "2_1", "2_2"}) {
-    if (is_there(showroom / tile)) tiles.append(tiles.empty() ? "" : ",").append(tile);
-  }
-  if (!tiles.empty() && is_there(cameras)) {
-    out.push_back({"lacadiere", (showroom / tiles).string(), cameras.string()});
-  }
-  const std::filesystem::path ruin = folder / "splats/fyoxy_ruin_300k_sh3";
-  if (is_there(ruin)) {
-    SceneSpec spec{"fyoxy_ruin", ruin.string(), {}};
-    const Vec3d up{0, -1, 0};  // the scan is y down, about one unit per metre
-    spec.views = {
-        look("wall", {0, -1, -2.5}, {2, -1.2, 0}, up), look("yard", {2.2, -1.5, -5}, {0.5, -1, 0}, up),
-        look("corner", {-3, -1.5, -5}, {0, -1, 0}, up), look("fence", {0, -1.4, -3}, {-3, -1.2, 0}, up)};
-    out.push_back(std::move(spec));
-  }
-  return out;
 }
 
 Result<Scene> load(const SceneSpec& spec, int views, const SceneFrame& frame) {

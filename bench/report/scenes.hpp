@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -52,9 +51,6 @@ SceneSpec default_flat();
 
 /// The benchmark flat of the file `ply`, with the cameras.json beside it. Errors: file_not_found.
 gsnav::Result<SceneSpec> benchmark_flat(const std::string& ply);
-
-/// The real scans that exist below `folder` (GSNAV_DATA_DIR), with viewpoints chosen by hand.
-std::vector<SceneSpec> data_scenes(const std::filesystem::path& folder);
 
 /// Loads a scene and chooses at most `views` of its viewpoints, evenly spread.
 /// @return the errors of gsnav::open_scene, and those of the files of cameras and visible sets. The
