@@ -24,7 +24,8 @@ struct PythonBatch {
 
 /// BatchStep whose spans are numpy arrays.
 struct PythonStep {
-  nb::object rewards, terminated, truncated, infos, point_goals, times, finished, final_metrics;
+  nb::object rewards, terminated, truncated, infos, point_goals, times, finished, final_metrics,
+      final_point_goals;
   nb::dict images, final_images;
 };
 
@@ -68,6 +69,8 @@ PythonStep step_arrays(const BatchStep& s, nb::handle self) {
   std::vector<std::int64_t> finished(s.finished.begin(), s.finished.end());
   const std::size_t ended = finished.size();
   out.finished = array_from(std::move(finished), {ended});
+  const auto* const goals = reinterpret_cast<const double*>(s.final_point_goals.data());
+  out.final_point_goals = array_copy(std::span(goals, 2 * ended), {ended, 2});
   out.final_metrics = structured_copy(s.final_metrics, types().metrics);
   out.images = image_arrays(s.images, self);
   out.final_images = image_arrays(s.final_images, nb::handle());
@@ -194,6 +197,9 @@ void bind_step(nb::module_& m) {
   array("finished", &S::finished, "int64", "Environments whose episode ended in this step. A copy.");
   array("final_metrics", &S::final_metrics, "void",
         "Metrics of those episodes, structured with the fields of EpisodeMetrics. A copy.");
+  array("final_point_goals", &S::final_point_goals, "float64",
+        "Goals at the end of those episodes: distance (metres) and angle (radians), [finished][2]. A "
+        "copy.");
   const char* const images = "-> dict[str, numpy.typing.NDArray[numpy.float32]]";
   c.def_prop_ro(
        "images", [](const S& s) { return s.images; },

@@ -35,7 +35,8 @@ void bind_device(nb::module_& m) {
       .def_prop_ro("name", &Device::name, "Name in the form that `parse` accepts.")
       .def_prop_ro("description", &Device::description, "Description for people.")
       .def(
-          "__eq__", [](const Device& a, const Device& b) { return a == b; }, nb::is_operator())
+          "__eq__", [](const Device& a, const Device& b) { return a == b; }, nb::is_operator(),
+          nb::sig("def __eq__(self, other: object, /) -> bool"))
       .def("__hash__", [](const Device& d) { return std::hash<std::string>()(d.name()); })
       .def("__repr__", [](const Device& d) { return "Device.parse('" + d.name() + "')"; })
       .def("__getstate__", [](const Device& d) { return d.name(); })

@@ -76,7 +76,11 @@ class Struct {
   /// Binds a field that is converted by functions. `set` throws if a value is wrong.
   Struct& extra(const char* name, const char* type, nb::object (*get)(const T&),
                 void (*set)(T&, nb::handle), const char* doc) {
-    class_.def_prop_rw(name, get, set, doc);
+    const std::string getter =
+        std::string("def ") + name + "(self) -> numpy.typing.NDArray[numpy.float64]";
+    const std::string setter = std::string("def ") + name + "(self, value: " + type + ", /) -> None";
+    class_.def_prop_rw(name, get, set, nb::for_getter(nb::sig(getter.c_str())),
+                       nb::for_setter(nb::sig(setter.c_str())), doc);
     fields_.push_back({name, type, get, [set](T& t, nb::handle h) { return set(t, h), true; }});
     return *this;
   }
@@ -103,11 +107,14 @@ class Struct {
       }
       return text + ")";
     });
-    class_.def("__getstate__", [fields = fields_](const T& self) {
-      nb::dict state;
-      for (const Field& f : fields) state[f.name.c_str()] = f.get(self);
-      return state;
-    });
+    class_.def(
+        "__getstate__",
+        [fields = fields_](const T& self) {
+          nb::dict state;
+          for (const Field& f : fields) state[f.name.c_str()] = f.get(self);
+          return state;
+        },
+        nb::sig("def __getstate__(self) -> dict[str, typing.Any]"));
     class_.def("__setstate__", [fields = fields_, name = name_](T& self, const nb::dict& state) {
       T made{};
       fill(made, name, fields, state);

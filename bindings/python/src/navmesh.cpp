@@ -125,7 +125,8 @@ void bind_settings_of_mesh(nb::module_& m) {
           "validate", [](const S& s) { s.validate().throw_if_error(); },
           "Raises InvalidArgument naming the field that is out of range.")
       .def(
-          "__eq__", [](const S& a, const S& b) { return a == b; }, nb::is_operator());
+          "__eq__", [](const S& a, const S& b) { return a == b; }, nb::is_operator(),
+          nb::sig("def __eq__(self, other: object, /) -> bool"));
 }
 
 void bind_points(nb::class_<NavMesh>& c) {

@@ -3,6 +3,7 @@
 
 #include <nanobind/stl/array.h>
 
+#include "arrays.hpp"
 #include "bind.hpp"
 #include "fields.hpp"
 #include "gsnav/sim.hpp"
@@ -58,6 +59,17 @@ void bind_actions(nb::module_& m) {
                   "PointNav among people, with penalties for coming near them.");
 }
 
+nb::object colors_to_bytes(nb::ndarray<const float, nb::c_contig, nb::device::cpu> rgb) {
+  std::vector<std::size_t> shape;
+  for (std::size_t i = 0; i < rgb.ndim(); ++i) shape.push_back(rgb.shape(i));
+  std::vector<std::uint8_t> bytes(rgb.size());
+  {
+    nb::gil_scoped_release release;
+    to_bytes(std::span(rgb.data(), rgb.size()), bytes);
+  }
+  return array_from(std::move(bytes), shape);
+}
+
 void bind_sensors(nb::module_& m) {
   nb::enum_<SensorKind>(m, "SensorKind", "Kind of image that a sensor produces.")
       .value("rgb", SensorKind::rgb, "Colour, float32 [H][W][3], 0 to 1 and above.")
@@ -99,6 +111,11 @@ void bind_sensors(nb::module_& m) {
   m.def("rgbd_sensors", &rgbd_sensors, nb::arg("height") = 256, nb::arg("width") = 256,
         nb::arg("hfov") = 90.0, nb::arg("position") = Vec3d{0.0, 1.5, 0.0},
         "An RGB and a depth sensor (\"rgb\", \"depth\") at the same position. They share one render.");
+  m.def(
+      "to_bytes", colors_to_bytes, nb::arg("rgb"),
+      nb::sig(
+          "def to_bytes(rgb: numpy.typing.NDArray[numpy.float32]) -> numpy.typing.NDArray[numpy.uint8]"),
+      "Converts display-referred colours, float32 of any shape, to 8 bit: round(255 clamp(c, 0, 1)).");
 }
 
 }  // namespace
@@ -126,8 +143,8 @@ void bind_settings(nb::module_& m) {
       .value("same_step", AutoReset::same_step, "The step that ends an episode begins the next one.")
       .value("disabled", AutoReset::disabled, "The environment waits for reset(mask).");
   using B = BatchConfig;
-  Struct<B>(m, "BatchConfig",
-            "Settings of a batch of environments: those of SimulatorConfig and two more.")
+  Struct<B, C>(m, "BatchConfig",
+               "Settings of a batch of environments: those of SimulatorConfig and two more.")
       .field("task", &B::task, "Agent, actions and rules of the task.")
       .field("sensors", &B::sensors,
              "Sensors of the agent. Reading gives a new list; assign to change it.")
