@@ -32,6 +32,8 @@ from ._spaces import Box, Dict, Discrete
 # Discrete actions of PointNav: stop, move_forward, turn_left, turn_right.
 ACTIONS = 4
 POINT_GOAL = "point_goal"
+# Bound of values without one. Gymnasium warns of infinite bounds.
+LARGEST = float(np.finfo(np.float32).max)
 # Fields of StepInfo that environments report at each step. The reward is returned on its own.
 INFO_FIELDS = ("collided", "wall_collision", "capsule_blocked", "avatar_contact", "avatar_touched", "pushed_into",
                "moved", "avatar_clearance")
@@ -62,10 +64,10 @@ def sensor_space(sensor: SensorSpec) -> Box:
     """Space of the images of a sensor, float32 [H][W][C]."""
     height, width = sensor.resolution
     if sensor.kind == SensorKind.rgb:
-        return Box(0.0, math.inf, (height, width, 3), np.float32)
+        return Box(0.0, LARGEST, (height, width, 3), np.float32)
     if sensor.kind == SensorKind.normal:
         return Box(-1.0, 1.0, (height, width, 3), np.float32)
-    high = {SensorKind.depth: sensor.far_plane, SensorKind.alpha: 1.0}.get(sensor.kind, math.inf)
+    high = {SensorKind.depth: sensor.far_plane, SensorKind.alpha: 1.0}.get(sensor.kind, LARGEST)
     return Box(0.0, high, (height, width, 1), np.float32)
 
 
@@ -78,7 +80,7 @@ def observation_space(config: SimulatorConfig) -> Dict:
         if sensor.uuid == POINT_GOAL:
             raise InvalidArgument(f"config.sensors: the name {POINT_GOAL!r} is taken by the goal; use another uuid")
         spaces[sensor.uuid] = sensor_space(sensor)
-    low, high = np.array([0, -math.pi], np.float32), np.array([math.inf, math.pi], np.float32)
+    low, high = np.array([0, -math.pi], np.float32), np.array([LARGEST, math.pi], np.float32)
     spaces[POINT_GOAL] = Box(low, high, dtype=np.float32)
     return Dict(spaces)
 

@@ -214,7 +214,7 @@ void bind_step(nb::module_& m) {
           [](const S& s, const std::string& uuid) -> nb::object {
             const nb::str key(uuid.data(), uuid.size());
             if (s.images.contains(key)) return s.images[key];
-            const std::string known = nb::cast<std::string>(nb::str(nb::list(s.images.keys())));
+            const std::string known = text_of(nb::list(s.images.keys()));
             throw nb::key_error(("no sensor \"" + uuid + "\"; the sensors are " + known).c_str());
           },
           nb::arg("uuid"),
@@ -248,7 +248,7 @@ void bind_batch(nb::module_& m) {
           "reset", reset, nb::arg("mask") = nb::none(),
           nb::sig("def reset(self, mask: numpy.typing.NDArray[numpy.bool_] | None = None) -> BatchStep"),
           "Starts the next episode in all environments, or in those whose mask is True, bool [N].")
-      .def("step", step, nb::arg("actions"),
+      .def("step", step, nb::arg("actions").none(),
            nb::sig("def step(self, actions: numpy.typing.NDArray[numpy.integer[typing.Any]] | "
                    "collections.abc.Sequence[Action | int] | collections.abc.Sequence[VelocityCommand]) "
                    "-> BatchStep"),

@@ -3,6 +3,7 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/shared_ptr.h>
 
 #include <cstddef>
 #include <cstdint>
@@ -48,6 +49,15 @@ inline bool read_numbers(nb::handle source, double* out, Py_ssize_t count) noexc
   }
   PyErr_Clear();
   return good;
+}
+
+/// The text that Python's str makes of an object.
+inline std::string text_of(nb::handle object) {
+  const nb::object text = nb::steal(PyObject_Str(object.ptr()));
+  if (!text.is_valid()) throw nb::python_error();
+  const char* const utf8 = PyUnicode_AsUTF8AndSize(text.ptr(), nullptr);
+  if (utf8 == nullptr) throw nb::python_error();
+  return utf8;
 }
 
 /// A new numpy array of these numbers, shape [count].

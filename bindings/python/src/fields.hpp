@@ -80,7 +80,8 @@ class Struct {
         std::string("def ") + name + "(self) -> numpy.typing.NDArray[numpy.float64]";
     const std::string setter = std::string("def ") + name + "(self, value: " + type + ", /) -> None";
     class_.def_prop_rw(name, get, set, nb::for_getter(nb::sig(getter.c_str())),
-                       nb::for_setter(nb::sig(setter.c_str())), doc);
+                       nb::for_setter(nb::sig(setter.c_str())), nb::for_setter(nb::arg("value").none()),
+                       doc);
     fields_.push_back({name, type, get, [set](T& t, nb::handle h) { return set(t, h), true; }});
     return *this;
   }
@@ -103,7 +104,7 @@ class Struct {
       std::string text = name + "(";
       for (const Field& f : fields) {
         text += (&f == &fields.front() ? "" : ", ") + f.name + "=";
-        text += nb::cast<std::string>(nb::repr(f.get(self)));
+        text += text_of(nb::repr(f.get(self)));
       }
       return text + ")";
     });
@@ -148,9 +149,9 @@ class Struct {
             (name + " has no field \"" + wanted + "\". Its fields are " + known).c_str());
       }
       if (!found->set(made, value)) {
-        throw nb::type_error((name + "." + wanted + ": expected " + found->type + ", got " +
-                              nb::cast<std::string>(nb::repr(value)))
-                                 .c_str());
+        throw nb::type_error(
+            (name + "." + wanted + ": expected " + found->type + ", got " + text_of(nb::repr(value)))
+                .c_str());
       }
     }
   }

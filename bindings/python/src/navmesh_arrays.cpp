@@ -3,6 +3,7 @@
 
 #include <limits>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "arrays.hpp"
@@ -16,28 +17,23 @@ nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu> rows_of_three(n
                                                                                const char* name,
                                                                                const char* kinds,
                                                                                const char* type) {
-  const nb::module_ numpy = nb::module_::import_("numpy");
+  const nb::object numpy = nb::module_::import_("numpy");
   const nb::object array = numpy.attr("asarray")(source);
-  const std::string kind = nb::cast<std::string>(array.attr("dtype").attr("kind"));
-  if (std::string(kinds).find(kind) == std::string::npos) {
-    const std::string dtype = nb::cast<std::string>(nb::str(array.attr("dtype")));
-    throw nb::type_error(
-        ("NavMesh.build: " + std::string(name) + " have dtype " + dtype + "; " + type + " is needed")
-            .c_str());
+  const nb::object dtype = array.attr("dtype"), shape = array.attr("shape");
+  const std::string where = "NavMesh.build: " + std::string(name) + " have ";
+  if (std::string(kinds).find(text_of(dtype.attr("kind"))) == std::string::npos) {
+    throw nb::type_error((where + "dtype " + text_of(dtype) + "; " + type + " is needed").c_str());
   }
-  const nb::object shape = array.attr("shape");
   if (nb::len(shape) != 2 || nb::cast<std::size_t>(shape[1]) != 3) {
-    const std::string text = nb::cast<std::string>(nb::str(shape));
-    throw nb::value_error(
-        ("NavMesh.build: " + std::string(name) + " have shape " + text + "; (n, 3) is needed").c_str());
+    throw nb::value_error((where + "shape " + text_of(shape) + "; (n, 3) is needed").c_str());
   }
-  if (kind != "f" && nb::cast<std::size_t>(array.attr("size")) > 0 &&
-      nb::cast<bool>(array.attr("min")() < nb::int_(0))) {
-    throw nb::value_error(("NavMesh.build: " + std::string(name) + " have a negative index").c_str());
-  }
-  if (kind != "f" && nb::cast<std::size_t>(array.attr("size")) > 0 &&
-      nb::cast<bool>(array.attr("max")() > nb::int_(std::numeric_limits<std::uint32_t>::max()))) {
-    throw nb::value_error(("NavMesh.build: " + std::string(name) + " have an index over 2^32").c_str());
+  if (std::is_integral_v<T> && nb::cast<std::size_t>(shape[0]) > 0) {
+    const std::string low = text_of(array.attr("min")()), high = text_of(array.attr("max")());
+    if (low[0] == '-' || high.size() > 10 ||
+        std::stoull(high) > std::numeric_limits<std::uint32_t>::max()) {
+      throw nb::value_error(
+          (where + "indices from " + low + " to " + high + "; 0 to 2^32 - 1 are valid").c_str());
+    }
   }
   return nb::cast<nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu>>(
       numpy.attr("ascontiguousarray")(array, type));

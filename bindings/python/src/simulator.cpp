@@ -89,7 +89,7 @@ void bind_observations(nb::module_& m) {
        [](const O& o, const std::string& uuid) -> nb::object {
          const nb::str key(uuid.data(), uuid.size());
          if (o.images.contains(key)) return o.images[key];
-         const std::string known = nb::cast<std::string>(nb::str(nb::list(o.images.keys())));
+         const std::string known = text_of(nb::list(o.images.keys()));
          throw nb::key_error(("no sensor \"" + uuid + "\"; the sensors are " + known).c_str());
        },
        nb::arg("uuid"),
@@ -126,7 +126,7 @@ void bind_episode_calls(nb::class_<PythonSimulator>& c) {
             const Action chosen = action_from(action, "Simulator.step");
             return observe(self, "Simulator.step", [&](Simulator& s) { return s.step(chosen); });
           },
-          nb::arg("action"),
+          nb::arg("action").none(),
           nb::sig("def step(self, action: Action | int | VelocityCommand) -> Observations"),
           "Performs one action for one control period and renders. Action.stop ends the episode. Raises "
           "InvalidArgument for an unknown action, before the first reset, and after the end.")
