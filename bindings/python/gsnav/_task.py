@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ._errors import InvalidArgument
 from ._gsnav import (
@@ -67,7 +66,10 @@ def sensor_space(sensor: SensorSpec) -> Box:
         return Box(0.0, LARGEST, (height, width, 3), np.float32)
     if sensor.kind == SensorKind.normal:
         return Box(-1.0, 1.0, (height, width, 3), np.float32)
-    high = {SensorKind.depth: sensor.far_plane, SensorKind.alpha: 1.0}.get(sensor.kind, LARGEST)
+    if sensor.kind == SensorKind.depth:
+        # Depth is below 0 where the camera is inside a Gaussian (docs/reference/image_contract.md).
+        return Box(-sensor.far_plane, sensor.far_plane, (height, width, 1), np.float32)
+    high = 1.0 if sensor.kind == SensorKind.alpha else LARGEST
     return Box(0.0, high, (height, width, 1), np.float32)
 
 
@@ -98,12 +100,6 @@ def rgb_sensor(config: SimulatorConfig, render_mode: str | None) -> str:
     if render_mode is not None and not names:
         raise InvalidArgument("render_mode = \"rgb_array\": add an RGB sensor to config.sensors")
     return names[0] if names else ""
-
-
-def to_bytes(image: npt.NDArray[np.float32]) -> npt.NDArray[np.uint8]:
-    """The colours in 8 bit: round(255 clamp(c, 0, 1)), as gsnav::to_bytes."""
-    scaled: npt.NDArray[np.float32] = np.clip(image, 0, 1) * np.float32(255) + np.float32(0.5)
-    return scaled.astype(np.uint8)
 
 
 def metrics_dict(metrics: EpisodeMetrics) -> dict[str, Any]:

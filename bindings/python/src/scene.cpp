@@ -65,6 +65,9 @@ OpenedScene open(const std::string& name, OpenOptions options, const nb::object&
   return open_scene(name, options).value();
 }
 
+nb::object itself(nb::handle self) { return nb::borrow(self); }
+nb::object itself_with_memo(nb::handle self, nb::handle) { return nb::borrow(self); }
+
 }  // namespace
 
 void bind_scene(nb::module_& m) {
@@ -80,6 +83,10 @@ void bind_scene(nb::module_& m) {
           nb::arg("scene"), nb::arg("navmesh") = nb::none(),
           "A scene that shares the parts of `scene`, with another NavMesh if one is given.")
       .def_ro("navmesh", &SimulatorScene::navmesh, "Surface that agents walk on, or None.")
+      .def("__copy__", itself, nb::sig("def __copy__(self) -> SimulatorScene"), "The same object.")
+      .def("__deepcopy__", itself_with_memo,
+           nb::sig("def __deepcopy__(self, memo: dict[int, object]) -> SimulatorScene"),
+           "The same object, because scenes do not change. Gymnasium copies arguments of environments.")
       .def_prop_ro(
           "avatar_count", [](const SimulatorScene& s) { return s.avatars.size(); }, "Number of people.")
       .def_prop_ro(
@@ -90,6 +97,9 @@ void bind_scene(nb::module_& m) {
   nb::class_<OpenedScene>(
       m, "OpenedScene",
       "A scene with everything that was found or asked for. World frame: metres, Y up.")
+      .def("__copy__", itself, nb::sig("def __copy__(self) -> OpenedScene"), "The same object.")
+      .def("__deepcopy__", itself_with_memo, nb::arg("memo"),
+           nb::sig("def __deepcopy__(self, memo: dict[int, object]) -> OpenedScene"), "The same object.")
       .def_ro("name", &OpenedScene::name, "The name that was opened.")
       .def_ro("scene", &OpenedScene::scene, "The scene, for renderers and simulators.")
       .def_prop_ro(
