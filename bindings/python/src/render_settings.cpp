@@ -81,7 +81,8 @@ void bind_render_settings(nb::module_& m) {
   using D = DetailChoice;
   Struct<D>(m, "DetailChoice", "Which part of a scene's assets is drawn.")
       .field("lod", &D::lod, "Level of detail. None: the assets as they are.")
-      .field("visible_sets", &D::visible_sets, "Draw only what is visible from the camera's cell.")
+      .field("visible_sets", &D::visible_sets,
+             "Draw only Gaussians that are visible from the camera's cell.")
       .done();
   using O = RenderOptions;
   Struct<O>(m, "RenderOptions", "Settings of a Renderer.")

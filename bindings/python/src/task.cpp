@@ -133,7 +133,8 @@ void bind_settings(nb::module_& m) {
              "Sensors of the agent. Reading gives a new list; assign to change it.")
       .field("render", &C::render, "How sensors render. Leave `outputs` at its default.")
       .field("lod", &C::lod, "Level of detail, or None.")
-      .field("visible_sets", &C::visible_sets, "Render only what is visible from the camera's cell.")
+      .field("visible_sets", &C::visible_sets,
+             "Render only Gaussians that are visible from the camera's cell.")
       .field("rendering", &C::rendering, "False: simulate without rendering.")
       .field("seed", &C::seed, "Seed of the sensor noise.")
       .done();
@@ -150,7 +151,8 @@ void bind_settings(nb::module_& m) {
              "Sensors of the agent. Reading gives a new list; assign to change it.")
       .field("render", &B::render, "How sensors render. Leave `outputs` at its default.")
       .field("lod", &B::lod, "Level of detail, or None.")
-      .field("visible_sets", &B::visible_sets, "Render only what is visible from the camera's cell.")
+      .field("visible_sets", &B::visible_sets,
+             "Render only Gaussians that are visible from the camera's cell.")
       .field("rendering", &B::rendering, "False: simulate without rendering.")
       .field("seed", &B::seed, "Seed of the sensor noise; environment e has seed + e.")
       .field("auto_reset", &B::auto_reset, "When an environment that is done begins its next episode.")
