@@ -14,7 +14,7 @@ import tempfile
 ROOT = pathlib.Path(__file__).parents[1]
 MOST_LINES, MOST_OF_FUNCTION = 350, 80
 MOST_LINES_OF_TESTS, MOST_OF_TEST_CASE = 650, 120
-FOLDERS = ("include", "src", "backends", "tools", "bench", "examples", "tests")
+FOLDERS = ("include", "src", "backends", "bindings", "tools", "bench", "examples", "tests")
 SOURCES = {".hpp", ".cpp", ".cu", ".cuh", ".h", ".inl"}
 NO_CODE = re.compile(r'//[^\n]*|/\*.*?\*/|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])+\'', re.DOTALL)
 DIRECTIVE = re.compile(r"^[ \t]*#(?:.*\\\n)*.*", re.MULTILINE)

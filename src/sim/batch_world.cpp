@@ -62,7 +62,8 @@ void BatchWorld::note_observation(std::size_t e) {
 }
 
 void BatchWorld::publish() {
-  info_ = {rewards_, terminated_, truncated_, infos_, point_goals_, times_, finished_, final_metrics_};
+  info_ = {rewards_,  terminated_,    truncated_,        infos_, point_goals_, times_,
+           finished_, final_metrics_, final_point_goals_};
 }
 
 Status BatchWorld::begin(const ParallelFor& run, std::span<const std::size_t> which) {
@@ -117,6 +118,7 @@ Status BatchWorld::reset(const ParallelFor& run, std::span<const std::uint8_t> m
   begun_ = false;  // Set to true again only when everything has succeeded.
   finished_.clear();
   final_metrics_.clear();
+  final_point_goals_.clear();
   resetting_.clear();
   for (std::size_t e = 0; e < size(); ++e) {
     environments_[e].moved = false;
@@ -223,10 +225,12 @@ Status BatchWorld::act(const ParallelFor& run, std::span<const A> actions,
   if (Status s = first_error(stepping_); !s) return s;
   finished_.clear();
   final_metrics_.clear();
+  final_point_goals_.clear();
   for (const std::size_t e : stepping_) {
     if (!environments_[e].world->done()) continue;
     finished_.push_back(e);
     final_metrics_.push_back(environments_[e].world->metrics());
+    final_point_goals_.push_back(environments_[e].world->point_goal());
   }
   publish();
   if (Status s = begin(run, resetting_); !s) return s;

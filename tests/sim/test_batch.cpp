@@ -201,6 +201,8 @@ TEST_CASE("same_step: an episode begins in the step that ended one, whose last i
   CHECK_FALSE(same_bits(end.images[0].of(0), before));
   CHECK(end.point_goals[0].distance != goal_before);
   CHECK(end.final_metrics[0].euclidean_distance_to_goal >= goal_before);
+  REQUIRE(end.final_point_goals.size() == 1);
+  CHECK(end.final_point_goals[0].distance == goal_before);  // stop moves nothing
   const BatchStep next = m.step().value();
   CHECK(next.terminated[0] == 0);
   CHECK(next.finished.size() == 2);

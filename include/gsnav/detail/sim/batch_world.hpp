@@ -49,6 +49,8 @@ struct BatchInfo {
                                            ///< increasing order.
   std::span<const EpisodeMetrics> final_metrics;  ///< Metrics of those episodes, one per entry of
                                                   ///< `finished`.
+  std::span<const PointGoal> final_point_goals;   ///< Goal as observed at the end of those episodes, one
+                                                  ///< per entry of `finished`.
 };
 
 /// Scene of a BatchWorld: NavMesh and bodies, without anything to render.
@@ -167,6 +169,7 @@ class BatchWorld {
   std::vector<std::size_t> stepping_, resetting_, finished_;
   std::vector<BatchEpisode> episodes_;
   std::vector<EpisodeMetrics> final_metrics_;
+  std::vector<PointGoal> final_point_goals_;
   std::vector<double> rewards_, times_;
   std::vector<std::uint8_t> terminated_, truncated_;
   std::vector<StepInfo> infos_;

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Env: one PointNav environment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _task
+from ._errors import ClosedEnvironment, InvalidArgument
+from ._gsnav import (
+    Device,
+    EpisodeRules,
+    Observations,
+    PointNavEpisode,
+    Simulator,
+    SimulatorConfig,
+    to_bytes,
+)
+from ._spaces import BaseEnv
+
+Observation = dict[str, npt.NDArray[np.float32]]
+
+
+class Env(BaseEnv):
+    """PointNav environment with one agent: a `gymnasium.Env`, or the same shape without Gymnasium.
+
+    An observation is a dict. It has an image per sensor, float32 [H][W][C], and "point_goal", float32 [2]: the
+    distance (metres, on the ground plane) and the angle (radians to the left). Observations are new arrays.
+
+    Actions are 0 (stop), 1 (forward), 2 (turn left) and 3 (turn right). An episode is terminated by `stop`, and
+    truncated after `config.task.max_steps` actions. The info of the last step has "metrics".
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 4}
+
+    def __init__(self, scene: _task.Scene = "default", *, device: Device | str = "best",
+                 config: SimulatorConfig | None = None, episodes: Sequence[_task.Episode] | None = None,
+                 rules: EpisodeRules | None = None, render_mode: str | None = None) -> None:
+        """Creates an environment.
+
+        scene: a name for open_scene, an OpenedScene or a SimulatorScene. It needs a NavMesh; one is built for a
+            name that has none.
+        device: device that simulates and renders, or its name.
+        config: agent, task and sensors. Default: RGB and depth of 256 x 256 pixels.
+        episodes: episodes to draw from. Default: they are sampled by `rules`.
+        render_mode: None, or "rgb_array" for the image of the first RGB sensor in 8 bit.
+        """
+        config = SimulatorConfig() if config is None else config
+        self.observation_space = _task.observation_space(config)
+        self.action_space = _task.action_space()
+        self._rgb = _task.rgb_sensor(config, render_mode)
+        self.render_mode = render_mode
+        self.scene = _task.scene_of(scene, config)
+        self._episodes = _task.Episodes([self.scene], episodes, rules)
+        self._simulator: Simulator | None = Simulator(device, self.scene, config)
+        self._last: Observation | None = None
+
+    @property
+    def simulator(self) -> Simulator:
+        """The simulator. Calls that change it do not update the environment's last observation."""
+        if self._simulator is None:
+            raise ClosedEnvironment("Env: the environment is closed; create a new one")
+        return self._simulator
+
+    def reset(self, *, seed: int | None = None,
+              options: dict[str, Any] | None = None) -> tuple[Observation, dict[str, Any]]:
+        """Starts the next episode, or `options["episode"]`.
+
+        The same seed gives the same sequence of episodes.
+        """
+        simulator = self.simulator
+        super().reset(seed=seed)
+        episode = (options or {}).get("episode")
+        if episode is None:
+            episode = self._episodes.draw(self.np_random).episode
+        elif not isinstance(episode, PointNavEpisode):
+            raise TypeError(f"options[\"episode\"]: expected a PointNavEpisode, got {type(episode).__name__}")
+        seen = simulator.reset(episode)
+        return self._observation(seen), _task.info_dict(seen.info)
+
+    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Performs one action. Returns observation, reward, terminated, truncated and info."""
+        simulator = self.simulator
+        if action not in self.action_space:
+            raise InvalidArgument(f"Env.step: action {action!r}: use an integer from 0 (stop) to 3 (turn right)")
+        seen = simulator.step(int(action))
+        info = _task.info_dict(seen.info)
+        terminated = truncated = False
+        if simulator.done:
+            metrics = simulator.metrics()
+            terminated = metrics.stop_called
+            truncated = not terminated
+            info["metrics"] = _task.metrics_dict(metrics)
+        return self._observation(seen), seen.reward, terminated, truncated, info
+
+    def render(self) -> npt.NDArray[np.uint8] | None:
+        """The last image of the first RGB sensor, uint8 [H][W][3]. None without a render mode."""
+        if self.render_mode is None:
+            return None
+        if self._last is None:
+            raise InvalidArgument("Env.render: call reset() first")
+        return to_bytes(self._last[self._rgb])
+
+    def close(self) -> None:
+        """Frees the simulator. Observations stay valid. Closing twice is allowed."""
+        self._simulator = None
+        self._last = None
+
+    def _observation(self, seen: Observations) -> Observation:
+        made = {name: image.copy() for name, image in seen.images.items()}
+        goal = seen.point_goal
+        made[_task.POINT_GOAL] = np.array([goal.distance, goal.angle], np.float32)
+        self._last = made
+        return dict(made)

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What Env and VectorEnv share: scenes, spaces, episodes and information about steps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ._errors import InvalidArgument
+from ._gsnav import (
+    BatchEpisode,
+    EpisodeMetrics,
+    EpisodeRules,
+    OpenedScene,
+    OpenOptions,
+    PointNavEpisode,
+    Rng,
+    SensorKind,
+    SensorSpec,
+    SimulatorConfig,
+    SimulatorScene,
+    StepInfo,
+    generate_episode,
+    open_scene,
+)
+from ._spaces import Box, Dict, Discrete
+
+# Discrete actions of PointNav: stop, move_forward, turn_left, turn_right.
+ACTIONS = 4
+POINT_GOAL = "point_goal"
+# Bound of values without one. Gymnasium warns of infinite bounds.
+LARGEST = float(np.finfo(np.float32).max)
+# Fields of StepInfo that environments report at each step. The reward is returned on its own.
+INFO_FIELDS = ("collided", "wall_collision", "capsule_blocked", "avatar_contact", "avatar_touched", "pushed_into",
+               "moved", "avatar_clearance")
+METRIC_FIELDS = ("success", "spl", "soft_spl", "stl", "distance_to_goal", "euclidean_distance_to_goal",
+                 "collision_rate", "psi", "psc", "human_collision", "human_blocked", "collisions",
+                 "collision_steps", "steps", "start_distance", "path_length", "min_clearance", "stop_called")
+
+Scene = str | OpenedScene | SimulatorScene
+Episode = PointNavEpisode | BatchEpisode
+
+
+def scene_of(scene: Scene, config: SimulatorConfig) -> SimulatorScene:
+    """The scene with a NavMesh. A name is opened, and a NavMesh is built for the agent if none is there."""
+    if isinstance(scene, str):
+        options = OpenOptions(navmesh="auto", agent_radius=config.task.agent_radius,
+                              agent_height=config.task.agent_height)
+        scene = open_scene(scene, options)
+    if isinstance(scene, OpenedScene):
+        scene = scene.scene
+    if not isinstance(scene, SimulatorScene):
+        raise TypeError(f"scene: expected a name, an OpenedScene or a SimulatorScene, got {type(scene).__name__}")
+    if scene.navmesh is None:
+        raise InvalidArgument("scene: it has no NavMesh. Open it with OpenOptions(navmesh=\"auto\").")
+    return scene
+
+
+def sensor_space(sensor: SensorSpec) -> Box:
+    """Space of the images of a sensor, float32 [H][W][C]."""
+    height, width = sensor.resolution
+    if sensor.kind == SensorKind.rgb:
+        return Box(0.0, LARGEST, (height, width, 3), np.float32)
+    if sensor.kind == SensorKind.normal:
+        return Box(-1.0, 1.0, (height, width, 3), np.float32)
+    if sensor.kind == SensorKind.depth:
+        # Depth is below 0 where the camera is inside a Gaussian (docs/reference/image_contract.md).
+        return Box(-sensor.far_plane, sensor.far_plane, (height, width, 1), np.float32)
+    high = 1.0 if sensor.kind == SensorKind.alpha else LARGEST
+    return Box(0.0, high, (height, width, 1), np.float32)
+
+
+def observation_space(config: SimulatorConfig) -> Dict:
+    """Space of observations: an image per sensor, and the goal as distance (metres) and angle (radians)."""
+    if not config.rendering:
+        raise InvalidArgument("config.rendering = False: environments need images; leave the sensors out instead")
+    spaces = {}
+    for sensor in config.sensors:
+        if sensor.uuid == POINT_GOAL:
+            raise InvalidArgument(f"config.sensors: the name {POINT_GOAL!r} is taken by the goal; use another uuid")
+        spaces[sensor.uuid] = sensor_space(sensor)
+    low, high = np.array([0, -math.pi], np.float32), np.array([LARGEST, math.pi], np.float32)
+    spaces[POINT_GOAL] = Box(low, high, dtype=np.float32)
+    return Dict(spaces)
+
+
+def action_space() -> Discrete:
+    """Stop, move forward, turn left, turn right."""
+    return Discrete(ACTIONS)
+
+
+def rgb_sensor(config: SimulatorConfig, render_mode: str | None) -> str:
+    """Name of the sensor whose image `render` returns."""
+    if render_mode not in (None, "rgb_array"):
+        raise InvalidArgument(f"render_mode = {render_mode!r}: use None or \"rgb_array\"")
+    names = [s.uuid for s in config.sensors if s.kind == SensorKind.rgb]
+    if render_mode is not None and not names:
+        raise InvalidArgument("render_mode = \"rgb_array\": add an RGB sensor to config.sensors")
+    return names[0] if names else ""
+
+
+def metrics_dict(metrics: EpisodeMetrics) -> dict[str, Any]:
+    """The metrics as numbers by their names."""
+    return {name: getattr(metrics, name) for name in METRIC_FIELDS}
+
+
+def info_dict(info: StepInfo) -> dict[str, Any]:
+    """The outcome of an action as numbers by their names."""
+    return {name: getattr(info, name) for name in INFO_FIELDS}
+
+
+class Episodes:
+    """Source of the episodes of one environment."""
+
+    def __init__(self, scenes: Sequence[SimulatorScene], episodes: Sequence[Episode] | None,
+                 rules: EpisodeRules | None) -> None:
+        self._scenes = scenes
+        self._rules = rules or EpisodeRules()
+        self._episodes: list[BatchEpisode] | None = None
+        if episodes is not None:
+            self._episodes = [self._checked(e, i) for i, e in enumerate(episodes)]
+            if not self._episodes:
+                raise InvalidArgument("episodes: the list is empty; use None to sample episodes")
+
+    def _checked(self, episode: Episode, index: int) -> BatchEpisode:
+        if isinstance(episode, PointNavEpisode):
+            return BatchEpisode(scene=0, episode=episode)
+        if not isinstance(episode, BatchEpisode):
+            raise TypeError(f"episodes[{index}]: expected a PointNavEpisode or a BatchEpisode, "
+                            f"got {type(episode).__name__}")
+        if episode.scene >= len(self._scenes):
+            raise InvalidArgument(f"episodes[{index}].scene = {episode.scene}: there are {len(self._scenes)} scenes")
+        return episode
+
+    def draw(self, generator: np.random.Generator) -> BatchEpisode:
+        """The next episode: a random one of the list, or a sampled one in a random scene."""
+        if self._episodes is not None:
+            return self._episodes[int(generator.integers(len(self._episodes)))]
+        index = int(generator.integers(len(self._scenes))) if len(self._scenes) > 1 else 0
+        navmesh = self._scenes[index].navmesh
+        assert navmesh is not None  # scene_of has checked it
+        episode = generate_episode(navmesh, Rng(int(generator.integers(2**63))), self._rules)
+        return BatchEpisode(scene=index, episode=episode)

@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: Apache-2.0
+"""VectorEnv: many PointNav environments in one process, stepped by one call."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _task
+from ._errors import ClosedEnvironment, InvalidArgument
+from ._gsnav import (
+    AutoReset,
+    BatchConfig,
+    BatchEpisode,
+    BatchSimulator,
+    BatchStep,
+    Device,
+    EpisodeRules,
+    SimulatorConfig,
+    to_bytes,
+)
+from ._spaces import AutoresetMode, BaseVectorEnv, batch_space, make_generator
+
+Observation = dict[str, npt.NDArray[np.float32]]
+
+AUTO_RESETS = {"NextStep": AutoReset.next_step, "SameStep": AutoReset.same_step, "Disabled": AutoReset.disabled}
+
+
+class Source:
+    """The function that a BatchSimulator calls for episodes. It does not refer to the environment."""
+
+    def __init__(self, episodes: _task.Episodes, environments: int) -> None:
+        self.episodes = episodes
+        self.generators = [make_generator()[0] for _ in range(environments)]
+
+    def __call__(self, environment: int, count: int) -> BatchEpisode:
+        """The next episode of an environment."""
+        return self.episodes.draw(self.generators[environment])
+
+
+def batch_config(config: SimulatorConfig, auto_reset: AutoReset) -> BatchConfig:
+    """The settings for a batch."""
+    state = config.__getstate__()
+    state["auto_reset"] = auto_reset
+    return BatchConfig(**state)
+
+
+class VectorEnv(BaseVectorEnv):
+    """N PointNav environments: a `gymnasium.vector.VectorEnv`, or the same shape without Gymnasium.
+
+    An observation is a dict. It has an array per sensor, float32 [N][H][W][C], and "point_goal", float32 [N][2]:
+    distances (metres) and angles (radians to the left). Actions are integers [N], as in Env.
+
+    Environment e, reset with seed s, gives the bits of an Env that was reset with seed s + e.
+    """
+
+    def __init__(self, num_envs: int = 1, scene: _task.Scene | Sequence[_task.Scene] = "default", *,
+                 device: Device | str = "best", config: SimulatorConfig | None = None,
+                 episodes: Sequence[_task.Episode] | None = None, rules: EpisodeRules | None = None,
+                 autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP, copy: bool = True,
+                 render_mode: str | None = None) -> None:
+        """Creates the environments. They share their scenes.
+
+        scene: as in Env, or a list of scenes, of which each sampled episode takes a random one.
+        episodes: episodes to draw from; a BatchEpisode names its scene. Default: they are sampled by `rules`.
+        autoreset_mode: what happens to an environment whose episode has ended, as in Gymnasium.
+        copy: False returns observations as read-only views of the simulator's memory, which the next call
+            overwrites.
+        Other arguments are those of Env. `config` may be a BatchConfig.
+        """
+        config = SimulatorConfig() if config is None else config
+        mode = AutoresetMode(getattr(autoreset_mode, "value", autoreset_mode))
+        self.metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 4, "autoreset_mode": mode}
+        self.num_envs = int(num_envs)
+        if self.num_envs < 1:
+            raise InvalidArgument(f"num_envs = {num_envs}: must be positive")
+        self.single_observation_space = _task.observation_space(config)
+        self.single_action_space = _task.action_space()
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._rgb = _task.rgb_sensor(config, render_mode)
+        self.render_mode = render_mode
+        names = list(scene) if isinstance(scene, (list, tuple)) else [scene]
+        self.scenes = [_task.scene_of(one, config) for one in names]
+        self._source = Source(_task.Episodes(self.scenes, episodes, rules), self.num_envs)
+        self._same_step = mode == AutoresetMode.SAME_STEP
+        self._copy = copy
+        self._last: Observation | None = None
+        self._all = np.ones(self.num_envs, np.bool_)
+        self._all.flags.writeable = False
+        self._simulator: BatchSimulator | None = BatchSimulator(
+            device, self.scenes, batch_config(config, AUTO_RESETS[mode.value]), self.num_envs, self._source)
+
+    @property
+    def simulator(self) -> BatchSimulator:
+        """The batch simulator. Step it by the environment only."""
+        if self._simulator is None:
+            raise ClosedEnvironment("VectorEnv: the environments are closed; create new ones")
+        return self._simulator
+
+    def reset(self, *, seed: int | Sequence[int | None] | None = None,
+              options: dict[str, Any] | None = None) -> tuple[Observation, dict[str, Any]]:
+        """Starts the next episode in all environments, or in those of `options["reset_mask"]`, bool [N].
+
+        seed: environment e gets seed + e, or seed[e]. The same seeds give the same episodes.
+        """
+        simulator = self.simulator
+        mask = self._mask((options or {}).get("reset_mask"))
+        seeds = self._seeds(seed)
+        super().reset(seed=seeds[0] if seed is not None else None)
+        for e, one in enumerate(seeds):
+            if one is not None and (mask is None or mask[e]):
+                self._source.generators[e] = make_generator(one)[0]
+        step = simulator.reset(mask)
+        infos: dict[str, Any] = {}
+        self._add_step_info(infos, step.infos, self._all if mask is None else mask)
+        return self._observation(step), infos
+
+    def step(self, actions: Any) -> tuple[Observation, npt.NDArray[np.float64], npt.NDArray[np.bool_],
+                                          npt.NDArray[np.bool_], dict[str, Any]]:
+        """Performs one action per environment, integers [N].
+
+        Returns observations, rewards, terminations, truncations and infos. Wrong actions raise an exception
+        before any environment moves.
+        """
+        step = self.simulator.step(self._checked(actions))
+        infos: dict[str, Any] = {}
+        self._add_step_info(infos, step.infos, self._all)
+        if len(step.finished):
+            self._add_ends(infos, step)
+        return (self._observation(step), step.rewards.copy(), step.terminated.copy(), step.truncated.copy(), infos)
+
+    def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
+        """The last image of each environment's first RGB sensor, uint8 [H][W][3]. None without a render mode."""
+        if self.render_mode is None:
+            return None
+        if self._last is None:
+            raise InvalidArgument("VectorEnv.render: call reset() first")
+        return tuple(to_bytes(self._last[self._rgb]))
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Frees the simulator. Observations stay valid."""
+        self._simulator = None
+        self._last = None
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, (int, np.integer)):
+            return [int(seed) + e for e in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise InvalidArgument(f"seed: {len(seed)} seeds for {self.num_envs} environments")
+        return list(seed)
+
+    def _mask(self, mask: Any) -> npt.NDArray[np.bool_] | None:
+        if mask is None:
+            return None
+        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
+            raise TypeError("options[\"reset_mask\"]: expected a numpy array of bool")
+        if mask.shape != (self.num_envs,):
+            raise InvalidArgument(f"options[\"reset_mask\"] has shape {mask.shape}: it must be ({self.num_envs},)")
+        if not mask.any():
+            raise InvalidArgument("options[\"reset_mask\"] has no True")
+        return mask
+
+    def _checked(self, actions: Any) -> npt.NDArray[np.integer[Any]]:
+        array = np.asarray(actions)
+        if array.dtype.kind not in "iu":
+            raise TypeError(f"VectorEnv.step: actions have dtype {array.dtype}: use integers")
+        if array.shape != (self.num_envs,):
+            raise InvalidArgument(f"VectorEnv.step: actions have shape {array.shape}: it must be ({self.num_envs},)")
+        wrong = (array < 0) | (array >= _task.ACTIONS)
+        if wrong.any():
+            e = int(np.argmax(wrong))
+            raise InvalidArgument(f"VectorEnv.step: environment {e}: action {array[e]}: "
+                                  "use 0 (stop) to 3 (turn right)")
+        return array
+
+    def _observation(self, step: BatchStep) -> Observation:
+        images = step.images
+        made = {name: image.copy() for name, image in images.items()} if self._copy else dict(images)
+        made[_task.POINT_GOAL] = step.point_goals.astype(np.float32)
+        self._last = made
+        return dict(made)
+
+    @staticmethod
+    def _add(infos: dict[str, Any], key: str, values: Any, mask: npt.NDArray[np.bool_]) -> None:
+        infos[key], infos["_" + key] = values, mask.copy()
+
+    def _add_step_info(self, infos: dict[str, Any], rows: Any, mask: npt.NDArray[np.bool_]) -> None:
+        """Adds the outcomes of actions, 0 where the mask is False."""
+        for name in _task.INFO_FIELDS:
+            self._add(infos, name, rows[name].copy() if mask is self._all else np.where(mask, rows[name], False), mask)
+
+    def _add_ends(self, infos: dict[str, Any], step: BatchStep) -> None:
+        """Adds metrics and, with SAME_STEP, the last observations and infos of the episodes that ended."""
+        ended = np.zeros(self.num_envs, np.bool_)
+        ended[step.finished] = True
+        metrics: dict[str, Any] = {}
+        for name in _task.METRIC_FIELDS:
+            values = step.final_metrics[name]
+            row = np.zeros(self.num_envs, np.int64 if values.dtype.kind == "u" else values.dtype)
+            row[step.finished] = values
+            self._add(metrics, name, row, ended)
+        if not self._same_step:
+            self._add(infos, "metrics", metrics, ended)
+            return
+        final: dict[str, Any] = {}
+        self._add_step_info(final, step.infos, ended)
+        self._add(final, "metrics", metrics, ended)
+        self._add(infos, "final_info", final, ended)
+        observations = np.full(self.num_envs, None, object)
+        goals = step.final_point_goals.astype(np.float32)
+        for i, e in enumerate(step.finished):
+            observations[e] = {name: image[i] for name, image in step.final_images.items()}
+            observations[e][_task.POINT_GOAL] = goals[i]
+            fresh = self.simulator.world(int(e)).last_step  # of the episode that has begun
+            for name in _task.INFO_FIELDS:
+                infos[name][e] = getattr(fresh, name)
+        self._add(infos, "final_obs", observations, ended)

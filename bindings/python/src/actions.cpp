@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "actions.hpp"
+
+#include <cmath>
+#include <string>
+
+#include "fields.hpp"
+#include "world.hpp"
+
+namespace gsnav::python {
+namespace {
+
+using Array = nb::ndarray<nb::ro, nb::device::cpu>;
+
+[[noreturn]] void wrong_shape(const char* what, const Array& array, std::size_t environments) {
+  std::string shape;
+  for (std::size_t i = 0; i < array.ndim(); ++i) {
+    shape += (i == 0 ? "" : ", ") + std::to_string(array.shape(i));
+  }
+  throw nb::value_error((std::string(what) + " of shape (" + shape + ") for " +
+                         std::to_string(environments) + " environments: the shape must be (" +
+                         std::to_string(environments) + ",)")
+                            .c_str());
+}
+
+/// Element i of a one-dimensional array, with its stride.
+template <class T>
+T element(const Array& array, std::size_t i) noexcept {
+  return static_cast<const T*>(array.data())[static_cast<std::int64_t>(i) * array.stride(0)];
+}
+
+template <class T>
+std::vector<Action> read(const Array& array) {
+  std::vector<Action> actions(array.shape(0));
+  for (std::size_t i = 0; i < actions.size(); ++i) {
+    const T value = element<T>(array, i);
+    if (value < T(0) || value > T(Action::look_down)) {
+      throw Error(Errc::invalid_argument, "environment " + std::to_string(i) + ": action " +
+                                              std::to_string(value) +
+                                              " is out of range: use 0 (stop) to 5 (look_down)");
+    }
+    actions[i] = static_cast<Action>(value);
+  }
+  return actions;
+}
+
+std::vector<Action> from_array(const Array& array, std::size_t environments) {
+  if (array.ndim() != 1 || array.shape(0) != environments) wrong_shape("actions", array, environments);
+  if (array.dtype() == nb::dtype<std::int64_t>()) return read<std::int64_t>(array);
+  if (array.dtype() == nb::dtype<std::int32_t>()) return read<std::int32_t>(array);
+  if (array.dtype() == nb::dtype<std::int16_t>()) return read<std::int16_t>(array);
+  if (array.dtype() == nb::dtype<std::int8_t>()) return read<std::int8_t>(array);
+  if (array.dtype() == nb::dtype<std::uint8_t>()) return read<std::uint8_t>(array);
+  if (array.dtype() == nb::dtype<std::uint16_t>()) return read<std::uint16_t>(array);
+  if (array.dtype() == nb::dtype<std::uint32_t>()) return read<std::uint32_t>(array);
+  if (array.dtype() == nb::dtype<std::uint64_t>()) return read<std::uint64_t>(array);
+  throw nb::type_error("actions: the array must have a dtype of integers, such as int64");
+}
+
+void check(const VelocityCommand& c, std::size_t environment) {
+  if (std::isfinite(c.linear) && std::isfinite(c.angular) && std::isfinite(c.lateral)) return;
+  throw Error(Errc::invalid_argument,
+              "environment " + std::to_string(environment) +
+                  ": VelocityCommand: linear, angular and lateral must be finite");
+}
+
+}  // namespace
+
+BatchActions batch_actions(nb::handle source, std::size_t environments) {
+  Array array;
+  if (!PyList_Check(source.ptr()) && !PyTuple_Check(source.ptr())) {
+    if (nb::try_cast(source, array, false)) return from_array(array, environments);
+    throw nb::type_error(
+        ("actions: expected an array of integers or a list, got " + type_of(source)).c_str());
+  }
+  const std::size_t count = nb::len(source);
+  if (count != environments) {
+    throw nb::value_error(("actions: " + std::to_string(count) + " actions for " +
+                           std::to_string(environments) + " environments")
+                              .c_str());
+  }
+  std::vector<Action> actions;
+  std::vector<VelocityCommand> commands;
+  for (std::size_t i = 0; i < count; ++i) {
+    const nb::object item = nb::borrow(source)[i];
+    VelocityCommand command;
+    if (nb::try_cast(item, command, false)) {
+      check(command, i);
+      commands.push_back(command);
+    } else {
+      actions.push_back(action_from(item, ("environment " + std::to_string(i)).c_str()));
+    }
+  }
+  if (commands.empty()) return actions;
+  if (!actions.empty()) throw nb::type_error("actions: mix no velocities with discrete actions");
+  return commands;
+}
+
+std::vector<std::uint8_t> reset_mask(nb::handle source, std::size_t environments) {
+  if (source.is_none()) return {};
+  Array array;
+  if (!nb::try_cast(source, array, false)) {
+    throw nb::type_error(("mask: expected an array of bool, got " + type_of(source)).c_str());
+  }
+  if (array.dtype() != nb::dtype<bool>())
+    throw nb::type_error("mask: the array must have the dtype bool");
+  if (array.ndim() != 1 || array.shape(0) != environments) wrong_shape("mask", array, environments);
+  std::vector<std::uint8_t> mask(environments);
+  for (std::size_t i = 0; i < environments; ++i) mask[i] = element<bool>(array, i) ? 1 : 0;
+  return mask;
+}
+
+}  // namespace gsnav::python

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <variant>
+#include <vector>
+
+#include "casters.hpp"
+#include "gsnav/detail/sim/task.hpp"
+
+namespace gsnav::python {
+
+/// Actions of a batch: all discrete or all velocities.
+using BatchActions = std::variant<std::vector<Action>, std::vector<VelocityCommand>>;
+
+/// Reads one action per environment from an array of integers [N], or a sequence of actions, integers or
+/// velocities. Throws a Python exception or gsnav::Error that names the environment and the value.
+BatchActions batch_actions(nb::handle source, std::size_t environments);
+
+/// Reads a mask: None (empty) or an array of bool [N].
+std::vector<std::uint8_t> reset_mask(nb::handle source, std::size_t environments);
+
+}  // namespace gsnav::python

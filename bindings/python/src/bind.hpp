@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "casters.hpp"
+
+namespace gsnav::python {
+
+void bind_errors(nb::module_& m);
+void bind_device(nb::module_& m);
+void bind_camera(nb::module_& m);
+void bind_navmesh(nb::module_& m);
+void bind_scene(nb::module_& m);
+void bind_render_settings(nb::module_& m);
+void bind_renderer(nb::module_& m);
+void bind_task(nb::module_& m);
+void bind_episodes(nb::module_& m);
+void bind_settings(nb::module_& m);
+void bind_world(nb::module_& m);
+void bind_simulator(nb::module_& m);
+void bind_batch(nb::module_& m);
+
+}  // namespace gsnav::python

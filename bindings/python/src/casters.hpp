@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/shared_ptr.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "gsnav/device/device.hpp"
+#include "gsnav/math/quat.hpp"
+#include "gsnav/math/vec.hpp"
+#include "gsnav/open.hpp"
+#include "gsnav/sim/scene.hpp"
+
+namespace nb = nanobind;
+
+namespace gsnav::python {
+
+/// Argument that takes a Device or its name.
+struct DeviceArg {
+  Device device;     ///< The device, if `name` is empty.
+  std::string name;  ///< Name to parse.
+
+  /// The device. Throws gsnav::Error if the name is that of no device.
+  Device value() const { return name.empty() ? device : Device::parse(name).value(); }
+};
+
+/// Argument that takes a SimulatorScene or an OpenedScene.
+struct SceneArg {
+  std::shared_ptr<const SimulatorScene> scene;  ///< Not null.
+};
+
+/// Reads `count` numbers from a sequence or array. Returns false if it is anything else.
+inline bool read_numbers(nb::handle source, double* out, Py_ssize_t count) noexcept {
+  if (PyUnicode_Check(source.ptr()) || !PySequence_Check(source.ptr())) return false;
+  const Py_ssize_t size = PySequence_Size(source.ptr());
+  bool good = size == count;
+  for (Py_ssize_t i = 0; good && i < count; ++i) {
+    PyObject* const item = PySequence_GetItem(source.ptr(), i);
+    good = item != nullptr;
+    if (!good) break;
+    out[i] = PyFloat_AsDouble(item);
+    good = !PyErr_Occurred();
+    Py_DECREF(item);
+  }
+  PyErr_Clear();
+  return good;
+}
+
+/// The text that Python's str makes of an object.
+inline std::string text_of(nb::handle object) {
+  const nb::object text = nb::steal(PyObject_Str(object.ptr()));
+  if (!text.is_valid()) throw nb::python_error();
+  const char* const utf8 = PyUnicode_AsUTF8AndSize(text.ptr(), nullptr);
+  if (utf8 == nullptr) throw nb::python_error();
+  return utf8;
+}
+
+/// A new numpy array of these numbers, shape [count].
+inline nb::object number_array(const double* numbers, std::size_t count) {
+  nb::ndarray<nb::numpy, const double, nb::ndim<1>> view(numbers, {count});
+  return nb::cast(view, nb::rv_policy::copy);
+}
+
+}  // namespace gsnav::python
+
+namespace nanobind::detail {
+
+template <>
+struct type_caster<gsnav::Vec3d> {
+  NB_TYPE_CASTER(gsnav::Vec3d,
+                 io_name("collections.abc.Sequence[float] | numpy.typing.NDArray[numpy.float64]",
+                         "numpy.typing.NDArray[numpy.float64]"))
+  bool from_python(handle source, std::uint32_t, cleanup_list*) noexcept {
+    double v[3];
+    if (!gsnav::python::read_numbers(source, v, 3)) return false;
+    value = {v[0], v[1], v[2]};
+    return true;
+  }
+  static handle from_cpp(const gsnav::Vec3d& v, rv_policy, cleanup_list*) noexcept {
+    const double numbers[3] = {v.x, v.y, v.z};
+    return gsnav::python::number_array(numbers, 3).release();
+  }
+};
+
+template <>
+struct type_caster<gsnav::Quatd> {
+  NB_TYPE_CASTER(gsnav::Quatd,
+                 io_name("collections.abc.Sequence[float] | numpy.typing.NDArray[numpy.float64]",
+                         "numpy.typing.NDArray[numpy.float64]"))
+  bool from_python(handle source, std::uint32_t, cleanup_list*) noexcept {
+    double q[4];
+    if (!gsnav::python::read_numbers(source, q, 4)) return false;
+    value = {q[0], q[1], q[2], q[3]};
+    return true;
+  }
+  static handle from_cpp(const gsnav::Quatd& q, rv_policy, cleanup_list*) noexcept {
+    const double numbers[4] = {q.w, q.x, q.y, q.z};
+    return gsnav::python::number_array(numbers, 4).release();
+  }
+};
+
+template <>
+struct type_caster<gsnav::python::DeviceArg> {
+  NB_TYPE_CASTER(gsnav::python::DeviceArg, const_name("Device | str"))
+  bool from_python(handle source, std::uint32_t, cleanup_list*) noexcept {
+    if (PyUnicode_Check(source.ptr())) {
+      Py_ssize_t size = 0;
+      const char* const text = PyUnicode_AsUTF8AndSize(source.ptr(), &size);
+      if (text == nullptr) return PyErr_Clear(), false;
+      // An empty name is an error of Device::parse, like any other unknown name.
+      value.name = size == 0 ? std::string(" ") : std::string(text, static_cast<std::size_t>(size));
+      return true;
+    }
+    return try_cast<gsnav::Device>(source, value.device, false);
+  }
+};
+
+template <>
+struct type_caster<gsnav::python::SceneArg> {
+  NB_TYPE_CASTER(gsnav::python::SceneArg, const_name("SimulatorScene | OpenedScene"))
+  bool from_python(handle source, std::uint32_t, cleanup_list*) noexcept {
+    gsnav::OpenedScene* opened = nullptr;
+    if (try_cast(source, opened, false) && opened != nullptr) {
+      value.scene = opened->scene;
+      return value.scene != nullptr;
+    }
+    return try_cast(source, value.scene, false) && value.scene != nullptr;
+  }
+};
+
+}  // namespace nanobind::detail

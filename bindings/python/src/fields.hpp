@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "casters.hpp"
+
+namespace gsnav::python {
+
+template <class V>
+struct TypeName {
+  static std::string get() {
+    if constexpr (std::is_same_v<V, bool>) {
+      return "bool";
+    } else if constexpr (std::is_integral_v<V>) {
+      return "int";
+    } else if constexpr (std::is_floating_point_v<V>) {
+      return "float";
+    } else if constexpr (std::is_same_v<V, std::string>) {
+      return "str";
+    } else if constexpr (std::is_same_v<V, Vec3d> || std::is_same_v<V, Quatd>) {
+      return "collections.abc.Sequence[float] | numpy.typing.NDArray[numpy.float64]";
+    } else {
+      return nb::cast<std::string>(nb::type<V>().attr("__name__"));
+    }
+  }
+};
+template <class V>
+struct TypeName<std::optional<V>> {
+  static std::string get() { return TypeName<V>::get() + " | None"; }
+};
+template <class V>
+struct TypeName<std::vector<V>> {
+  static std::string get() { return "collections.abc.Sequence[" + TypeName<V>::get() + "]"; }
+};
+template <class V, std::size_t N>
+struct TypeName<std::array<V, N>> {
+  static std::string get() { return "collections.abc.Sequence[" + TypeName<V>::get() + "]"; }
+};
+
+/// Name of the type of a Python object.
+inline std::string type_of(nb::handle object) {
+  return nb::cast<std::string>(object.type().attr("__name__"));
+}
+
+/// Binds a C++ struct of settings or results as a Python class. Fields are attributes and keywords of
+/// the constructor. Objects can be printed, copied and pickled.
+template <class T, class... Base>
+class Struct {
+ public:
+  Struct(nb::module_& m, const char* name, const char* doc) : class_(m, name, doc), name_(name) {}
+
+  /// Binds a field.
+  template <class V, class C>
+  Struct& field(const char* name, V C::*member, const char* doc) {
+    class_.def_rw(name, member, doc);
+    fields_.push_back({name, TypeName<V>::get(),
+                       [member](const T& t) { return nb::cast(t.*member, nb::rv_policy::copy); },
+                       [member](T& t, nb::handle h) {
+                         V v{};
+                         if (!nb::try_cast<V>(h, v)) return false;
+                         t.*member = std::move(v);
+                         return true;
+                       }});
+    return *this;
+  }
+
+  /// Binds a field that is converted by functions. `set` throws if a value is wrong.
+  Struct& extra(const char* name, const char* type, nb::object (*get)(const T&),
+                void (*set)(T&, nb::handle), const char* doc) {
+    const std::string getter =
+        std::string("def ") + name + "(self) -> numpy.typing.NDArray[numpy.float64]";
+    const std::string setter = std::string("def ") + name + "(self, value: " + type + ", /) -> None";
+    class_.def_prop_rw(name, get, set, nb::for_getter(nb::sig(getter.c_str())),
+                       nb::for_setter(nb::sig(setter.c_str())), nb::for_setter(nb::arg("value").none()),
+                       doc);
+    fields_.push_back({name, type, get, [set](T& t, nb::handle h) { return set(t, h), true; }});
+    return *this;
+  }
+
+  /// Defines the methods that need all fields. Call it last.
+  nb::class_<T, Base...>& done() {
+    std::string signature = "def __init__(self";
+    if (!fields_.empty()) signature += ", *";
+    for (const Field& f : fields_) signature += ", " + f.name + ": " + f.type + " = ...";
+    signature += ") -> None";
+    class_.def(
+        "__init__",
+        [fields = fields_, name = name_](T* self, const nb::kwargs& values) {
+          T made{};
+          fill(made, name, fields, values);
+          new (self) T(std::move(made));
+        },
+        nb::sig(signature.c_str()));
+    class_.def("__repr__", [fields = fields_, name = name_](const T& self) {
+      std::string text = name + "(";
+      for (const Field& f : fields) {
+        text += (&f == &fields.front() ? "" : ", ") + f.name + "=";
+        text += text_of(nb::repr(f.get(self)));
+      }
+      return text + ")";
+    });
+    class_.def(
+        "__getstate__",
+        [fields = fields_](const T& self) {
+          nb::dict state;
+          for (const Field& f : fields) state[f.name.c_str()] = f.get(self);
+          return state;
+        },
+        nb::sig("def __getstate__(self) -> dict[str, typing.Any]"));
+    class_.def("__setstate__", [fields = fields_, name = name_](T& self, const nb::dict& state) {
+      T made{};
+      fill(made, name, fields, state);
+      new (&self) T(std::move(made));
+    });
+    return class_;
+  }
+
+  /// The class, for further methods.
+  nb::class_<T, Base...>& python() { return class_; }
+
+ private:
+  struct Field {
+    std::string name, type;
+    std::function<nb::object(const T&)> get;
+    std::function<bool(T&, nb::handle)> set;
+  };
+
+  static void fill(T& made, const std::string& name, const std::vector<Field>& fields,
+                   const nb::dict& values) {
+    for (const auto& [key, value] : values) {
+      const std::string wanted = nb::cast<std::string>(key);
+      const Field* found = nullptr;
+      std::string known;
+      for (const Field& f : fields) {
+        if (f.name == wanted) found = &f;
+        known += (known.empty() ? "" : ", ") + f.name;
+      }
+      if (found == nullptr) {
+        throw nb::type_error(
+            (name + " has no field \"" + wanted + "\". Its fields are " + known).c_str());
+      }
+      if (!found->set(made, value)) {
+        throw nb::type_error(
+            (name + "." + wanted + ": expected " + found->type + ", got " + text_of(nb::repr(value)))
+                .c_str());
+      }
+    }
+  }
+
+  nb::class_<T, Base...> class_;
+  std::string name_;
+  std::vector<Field> fields_;
+};
+
+}  // namespace gsnav::python

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// The compiled module gsnav._gsnav. Types are bound before the functions that use them.
+#include "bind.hpp"
+
+NB_MODULE(_gsnav, m) {
+  using namespace gsnav::python;
+  m.doc() = "Compiled part of gsnav. Import gsnav instead.";
+  bind_errors(m);
+  bind_device(m);
+  bind_camera(m);
+  bind_navmesh(m);
+  bind_scene(m);
+  bind_render_settings(m);
+  bind_renderer(m);
+  bind_task(m);
+  bind_episodes(m);
+  bind_settings(m);
+  bind_world(m);
+  bind_simulator(m);
+  bind_batch(m);
+}

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "navmesh_arrays.hpp"
+
+#include <limits>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "arrays.hpp"
+
+namespace gsnav::python {
+namespace {
+
+/// The argument as a C-contiguous array of T with shape [rows][3]. Copies only if it has another type.
+template <class T>
+nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu> rows_of_three(nb::handle source,
+                                                                               const char* name,
+                                                                               const char* kinds,
+                                                                               const char* type) {
+  const nb::object numpy = nb::module_::import_("numpy");
+  const nb::object array = numpy.attr("asarray")(source);
+  const nb::object dtype = array.attr("dtype"), shape = array.attr("shape");
+  const std::string where = "NavMesh.build: " + std::string(name) + " have ";
+  if (std::string(kinds).find(text_of(dtype.attr("kind"))) == std::string::npos) {
+    throw nb::type_error((where + "dtype " + text_of(dtype) + "; " + type + " is needed").c_str());
+  }
+  if (nb::len(shape) != 2 || nb::cast<std::size_t>(shape[1]) != 3) {
+    throw nb::value_error((where + "shape " + text_of(shape) + "; (n, 3) is needed").c_str());
+  }
+  if (std::is_integral_v<T> && nb::cast<std::size_t>(shape[0]) > 0) {
+    const std::string low = text_of(array.attr("min")()), high = text_of(array.attr("max")());
+    if (low[0] == '-' || high.size() > 10 ||
+        std::stoull(high) > std::numeric_limits<std::uint32_t>::max()) {
+      throw nb::value_error(
+          (where + "indices from " + low + " to " + high + "; 0 to 2^32 - 1 are valid").c_str());
+    }
+  }
+  return nb::cast<nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu>>(
+      numpy.attr("ascontiguousarray")(array, type));
+}
+
+}  // namespace
+
+std::shared_ptr<NavMesh> build_navmesh(const NavMeshSettings& settings, nb::handle vertices,
+                                       nb::handle triangles, int threads) {
+  const auto v = rows_of_three<double>(vertices, "vertices", "f", "float64");
+  const auto t = rows_of_three<std::uint32_t>(triangles, "triangles", "iu", "uint32");
+  std::vector<Vec3d> points(v.shape(0));
+  for (std::size_t i = 0; i < points.size(); ++i) points[i] = {v(i, 0), v(i, 1), v(i, 2)};
+  std::vector<NavMesh::Triangle> faces(t.shape(0));
+  for (std::size_t i = 0; i < faces.size(); ++i) faces[i] = {t(i, 0), t(i, 1), t(i, 2)};
+  nb::gil_scoped_release release;
+  return std::make_shared<NavMesh>(NavMesh::build(settings, points, faces, threads).value());
+}
+
+nb::tuple navmesh_surface(const NavMesh& mesh, std::optional<std::size_t> island) {
+  NavMeshTriangles surface;
+  {
+    nb::gil_scoped_release release;
+    surface = mesh.surface(island);
+  }
+  std::vector<std::uint32_t> indices;
+  indices.reserve(3 * surface.triangles.size());
+  for (const auto& t : surface.triangles) indices.insert(indices.end(), t.begin(), t.end());
+  return nb::make_tuple(point_array(surface.vertices),
+                        array_from(std::move(indices), {surface.triangles.size(), 3}));
+}
+
+}  // namespace gsnav::python

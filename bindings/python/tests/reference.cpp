@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// Steps a BatchSimulator without Python, as the truth for the bits and the speed of the Python package.
+// usage: gsnav_python_reference ENVIRONMENTS SIDE STEPS DENSITY; prints a hash of all images and ms per
+// step
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "gsnav/demo.hpp"
+#include "gsnav/device/simulator.hpp"
+
+namespace {
+
+std::uint64_t hash(std::uint64_t h, std::span<const float> values) {
+  for (const float v : values) {
+    std::uint32_t bits = 0;
+    std::memcpy(&bits, &v, sizeof bits);
+    h = (h ^ bits) * 0x100000001b3ull;
+  }
+  return h;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  if (argc != 5) return std::fprintf(stderr, "usage: %s ENVIRONMENTS SIDE STEPS DENSITY\n", argv[0]), 2;
+  const auto environments = static_cast<std::size_t>(std::atoi(argv[1]));
+  const int side = std::atoi(argv[2]), steps = std::atoi(argv[3]);
+  auto scene = std::make_shared<const gsnav::SimulatorScene>(
+      gsnav::default_simulator_scene(0, 1, std::atof(argv[4])).value());
+  const auto episodes = gsnav::generate_episodes(*scene->navmesh, 1, 1).value();
+  gsnav::BatchConfig config;
+  config.sensors = gsnav::rgbd_sensors(side, side);
+  auto sim =
+      gsnav::BatchSimulator::create(gsnav::Device::parse("cpu").value(), {scene}, config, environments,
+                                    [&](std::size_t, std::size_t) -> gsnav::Result<gsnav::BatchEpisode> {
+                                      return gsnav::BatchEpisode{0, episodes[0]};
+                                    })
+          .value();
+  gsnav::BatchStep out = sim.reset().value();
+  std::uint64_t h = 0xcbf29ce484222325ull;
+  double seconds = 0;
+  for (int i = 0; i < steps; ++i) {
+    std::vector<gsnav::Action> actions;
+    for (std::size_t e = 0; e < environments; ++e) {
+      actions.push_back(static_cast<gsnav::Action>(1 + (e + static_cast<std::size_t>(i)) % 3));
+    }
+    const auto start = std::chrono::steady_clock::now();
+    out = sim.step(actions).value();
+    seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (i + 1 == steps) h = hash(hash(h, out["rgb"].data), out["depth"].data);
+  }
+  std::printf("%016llx %.4f\n", static_cast<unsigned long long>(h), 1000 * seconds / steps);
+} catch (const std::exception& e) {
+  return std::fprintf(stderr, "%s\n", e.what()), 1;
+}

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs each example in a process of its own, and checks the types of all."""
+
+import pathlib
+import subprocess
+import sys
+
+import pytest
+
+EXAMPLES = pathlib.Path(__file__).parents[3] / "examples" / "python"
+NEEDS = {"vector_env.py": "gymnasium", "plot.py": "matplotlib"}
+WRITES = {"render_scan.py": "scan.npz", "plot.py": "plot.png"}
+
+
+@pytest.mark.parametrize("name", sorted(p.name for p in EXAMPLES.glob("*.py")))
+def test_example(name, tmp_path):
+    if name in NEEDS:
+        pytest.importorskip(NEEDS[name])
+    lines = (EXAMPLES / name).read_text().splitlines()
+    assert 15 <= len(lines) <= 40
+    subprocess.run([sys.executable, "-W", "error::UserWarning", EXAMPLES / name], check=True, cwd=tmp_path)
+    if name in WRITES:
+        assert (tmp_path / WRITES[name]).stat().st_size > 1000
+
+
+def test_types_of_the_examples(tmp_path):
+    pytest.importorskip("mypy")
+    run = subprocess.run([sys.executable, "-m", "mypy", "--strict", "--cache-dir", tmp_path, *EXAMPLES.glob("*.py")],
+                         capture_output=True, text=True, cwd=tmp_path)
+    assert run.returncode == 0, run.stdout

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+import multiprocessing
+import os
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import gsnav
+
+
+def test_one_simulator_per_thread(people, small):
+    episodes = gsnav.generate_episodes(people.navmesh, 1, 1)
+
+    def run(out):
+        simulator = gsnav.Simulator("serial", people, small)
+        simulator.reset(episodes[0])
+        out.append(np.stack([simulator.step(1 + i % 3)["rgb"].copy() for i in range(8)]))
+
+    results = [[] for _ in range(3)]
+    threads = [threading.Thread(target=run, args=(r,)) for r in results]
+    [t.start() for t in threads]
+    [t.join() for t in threads]
+    assert all(np.array_equal(r[0], results[0][0]) for r in results)
+
+
+def test_a_second_thread_gets_an_error(opened):
+    renderer = gsnav.Renderer("serial", opened)
+    camera = gsnav.framing_camera(opened, 640, 480)
+    refused, ready = [], threading.Barrier(2)
+
+    def run():
+        ready.wait()
+        for _ in range(10):
+            try:
+                renderer.render(camera)
+            except gsnav.InvalidArgument as e:
+                refused.append(str(e))
+
+    threads = [threading.Thread(target=run) for _ in range(2)]
+    [t.start() for t in threads]
+    [t.join() for t in threads]
+    assert refused and "another call of this object" in refused[0]
+    assert renderer.render(camera).rgb.any()
+
+
+def test_a_callback_cannot_call_its_simulator(people):
+    episodes = gsnav.generate_episodes(people.navmesh, 1, 1)
+    batch = None
+
+    def source(environment, count):
+        if count == 1:
+            batch.reset()
+        return episodes[0]
+
+    batch = gsnav.BatchSimulator("cpu", [people], gsnav.BatchConfig(sensors=[]), 1, source)
+    batch.reset()
+    with pytest.raises(gsnav.InvalidArgument, match="callback"):
+        batch.reset()
+
+
+def test_rendering_releases_the_interpreter(opened):
+    renderer = gsnav.Renderer("serial", opened)
+    cameras = gsnav.views_around(opened, 8, 640, 480)
+    thread = threading.Thread(target=renderer.render, args=(cameras,))
+    ticks = 0
+    thread.start()
+    while thread.is_alive():
+        ticks += 1
+        time.sleep(0.001)
+    assert ticks > 5  # with the lock held, the loop could not run before the end
+
+
+def test_progress_is_called_and_its_errors_do_not_stop_the_work(capfd):
+    calls = []
+    gsnav.open_scene("default", gsnav.OpenOptions(navmesh="gaussians", density=0.05),
+                     lambda task, share: calls.append((task, share)))
+    assert calls and all(0 <= share <= 1 for _, share in calls)
+
+
+def _in_child(function):
+    """Runs function in a forked child. Returns its exit status, or None after 60 s."""
+    pid = os.fork()
+    if pid == 0:
+        try:
+            function()
+            os._exit(0)
+        except gsnav.Unsupported:
+            os._exit(7)
+        except BaseException:
+            os._exit(1)
+    for _ in range(600):
+        done, status = os.waitpid(pid, os.WNOHANG)
+        if done:
+            return os.waitstatus_to_exitcode(status)
+        time.sleep(0.1)
+    os.kill(pid, 9)
+    os.waitpid(pid, 0)
+    return None
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_fork(opened):
+    camera = gsnav.framing_camera(opened, 64, 64)
+    renderer = gsnav.Renderer("cpu:2", opened)
+    renderer.render(camera)
+    assert _in_child(lambda: renderer.render(camera)) == 7
+    assert _in_child(lambda: gsnav.Renderer("cpu", opened)) == 7
+    assert _in_child(lambda: gsnav.Renderer("serial", opened).render(camera)) == 0
+    assert renderer.render(camera).rgb.any()
+
+
+def _spawned(queue):
+    env = gsnav.Env(gsnav.open_scene("default", gsnav.OpenOptions(navmesh="auto", density=0.05)),
+                    config=gsnav.SimulatorConfig(sensors=gsnav.rgbd_sensors(8, 8)))
+    queue.put(float(env.reset(seed=1)[0]["rgb"].sum()))
+
+
+def test_spawn(opened):
+    context = multiprocessing.get_context("spawn")
+    queue = context.Queue()
+    process = context.Process(target=_spawned, args=(queue,))
+    process.start()
+    total = queue.get(timeout=120)
+    process.join()
+    env = gsnav.Env(opened, config=gsnav.SimulatorConfig(sensors=gsnav.rgbd_sensors(8, 8)))
+    assert total == float(env.reset(seed=1)[0]["rgb"].sum())
