@@ -6,6 +6,7 @@
 #include <set>
 #include <vector>
 
+#include "gsnav/core/rng.hpp"
 #include "gsnav/demo.hpp"
 #include "gsnav/detail/io/ply.hpp"
 #include "gsnav/scene/lod_cut.hpp"
@@ -114,16 +115,14 @@ TEST_CASE("scenes: what --scene says") {
 
 TEST_CASE("scenes: without cameras a scan is seen upright, by its ground or by the axis that is said") {
   const gsnav_test::TempFolder folder("report_upright");
-  // A floor in x and y of the file, with a few Gaussians above it: z is up.
+  // A room of 10 x 10 m with more at its floor than under its ceiling: z of the file is up.
   GaussianCloudBuilder builder(0);
-  for (int i = 0; i < 50; ++i) {
-    for (int k = 0; k < 50; ++k) {
-      RawGaussian g;
-      g.mean = {0.1 * i, 0.1 * k, k == 0 || i == 0 ? 0.05 * (i + k) : 0.0};
-      g.log_scales = {-3, -3, -5};
-      g.opacity_logit = 6;
-      builder.add(g);
-    }
+  Rng rng(2);
+  for (int i = 0; i < 4000; ++i) {
+    RawGaussian g;
+    g.mean = {rng.uniform(-5, 5), rng.uniform(-5, 5), std::max(rng.uniform(-1.5, 2.5), 0.0)};
+    g.quat = {1, 0, 0, 0};
+    builder.add(g);
   }
   io::save_ply(folder / "floor.ply", builder.cloud()).throw_if_error();
   const auto up_of = [&](const std::string& up) {
@@ -144,13 +143,14 @@ TEST_CASE("scenes: Gaussians are needed, and a Habitat stage names its file") {
   gsnav_test::write_file(folder / "floor.obj", "v 0 0 0\nv 0 0 4\nv 4 0 4\nf 1 2 3\n");
   const Status none = load({"a", (folder / "floor.obj").string(), {}}, 4).status();
   CHECK(none.message().find("no Gaussians") != std::string::npos);
-  io::save_ply(folder / "room.ply", gsnav_test::random_cloud(5, {.count = 60})).throw_if_error();
+  const GaussianCloud room = gsnav_test::random_cloud(5, {.count = 60});
+  io::save_ply(folder / "room.ply", room).throw_if_error();
   gsnav_test::write_file(folder / "a.stage_config.json", R"({"render_asset":"room.ply"})");
   const std::string stage = (folder / "a.stage_config.json").string();
   const Scene scene = load(parse_scene(stage).value(), 2).value();
   CHECK(scene.name == "a");
   CHECK(std::filesystem::equivalent(scene.path, folder / "room.ply"));
-  CHECK(scene.cloud.size() == 60);
+  CHECK(scene.cloud.size() == room.size());
 }
 
 TEST_CASE("timing: percentiles are of values that were seen") {
