@@ -152,8 +152,9 @@ class BatchSimulator {
   /// Number of environments, N.
   std::size_t environments() const noexcept;
   /// World of an environment, without images. Valid while the simulator lives.
+  /// @pre environment < environments(), and a reset() has succeeded.
   const World& world(std::size_t environment) const noexcept;
-  /// Index of the scene that an environment is in.
+  /// Index of the scene that an environment is in. @pre as for world().
   std::size_t scene_of(std::size_t environment) const noexcept;
   /// Device that the simulator runs on.
   const Device& device() const noexcept { return device_; }

@@ -78,9 +78,10 @@ class BasicBatchSimulator {
 
   /// Number of environments, N.
   std::size_t environments() const noexcept { return worlds_.size(); }
-  /// World of one environment: agent, task and clock. @pre environment < environments().
+  /// World of one environment: agent, task and clock.
+  /// @pre environment < environments(), and a reset() has succeeded.
   const World& world(std::size_t environment) const noexcept { return worlds_.world(environment); }
-  /// Index of the scene that an environment is in.
+  /// Index of the scene that an environment is in. @pre as for world().
   std::size_t scene_of(std::size_t environment) const noexcept { return worlds_.scene_of(environment); }
 
   /// Begins the next episode in every environment.
