@@ -70,8 +70,8 @@ class Workers:
         indexed = list(enumerate(episodes))[first:]
         pieces = [indexed[i:i + piece] for i in range(0, len(indexed), piece)]
         local = self._local
-        played = (local.play(p, make_policy, keep) for p in pieces) if local else self._remote(pieces, make_policy, keep)
-        for rollouts in played:
+        here = (local.play(one, make_policy, keep) for one in pieces) if local else None
+        for rollouts in here or self._remote(pieces, make_policy, keep):
             yield from rollouts
 
     def evaluate(self, episodes: Sequence[_task.Episode], make_policy: Callable[[VectorEnv], Policy],
