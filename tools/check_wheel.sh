@@ -49,7 +49,8 @@ PATH="$work/build/bin:$PATH" auditwheel repair --wheel-dir "$work/repaired" "$wo
   > "$work/log" 2>&1 || fail "$(cat "$work/log")"
 wheel=$(echo "$work"/repaired/gsnav-*.whl)
 bytes=$(stat -c %s "$wheel")
-echo "   $(basename "$wheel"): $bytes bytes, with$("$python" -m zipfile -l "$wheel" | sed -n 's|^gsnav.libs/\([^ ]*\).*| \1|p' | tr -d '\n')"
+libraries=$("$python" -m zipfile -l "$wheel" | sed -n 's|^gsnav.libs/\([^ ]*\).*|\1|p')
+echo "   $(basename "$wheel"): $bytes bytes, with" $libraries
 [[ $bytes -le 20000000 ]] || fail "the wheel has more than 20 MB"
 "$work/build/bin/pip" download --quiet --dest "$work/numpy" numpy
 
