@@ -7,6 +7,7 @@
 # The exit status is that of pytest. ccache is used if it is installed.
 #
 # PYTHON=python3.12   interpreter of the virtual environment (default: python3), 3.10 or later
+# GSNAV_TEST_WITH=... more packages to install and test with, such as "ray jax torch stable-baselines3"
 # GSNAV_VENV=DIR      folder of the virtual environment (default: build/venv)
 # GSNAV_NO_APT=1      never call apt-get
 # GSNAV_JOBS=N        compile N files at a time; tools/build_jobs.sh has the default
@@ -14,7 +15,7 @@ set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 if [[ ${1:-} == --help || ${1:-} == -h ]]; then
-  sed -n '4,13s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
+  sed -n '4,14s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
   exit 0
 fi
 python=${PYTHON:-python3}
@@ -40,7 +41,8 @@ if command -v ccache > /dev/null; then
 fi
 echo "Installing what the build and the tests need in $venv"
 "$venv/bin/pip" install --quiet --disable-pip-version-check "scikit-build-core>=0.11" "nanobind>=2.8" \
-  "numpy>=1.26" "gymnasium>=1.1" "matplotlib>=3.8" "mypy>=1.11" "pytest>=8"
+  "numpy>=1.26" "gymnasium>=1.1" "matplotlib>=3.8" "mypy>=1.11" "pytest>=8" \
+  ${GSNAV_TEST_WITH:-}
 echo "Building the package, $CMAKE_BUILD_PARALLEL_LEVEL files at a time"
 build=$root/build/python
 # The build folder is kept, so that only changed files are compiled.

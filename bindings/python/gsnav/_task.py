@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -42,6 +42,7 @@ METRIC_FIELDS = ("success", "spl", "soft_spl", "stl", "distance_to_goal", "eucli
 
 Scene = str | OpenedScene | SimulatorScene
 Episode = PointNavEpisode | BatchEpisode
+EpisodeSource = Callable[[int, int], Episode]
 
 
 def scene_of(scene: Scene, config: SimulatorConfig) -> SimulatorScene:

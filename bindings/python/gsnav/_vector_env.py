@@ -14,7 +14,6 @@ from ._errors import ClosedEnvironment, InvalidArgument
 from ._gsnav import (
     AutoReset,
     BatchConfig,
-    BatchEpisode,
     BatchSimulator,
     BatchStep,
     Device,
@@ -32,13 +31,15 @@ AUTO_RESETS = {"NextStep": AutoReset.next_step, "SameStep": AutoReset.same_step,
 class Source:
     """The function that a BatchSimulator calls for episodes. It does not refer to the environment."""
 
-    def __init__(self, episodes: _task.Episodes, environments: int) -> None:
+    def __init__(self, episodes: _task.Episodes | _task.EpisodeSource, environments: int) -> None:
         self.episodes = episodes
         self.generators = [make_generator()[0] for _ in range(environments)]
 
-    def __call__(self, environment: int, count: int) -> BatchEpisode:
+    def __call__(self, environment: int, count: int) -> _task.Episode:
         """The next episode of an environment."""
-        return self.episodes.draw(self.generators[environment])
+        if isinstance(self.episodes, _task.Episodes):
+            return self.episodes.draw(self.generators[environment])
+        return self.episodes(environment, count)
 
 
 def batch_config(config: SimulatorConfig, auto_reset: AutoReset) -> BatchConfig:
@@ -59,13 +60,15 @@ class VectorEnv(BaseVectorEnv):
 
     def __init__(self, num_envs: int = 1, scene: _task.Scene | Sequence[_task.Scene] = "default", *,
                  device: Device | str = "best", config: SimulatorConfig | None = None,
-                 episodes: Sequence[_task.Episode] | None = None, rules: EpisodeRules | None = None,
+                 episodes: Sequence[_task.Episode] | _task.EpisodeSource | None = None,
+                 rules: EpisodeRules | None = None,
                  autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP, copy: bool = True,
                  render_mode: str | None = None) -> None:
         """Creates the environments. They share their scenes.
 
         scene: as in Env, or a list of scenes, of which each sampled episode takes a random one.
-        episodes: episodes to draw from; a BatchEpisode names its scene. Default: they are sampled by `rules`.
+        episodes: episodes to draw from; a BatchEpisode names its scene. Or a function like the `next_episode`
+            of BatchSimulator, which decides without seeds. Default: episodes are sampled by `rules`.
         autoreset_mode: what happens to an environment whose episode has ended, as in Gymnasium.
         copy: False returns observations as read-only views of the simulator's memory, which the next call
             overwrites.
@@ -85,7 +88,8 @@ class VectorEnv(BaseVectorEnv):
         self.render_mode = render_mode
         names = list(scene) if isinstance(scene, (list, tuple)) else [scene]
         self.scenes = [_task.scene_of(one, config) for one in names]
-        self._source = Source(_task.Episodes(self.scenes, episodes, rules), self.num_envs)
+        drawn = episodes if callable(episodes) else _task.Episodes(self.scenes, episodes, rules)
+        self._source = Source(drawn, self.num_envs)
         self._same_step = mode == AutoresetMode.SAME_STEP
         self._copy = copy
         self._last: Observation | None = None

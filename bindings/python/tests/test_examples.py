@@ -8,8 +8,8 @@ import sys
 import pytest
 
 EXAMPLES = pathlib.Path(__file__).parents[3] / "examples" / "python"
-NEEDS = {"vector_env.py": "gymnasium", "plot.py": "matplotlib"}
-WRITES = {"render_scan.py": "scan.npz", "plot.py": "plot.png"}
+NEEDS = {"vector_env.py": "gymnasium", "plot.py": "matplotlib", "on_ray.py": "ray"}
+WRITES = {"render_scan.py": "scan.npz", "plot.py": "plot.png", "on_ray.py": "journal.jsonl"}
 
 
 @pytest.mark.parametrize("name", sorted(p.name for p in EXAMPLES.glob("*.py")))

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+import json
+import os
+
+import numpy as np
+import pytest
+
+import gsnav
+import gsnav.ray
+
+CONFIG = gsnav.SimulatorConfig(sensors=gsnav.rgbd_sensors(8, 12), task=gsnav.TaskConfig(max_steps=15))
+
+
+def policy_maker():
+    """Maker of a policy whose actions depend on images and on random numbers of the episode.
+
+    It is a local function, so that Ray sends it by value: actors cannot import the tests.
+    """
+
+    def make_policy(envs):
+        steps = [0] * envs.num_envs
+        before = [-1] * envs.num_envs
+
+        def policy(observations, playing):
+            assert observations["rgb"].shape == (envs.num_envs, 8, 12, 3) and playing.shape == (envs.num_envs,)
+            actions = []
+            for e, index in enumerate(playing):
+                steps[e] = steps[e] + 1 if index == before[e] else 0
+                before[e] = index
+                rng = np.random.default_rng([int(index) + 1, steps[e]])
+                bright = int(observations["rgb"][e].sum() * 1000)
+                actions.append(0 if rng.uniform() < 0.05 else 1 + (bright + int(rng.integers(3))) % 3)
+            return actions
+
+        return policy
+
+    return make_policy
+
+
+@pytest.fixture(scope="module")
+def episodes():
+    scene = gsnav.open_scene("default", gsnav.OpenOptions(navmesh="auto"))
+    return gsnav.generate_episodes(scene.scene.navmesh, 26, 3)
+
+
+@pytest.fixture(scope="module")
+def alone(episodes, tmp_path_factory):
+    """Journal and observed depths of a single process."""
+    workers = gsnav.ray.Workers(actors=0, environments=3, config=CONFIG)
+    journal = tmp_path_factory.mktemp("alone") / "journal.jsonl"
+    workers.evaluate(episodes, policy_maker(), journal, piece=4)
+    rollouts = list(workers.rollouts(episodes, policy_maker(), piece=4, keep=["depth"]))
+    return journal.read_bytes(), rollouts
+
+
+def test_a_single_process_plays_every_episode(episodes, alone):
+    header, *lines = map(json.loads, alone[0].splitlines())
+    assert header["journal"] == "gsnav.ray" and [line["episode"] for line in lines] == list(range(26))
+    world = gsnav.Simulator("cpu", gsnav.open_scene("default", gsnav.OpenOptions(navmesh="auto")), CONFIG)
+    assert {line["metrics"]["stop_called"] for line in lines} == {True, False}
+    for line, rollout, episode in zip(lines[:5], alone[1], episodes):  # the same as without a vector environment
+        seen, rewards = world.reset(episode), []
+        for i, action in enumerate(line["actions"]):
+            assert np.array_equal(seen["depth"], rollout.observations["depth"][i])
+            seen = world.step(int(action))
+            rewards.append(seen.reward)
+        assert world.done and sum(rewards) == line["reward"] and rewards == rollout.rewards.tolist()
+        for name, value in line["metrics"].items():
+            assert getattr(world.metrics(), name) == (np.inf if value is None else value), name
+
+
+def test_a_journal_is_continued(episodes, alone, tmp_path):
+    workers = gsnav.ray.Workers(actors=0, environments=3, config=CONFIG)
+    journal = tmp_path / "journal.jsonl"
+    for size in (0, 10, 2000, len(alone[0]) - 3, len(alone[0])):
+        journal.write_bytes(alone[0][:size])
+        metrics = workers.evaluate(episodes, policy_maker(), journal, piece=4)
+        assert journal.read_bytes() == alone[0], size
+        assert [repr(m) for m in metrics] == [repr(r.metrics) for r in alone[1]]
+    for wrong in (episodes[:25], [*episodes[:25], episodes[0]]):
+        with pytest.raises(gsnav.InvalidArgument, match="other episodes"):
+            workers.evaluate(wrong, policy_maker(), journal, piece=4)
+    with pytest.raises(gsnav.InvalidArgument, match="piece"):
+        list(workers.rollouts(episodes, policy_maker(), piece=0))
+    workers.close()
+    with pytest.raises(gsnav.ClosedEnvironment):
+        list(workers.rollouts(episodes, policy_maker()))
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_of_two_nodes_one_killed(episodes, alone, tmp_path):
+    ray = pytest.importorskip("ray")
+    from ray.cluster_utils import Cluster
+
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 3})
+    try:
+        node = cluster.add_node(num_cpus=1, resources={"second": 1})
+        ray.init(address=cluster.address, log_to_driver=False, logging_level="ERROR")
+        workers = gsnav.ray.Workers(actors=2, environments=3, config=CONFIG,
+                                    options={"scheduling_strategy": "SPREAD"})
+        played = []
+        for rollout in workers.rollouts(episodes, policy_maker(), piece=4, keep=["depth"]):
+            if not played:
+                where = [a.__ray_call__.remote(lambda _: ray.get_runtime_context().get_node_id())
+                         for a in workers._actors]
+                assert len(set(ray.get(where))) == 2
+                cluster.remove_node(node, allow_graceful=False)
+            if len(played) == 13:
+                ray.kill(workers._actors[0])
+            played.append(rollout)
+        assert workers.deaths >= 1
+        assert "".join(r.line() + "\n" for r in played).encode() == alone[0].split(b"\n", 1)[1]
+        assert all(np.array_equal(a.observations["depth"], b.observations["depth"]) for a, b in zip(played, alone[1]))
+        workers.close()
+        for actors in (1, 3):
+            workers = gsnav.ray.Workers(actors=actors, environments=3, config=CONFIG)
+            workers.evaluate(episodes, policy_maker(), tmp_path / f"{actors}.jsonl", piece=4)
+            assert (tmp_path / f"{actors}.jsonl").read_bytes() == alone[0]
+            workers.close()
+
+        def wrong(envs):
+            raise KeyError("mine")
+
+        workers = gsnav.ray.Workers(actors=1, environments=3, config=CONFIG)
+        with pytest.raises(KeyError, match="mine"):
+            list(workers.rollouts(episodes, wrong))
+
+        def deadly(envs):
+            os._exit(1)
+
+        with pytest.raises(gsnav.BackendFailure, match="again and again"):
+            list(workers.rollouts(episodes, deadly))
+        with pytest.raises(FileNotFoundError, match="nowhere"):
+            list(gsnav.ray.Workers("nowhere.ply", actors=1).rollouts(episodes, policy_maker()))
+    finally:
+        ray.shutdown()
+        cluster.shutdown()
