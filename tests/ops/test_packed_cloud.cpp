@@ -243,7 +243,7 @@ TEST_CASE("packed clouds: the image stays within a bound of the cloud's own") {
   for (std::size_t i = 0; i < got.rgb.size(); ++i) squares += std::pow(got.rgb[i] - want.rgb[i], 2);
   const double psnr = -10 * std::log10(squares / static_cast<double>(got.rgb.size()));
   CAPTURE(psnr);
-  CHECK(psnr > 60);  // the budget of `fast`
+  CHECK(psnr > 60);  // as docs/reference/formats.md says
 }
 
 TEST_CASE("packed clouds: planes that do not fit are named") {

@@ -93,7 +93,7 @@ class Player:
         return [done[index] for index, _ in piece]
 
     def _rollout(self, index: int, rows: Any, metrics: Any, e: int) -> Rollout:
-        episode: Any = next(one for i, one in self._piece if i == index)
+        episode: Any = dict(self._piece)[index]
         actions, rewards, images = zip(*rows)
         return Rollout(index, getattr(episode, "episode", episode).id, np.array(actions, np.int8), np.array(rewards),
                        EpisodeMetrics(**{n: metrics[n][e].item() for n in _task.METRIC_FIELDS}),
