@@ -3,8 +3,8 @@
 // and the memory.
 //
 //   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_batch [--size 256x256]
-//       [--compact] [--balls 8] [--rgb] [--visible] [--visible-rows 8] [--visible-weight 0.001]
-//       [batch sizes...]
+//       [--compact] [--balls 8] [--rgb] [--depth] [--visible] [--visible-rows 8]
+//       [--visible-weight 0.001] [batch sizes...]
 //
 // Without the variables, the scene is the embedded flat from its four viewpoints. A batch larger than
 // the number of views repeats the views from slightly different places. Times are measured on the
@@ -12,6 +12,7 @@
 //
 // --balls N: N meshes of 4000 triangles stand in front of the first cameras, and all cameras see them.
 // --rgb: colours alone, without depth (its error is nan) and alpha, as most renderers measure.
+// --depth: median depth alone. Errors of colours are nan.
 // --visible: each camera draws only the Gaussians that are visible from its cell (VisibleSettings::rows,
 // min_weight). The images of all views are then compared with images of the whole scene.
 #include <cuda_runtime.h>
@@ -40,10 +41,11 @@ namespace {
 
 constexpr int kRepeats = 9;
 int g_width = 256, g_height = 256;
-bool g_rgb_alone = false;
-constexpr std::size_t kReferenceViews = 4;  ///< compared with float64
-std::vector<MeshInstance> g_meshes;         ///< on the device
-VisibleSets g_visible;                      ///< empty: every camera draws the whole scene
+bool g_rgb = true, g_depth = true;  ///< images that are drawn: both with alpha
+/// Number of views that are compared with float64.
+std::size_t reference_views() { return g_width * g_height <= 128 * 128 ? 16 : 4; }
+std::vector<MeshInstance> g_meshes;  ///< on the device
+VisibleSets g_visible;               ///< empty: every camera draws the whole scene
 
 /// A ball of radius 1.
 SurfaceMesh ball() {
@@ -102,10 +104,9 @@ struct Seen {
 struct DeviceImages {
   DeviceImages(CudaBackend& cuda, std::size_t pixels) : memory(cuda) {
     memory.resize_discard(5 * pixels);
-    images.floats.rgb = memory.data();
-    if (g_rgb_alone) return;
-    images.floats.alpha = memory.data() + 3 * pixels;
-    images.floats.median_depth = memory.data() + 4 * pixels;
+    if (g_rgb) images.floats.rgb = memory.data();
+    if (g_rgb && g_depth) images.floats.alpha = memory.data() + 3 * pixels;
+    if (g_depth) images.floats.median_depth = memory.data() + 4 * pixels;
   }
   Buffer<float, CudaBackend> memory;
   BatchImages images;
@@ -153,24 +154,36 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
   renderer.finish().throw_if_error();
   std::vector<float> rgb(3 * compared * pixels), depth(compared * pixels), depth_seen;
   std::vector<double> depth_truth;
-  cuda.copy(rgb.data(), out.images.floats.rgb, rgb.size() * sizeof(float), CopyKind::device_to_host);
-  if (!g_rgb_alone)
+  if (g_rgb)
+    cuda.copy(rgb.data(), out.images.floats.rgb, rgb.size() * sizeof(float), CopyKind::device_to_host);
+  if (g_depth)
     cuda.copy(depth.data(), out.images.floats.median_depth, depth.size() * sizeof(float),
               CopyKind::device_to_host);
   cuda.synchronize().throw_if_error();
   for (std::size_t i = 0; i < depth.size(); ++i) {
-    if (g_rgb_alone || truth.alpha[i] <= 0.9) continue;
+    if (!g_depth || truth.alpha[i] <= 0.9) continue;
     depth_seen.push_back(depth[i]);
     depth_truth.push_back(truth.median_depth[i]);
   }
   const std::vector<double> rgb_truth(truth.rgb.begin(),
                                       truth.rgb.begin() + static_cast<std::ptrdiff_t>(rgb.size()));
-  const gsnav_bench::Error e = gsnav_bench::error_of(rgb, rgb_truth);
-  std::printf("%-6s %5zu  %9.4f %9.4f %9.0f   %.1e  %.1e  %6.1f  %.1e  %9.0f  %8.1f  %7.1f\n",
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  gsnav_bench::Error e{kNan, kNan, kNan, kNan};
+  double least = kNan;  // PSNR of the worst view.
+  if (g_rgb) {
+    e = gsnav_bench::error_of(rgb, rgb_truth);
+    for (std::size_t v = 0; v < compared; ++v) {
+      const auto part = [&](const auto& image) {
+        const auto from = image.begin() + static_cast<std::ptrdiff_t>(3 * v * pixels);
+        return std::vector(from, from + static_cast<std::ptrdiff_t>(3 * pixels));
+      };
+      least = std::fmin(least, gsnav_bench::error_of(part(rgb), part(rgb_truth)).psnr);
+    }
+  }
+  std::printf("%-6s %5zu  %9.4f %9.4f %9.0f   %.1e  %.1e  %6.1f %6.1f  %.1e  %9.0f  %8.1f  %7.1f\n",
               quality == Quality::fast() ? "fast" : "exact", count, gsnav_bench::median(ms),
               gsnav_bench::quantile(ms, 0.9), 1000.0 / gsnav_bench::median(ms), e.max, e.p999, e.psnr,
-              g_rgb_alone ? std::numeric_limits<double>::quiet_NaN()
-                          : gsnav_bench::error_of(depth_seen, depth_truth).p99,
+              least, g_depth ? gsnav_bench::error_of(depth_seen, depth_truth).p99 : kNan,
               pairs / static_cast<double>(ms.size() * count),
               static_cast<double>(renderer.stats().scratch_bytes) / 1e6, gsnav_bench::median(host_us));
   std::fflush(stdout);
@@ -214,6 +227,23 @@ void compare_visible(CudaBackend& cuda, const GaussianArrays<CudaBackend>& array
       views, least, -10 * std::log10(sum / static_cast<double>(views)), worst);
 }
 
+/// Handles an argument that chooses images. Returns false for others.
+bool chooses_images(const std::string& argument) {
+  if (argument == "--rgb") {
+    g_depth = false;
+  } else if (argument == "--depth") {
+    g_rgb = false;
+  } else {
+    return false;
+  }
+  return true;
+}
+
+const char* drawn_images() {
+  if (!g_depth) return "RGB";
+  return g_rgb ? "RGB + alpha + median depth" : "median depth";
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -237,8 +267,7 @@ int main(int argc, char** argv) {
     } else if (std::string(argv[i]) == "--visible-weight" && i + 1 < argc) {
       sets_of.min_weight = std::atof(argv[++i]);
       continue;
-    } else if (std::string(argv[i]) == "--rgb") {
-      g_rgb_alone = true;
+    } else if (chooses_images(argv[i])) {
       continue;
     } else if (std::string(argv[i]) == "--balls" && i + 1 < argc) {
       balls = std::strtoull(argv[++i], nullptr, 10);
@@ -250,9 +279,8 @@ int main(int argc, char** argv) {
       }
     }
     std::fprintf(stderr,
-                 "bench_batch: '%s' is no size (256x256), batch size, --compact, --rgb, --visible, "
-                 "--visible-rows, "
-                 "--visible-weight or --balls\n",
+                 "bench_batch: '%s' is no size (256x256), batch size, --compact, --rgb, --depth, "
+                 "--visible, --visible-rows, --visible-weight or --balls\n",
                  argv[i]);
     return 2;
   }
@@ -268,7 +296,7 @@ int main(int argc, char** argv) {
   OpenMPBackend cpu;
   BasicRenderer<double, OpenMPBackend> reference(cpu);
   std::vector<Camera> cameras;
-  for (const BatchCamera& c : cameras_of(0, kReferenceViews)) cameras.push_back(c.camera);
+  for (const BatchCamera& c : cameras_of(0, reference_views())) cameras.push_back(c.camera);
   const std::vector<GaussianSet> sets{gsnav_bench::workload().cloud.set()};
   MeshScene scene;
   scene.add(ball()).value();
@@ -283,13 +311,13 @@ int main(int argc, char** argv) {
   }
   reference.set_meshes(here);
   const Frames<double> truth = reference.render(sets, cameras).value();
-  std::printf("%s: %zu Gaussians, %zu views, %d x %d, RGB%s%s, %zu meshes\n", cuda.device_name().c_str(),
+  std::printf("%s: %zu Gaussians, %zu views, %d x %d, %s%s, %zu meshes\n", cuda.device_name().c_str(),
               gsnav_bench::workload().cloud.size(), gsnav_bench::workload().cameras.size(), g_width,
-              g_height, g_rgb_alone ? "" : " + alpha + median depth",
-              compact ? ", SH in half precision" : "", balls);
+              g_height, drawn_images(), compact ? ", SH in half precision" : "", balls);
   if (visible) compare_visible(cuda, arrays);
   std::printf(
-      "profile batch  ms/frame       p90  frames/s   rgb max  p99.9  psnr dB  depth p99     pairs  "
+      "profile batch  ms/frame       p90  frames/s   rgb max  p99.9  psnr dB  least  depth p99     "
+      "pairs  "
       "scratch MB  host us\n");
   if (counts.empty()) counts = {1, 8, 64, 256, 512};
   for (const Quality& quality : {Quality::fast(), Quality::exact()}) {
