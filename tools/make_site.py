@@ -19,6 +19,8 @@ import urllib.parse
 from html import unescape
 from xml.sax.saxutils import quoteattr
 
+import site_search
+
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 SITE = ROOT / "docs/site"
 # Group, its title, the module header that has it (or none) and the folders whose other headers belong to it.
@@ -105,8 +107,8 @@ def joined(text):
     return re.sub(r"[ \t]*\n\s*", " ", text)
 
 
-def page_text(name, known):
-    """A page with labels on its headings and links that Doxygen resolves."""
+def page_text(name, known, missing):
+    """A page with labels on its headings and links that Doxygen resolves. `missing` gets a line for each dead link."""
     folder, code, seen, out = (ROOT / name).parent, False, set(), []
 
     def link(m):
@@ -117,6 +119,8 @@ def page_text(name, known):
         path = pathlib.Path(os.path.normpath(folder / file)) if file else ROOT / name
         linked = path.relative_to(ROOT).as_posix() if path.is_relative_to(ROOT) else ""
         if linked not in known:  # not on the site: a folder, a source
+            if not path.exists():
+                missing.append(f"{name}: error: {target}: there is no such file")
             return text if "`" in text else f"`{linked}`" if text == linked else text
         return f"[{joined(text)}](@ref {label(linked, anchor)})"
 
@@ -238,18 +242,36 @@ def document_the_obvious(text):
     return "\n".join(out)
 
 
+ENUM = re.compile(r"^ *enum (?:class |struct )?(\w+)[^;{]*\{\n(.*?)^ *\}", FLAGS)
+
+
+def bare_enumerators(text, name):
+    """Lines for enumerators without a comment. A public enumeration of one line has one comment for all."""
+    found = []
+    for enum in ENUM.finditer(text):
+        before, above = text[:enum.start()], ""
+        if max(before.rfind("\nprivate:"), before.rfind("\n private:")) > before.rfind(" public:"):
+            continue
+        for line in enum.group(2).splitlines():
+            if re.match(r" *\w", line) and "///<" not in line and not above.startswith("///"):
+                found.append(f"{name}: error: {enum.group(1)}: no documentation of {line.strip(' ,')}")
+            above = line.strip()
+    return found
+
+
 def write_inputs(out):
-    """Copies of the pages and headers for Doxygen, in folders as in the tree; their paths."""
-    known, copies = set(pages()), {}
+    """Copies of the pages and headers for Doxygen, in folders as in the tree. Their paths, and lines for errors."""
+    known, copies, wrong = set(pages()), {}, []
     for name in sorted(known):
-        copies[name] = page_text(name, known)
+        copies[name] = page_text(name, known, wrong)
     for path, group in headers().items():
         name = path.relative_to(ROOT).as_posix()
         copies[name] = header_text(path, re.sub(r"^include/|^backends/\w+/", "", name), group)
+        wrong += bare_enumerators(copies[name], name)
     for name, text in copies.items():
         (out / "input" / name).parent.mkdir(parents=True, exist_ok=True)
         (out / "input" / name).write_text(text, encoding="utf-8")
-    return [out / "input" / name for name in sorted(copies)]
+    return [out / "input" / name for name in sorted(copies)], wrong
 
 
 def module_comment(module):
@@ -296,12 +318,22 @@ def version():
 
 
 def headings(name):
-    """Number of headings of a page behind its title."""
-    code, found = False, 0
+    """Texts of the headings of a page, the title first."""
+    code, found = False, []
     for line in (ROOT / name).read_text(encoding="utf-8").splitlines():
         code ^= bool(FENCE.match(line))
-        found += not code and bool(re.match(r"#{1,6} \S", line))
-    return found - 1
+        heading = re.match(r"#{1,6} (\S.*)", line)
+        if heading and not code:
+            found.append(heading.group(1).strip())
+    return found
+
+
+def searchable():
+    """Text, address and page of each heading, for the search field."""
+    for name in pages():
+        for k, text in enumerate(headings(name)):
+            plain = LINK.sub(r"\1", text).replace("`", "")
+            yield plain, f"../{html_of(name)}" + (f"#{label(name, text)}" if k else ""), title_of(name)
 
 
 RAW = re.compile(r"@(?:sub)*section\b|@ref\b|&lt;/?tt&gt;")
@@ -320,8 +352,9 @@ def wrong_pages(html):
         prose = re.sub(r"<pre\b.*?</pre>|<div class=\"fragment\">.*?</div><!-- fragment -->", "", text, flags=re.DOTALL)
         found += [f"{name}: error: Doxygen left {m} as text" for m in sorted(set(RAW.findall(prose)))]
         made = len(re.findall(r"<h[1-6]\b", prose))
-        if made != headings(name):
-            found.append(f"{name}: error: {headings(name)} headings, but {made} on the site")
+        asked = len(headings(name)) - 1
+        if made != asked:
+            found.append(f"{name}: error: {asked} headings, but {made} on the site")
     return found
 
 
@@ -352,7 +385,8 @@ def make(out, doxygen):
     out.mkdir(parents=True)
     write_groups(out)
     write_layout(out)
-    inputs = [*write_inputs(out), out / "groups.dox"]
+    inputs, wrong = write_inputs(out)
+    inputs.append(out / "groups.dox")
     pictures = [p for p in (ROOT / "docs").rglob("*") if p.suffix in {".png", ".svg", ".webp"}]
     names = [p.name for p in pictures]
     if len(set(names)) != len(names):
@@ -369,10 +403,11 @@ def make(out, doxygen):
     print(said, end="")
     if done.returncode != 0 or "warning:" in said or "error:" in said:
         return 1
-    wrong = wrong_pages(out / "html") + dead_links(out / "html")
+    wrong += wrong_pages(out / "html") + dead_links(out / "html")
     if wrong:
         print("\n".join(wrong))
         return 1
+    site_search.widen(out / "html/search", searchable())
     print(f"{out}/html/index.html")
     return 0
 

@@ -57,6 +57,7 @@ class Tree(unittest.TestCase):
         self.write("include/gsnav/nav/place.hpp", HEADER)
         self.write("README.md", "![A room](docs/a.svg)\n\n# Name\n\n"
                                 "See [the\npage](docs/a.md#two-words) and [code](src).\n")
+        self.write("src/a.cpp", "")
         self.write("docs/a.svg", "<svg xmlns='http://www.w3.org/2000/svg' width='8' height='8'/>")
         self.write("docs/a.md", "# Page\n\n## Two words\n\n```\n[not](a-link.md)\n```\n")
 
@@ -65,12 +66,36 @@ class Tree(unittest.TestCase):
         (self.root / name).write_text(text)
 
     def test_links_lead_to_pages_and_headings(self):
-        text = make_site.page_text("README.md", {"README.md", "docs/a.md"})
+        missing = []
+        text = make_site.page_text("README.md", {"README.md", "docs/a.md"}, missing)
         self.assertTrue(text.startswith("# Name {#page_README}"))
         self.assertIn("[the page](@ref page_docs_a__two-words) and code.", text)
-        text = make_site.page_text("docs/a.md", {"README.md", "docs/a.md"})
+        text = make_site.page_text("docs/a.md", {"README.md", "docs/a.md"}, missing)
         self.assertIn("## Two words {#page_docs_a__two-words}", text)
         self.assertIn("[not](a-link.md)", text)
+        self.assertEqual(missing, [])
+        self.write("docs/b.md", "# Page\n\nSee [this](c.md).\n")
+        make_site.page_text("docs/b.md", {"docs/b.md"}, missing)
+        self.assertEqual(missing, ["docs/b.md: error: c.md: there is no such file"])
+
+    def test_enumerators_need_comments(self):
+        bare = lambda text: make_site.bare_enumerators(text, "a.hpp")  # noqa: E731
+        self.assertEqual(bare("/// A kind.\nenum class Kind {\n  one,  ///< First.\n  /// Second.\n  two,\n};\n"), [])
+        self.assertEqual(bare("/// A kind: one or two.\nenum class Kind { one, two };\n"), [])
+        self.assertEqual(bare("/// A kind.\nenum Kind : int {\n  one,\n  two,  ///< Second.\n};\n"),
+                         ["a.hpp: error: Kind: no documentation of one"])
+        self.assertEqual(bare("class A {\n private:\n  enum Kind {\n    one,\n  };\n};\n"), [])
+
+    @unittest.skipUnless(shutil.which("doxygen"), "no doxygen here")
+    def test_the_search_finds_each_word_of_a_heading(self):
+        self.write("docs/a.md", "# Page\n\n## Two words\n\n## On a [GPU](../README.md)\n")
+        self.assertEqual(self.run_doxygen().returncode, 0)
+        found = "".join(p.read_text() for p in (self.root / "out/html/search").glob("all_*.js"))
+        self.assertIn("""['gpu_""", found)
+        self.assertIn("""["On a GPU",["../page_docs_a.html#page_docs_a__on-a-gpu",1,"Page"]]""", found)
+        self.assertIn("""['here_""", found)  # names of the library stay
+        self.assertIn("""['on_20a_20gpu_""", found)
+        self.assertNotIn("""['a_20gpu_""", found)
 
     def test_headers_join_their_group_and_keep_their_lines(self):
         path = self.root / "include/gsnav/nav/place.hpp"

@@ -70,21 +70,21 @@ struct PlannedWindow {
 
 /// Kinds of furniture.
 enum class FurnitureKind {
-  sofa,
-  coffee_table,
-  dining_table,
-  chair,
-  bed,
-  bedside_table,
-  wardrobe,
-  sideboard,
-  bookshelf,
-  desk,
-  kitchen_unit,
-  fridge,
-  plant,
-  floor_lamp,
-  rug,  ///< Can be walked on.
+  sofa,           ///< Sofa.
+  coffee_table,   ///< Low table in front of a sofa.
+  dining_table,   ///< Table with chairs.
+  chair,          ///< Chair at a table or desk.
+  bed,            ///< Bed; its head is at the back.
+  bedside_table,  ///< Small table next to a bed.
+  wardrobe,       ///< Tall cupboard for clothes.
+  sideboard,      ///< Low cupboard.
+  bookshelf,      ///< Tall shelf.
+  desk,           ///< Desk.
+  kitchen_unit,   ///< Kitchen cupboard with a worktop.
+  fridge,         ///< Fridge.
+  plant,          ///< Plant in a pot.
+  floor_lamp,     ///< Lamp that stands on the floor.
+  rug,            ///< Rug. It can be walked on.
 };
 
 /// A piece of furniture. In its own frame the back is at z = 0, the front faces +z, and x = 0 is the

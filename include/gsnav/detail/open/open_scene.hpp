@@ -30,7 +30,7 @@ enum class CloudStorage : std::uint8_t {
 
 /// Levels of detail of a scene's Gaussians.
 enum class SceneLevels : std::uint8_t {
-  none,
+  none,     ///< The Gaussians of the finest level alone.
   shipped,  ///< Those that a streamed set ships, or else built ones.
   built,    ///< Built from the finest level.
 };

@@ -11,7 +11,8 @@
 
 namespace gsnav {
 
-/// Result of reading a row: kept, or the reason why it was dropped.
+/// Result of reading a row: kept, or dropped because a value is not finite, its quaternion is zero or it
+/// is transparent.
 enum class RowFate : std::uint8_t { kept, non_finite, zero_quat, transparent };
 
 /// What packing changed: the largest error of any row.

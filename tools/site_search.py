@@ -1,0 +1,39 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Makes every word of the pages' titles and headings known to the search field of the site.
+
+Doxygen 1.9.4 compares the typed text with the beginning of a name or title only. widen() adds an entry for each
+heading and for each later word, so that "gpu" finds the page "On a GPU".
+"""
+import json
+import re
+
+ENTRY = re.compile(r"^  \['((?:[^'\\]|\\.)*?)_\d+',(\[.*\])\],?$", re.MULTILINE)
+WORD = re.compile(r"[A-Za-z0-9][\w-]*")
+FEW = frozenset(["a", "an", "and", "at", "by", "for", "from", "in", "is", "it", "of", "on", "or", "the", "to", "with"])
+
+
+def key(text):
+    """The form in which the page's script compares texts."""
+    return re.sub(r"[^a-z0-9\u0080-\uffff]", lambda m: f"_{ord(m.group()):02x}", text.lower())
+
+
+def widen(search, headings):
+    """Adds entries to the index of all names.
+
+    `search` is the folder of the search data. `headings` yields texts, addresses and titles of pages.
+    """
+    added = {}
+    for text, address, page in headings:
+        for k, word in enumerate(WORD.finditer(text)):
+            if (word.group().lower() not in FEW) if k else "#" in address:  # Doxygen knows how titles begin
+                script = "[{},[{},1,{}]]".format(*(json.dumps(part, ensure_ascii=False)
+                                                   for part in (text, address, page if page != text else "")))
+                added.setdefault(word.group()[0].lower(), {})[key(text[word.start():]), script] = None
+    letters = re.search(r'0: "([^"]*)"', (search / "searchdata.js").read_text(encoding="utf-8")).group(1)
+    for number, letter in enumerate(letters):
+        path = search / f"all_{number:x}.js"
+        entries = dict.fromkeys(ENTRY.findall(path.read_text(encoding="utf-8")))
+        entries |= added.get(letter, {})
+        lines = (f"  ['{name}_{k}',{script}]" for k, (name, script) in enumerate(sorted(entries)))
+        path.write_text("var searchData=\n[\n" + ",\n".join(lines) + "\n];\n", encoding="utf-8")
