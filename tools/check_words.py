@@ -47,6 +47,7 @@ RULES = {
     "person": "data are not persons: no 'one who', 'whoever', 'nobody', 'others get'",
     "per": "'3 ms per frame', not '3 ms a frame'",
     "many": "a number has a name: '64 rows at a time', not 'so many rows'; 'as many as' needs a noun",
+    "same": "'the same' names what it is the same as: 'the same holds for meshes', not 'the same holds here'",
     "possessive": "a noun follows 's: 'the scene's images', not 'they are the scene's'; no 'ours', 'theirs'",
     "of": "a sentence starts with its subject, not with 'Of ...'",
     "old": "plain words: no 'whence', 'lest', 'therein', 'but for', 'can be had', 'as the table has it'",
@@ -55,7 +56,8 @@ RULES = {
 
 UNIT = (r"(?:frame|pixel|tile|row|column|camera|second|minute|hour|episode|thread|core|lane|warp|block|splat|"
         r"gaussian|triangle|voxel|vertex|chunk|slice|byte|view|image|sensor|environment|call|axis|channel|node|joint|"
-        r"level|batch|ray|scene|avatar|agent|person|metre|layer|kernel|backend|file|line|cell|set|walker|sample)")
+        r"level|batch|ray|scene|avatar|agent|person|metre|layer|kernel|backend|file|line|cell|set|walker|sample|action|"
+        r"step)")
 COUNTED = (r"(?:ms|us|ns|milliseconds?|microseconds?|nanoseconds?|seconds|bytes|[KMG]i?B|gaussians|pixels|triangles|"
            r"voxels|threads|registers|allocations|multiplications|additions|times)")
 PERSONS = (r"(?i:people|persons?|users?|agents?|avatars?|walkers?|readers?|authors?|researchers?|engineers?|"
@@ -87,14 +89,17 @@ DEVICES = {
     "per": [rf"(?<![\w.-])\d[\d.,/x]*(?<![.,/])(?: (?!{SMALL}\b)[\w-]+)? an? {UNIT}\b{NO_VERB}",
             rf"\b{COUNTED} an? {UNIT}\b{NO_VERB}",
             rf"\b(?:one|once|twice|two|three|four)(?: (?!{SMALL}\b)[\w-]+)? an? {UNIT}(?=[.,;:)]|$)"],
-    "many": [r"\b[Ss]o (?:many|much)\b(?!.*\bthat\b)", r"\b[Aa]s (?:many|much)(?= as\b|[.,;:)]|$| of\b| at\b)"],
+    "many": [r"\b[Ss]o (?:many|much)\b(?!.*\bthat\b)", r"\b[Aa]s (?:many|much)(?= as\b|[.,;:)]|$| of\b| at\b)",
+             r"\b[Aa]s (?:many|much) (?!.* as\b)"],
+    "same": [r"\b[Tt]he same (?:holds?|is true|goes|applies|here|there)\b(?! (?:for|of|to|with|in) )"],
     "possessive": [r"\w's(?=[.;:,)]|$)", r"\b(?:[Oo]urs|[Tt]heirs)\b"],
     "of": [r"^Of (?!course\b)"],
     "old": [r"\b(?:[Ww]hence|[Tt]hence|[Ww]herein|[Ww]hereof|[Tt]hereof|[Tt]herein|[Tt]hereby|[Ll]est|[Aa]ught|"
             r"[Ff]orthwith)\b", r"\bbut for\b", r"\bas [\w ]{1,40} (?:has|have) it\b",
             r"\b(?:to|can|could) be had\b", r"\bas ever\b"],
     "history": [r"\btried (?:and|but) (?:not|dropped|given)", r"\b(?:was|were|is) formerly\b",
-                r"(?<!is )(?<!are )\bused to (?:be|have|take|do|give|go|make)\b", r"\bin earlier versions\b"],
+                r"(?<!is )(?<!are )\bused to (?:be|have|take|do|give|go|make)\b", r"\bin earlier versions\b",
+                r"\b[Pp]reviously\b", r"\b(?:was|were) [\w-]+ once\b"],
 }
 DEVICES = {rule: [re.compile(p) for p in patterns] for rule, patterns in DEVICES.items()}
 ABBREVIATION = re.compile(r"(?:\b(?:e\.g|i\.e|vs|etc|cf|Fig|Eq|Sec|No|approx|al|resp|incl|max|min)|^\W*\d+|\b[A-Z])$")

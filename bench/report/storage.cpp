@@ -29,14 +29,14 @@ constexpr std::array<StorageCodec, 8> kCodecs{{
     {"position_fixed24", "positions in 24 bit, 12 of them fraction (SPZ)", 1.0 / 4096, -kInf, kInf, 24,
      3},
     {"position_u16_8m", "positions in 16 bit within cells of 8 m", 8.0 / 65536, -kInf, kInf, 16, 3},
-    {"log_scale_8", "log-scales in 8 bit, 1/16 a step from -10 (SPZ)", 1.0 / 16, -10, 255.0 / 16 - 10, 8,
-     3},
+    {"log_scale_8", "log-scales in 8 bit, steps of 1/16 from -10 (SPZ)", 1.0 / 16, -10, 255.0 / 16 - 10,
+     8, 3},
     {"quat_10", "the three smallest components in 10 bit", kHalfSqrt2 / 511, -kHalfSqrt2, kHalfSqrt2, 8,
      4},
     {"opacity_8", "opacity in 8 bit", 1.0 / 255, 0, 1, 8, 1},
     {"sh0_8", "degree-0 colour in 8 bit, scale 0.15 (SPZ)", 1 / (0.15 * 255), -0.5 / 0.15, 0.5 / 0.15, 8,
      3},
-    {"shN_8", "higher SH in 8 bit, 1/128 a step (SPZ)", 1.0 / 128, -1, 127.0 / 128, 8, -1},
+    {"shN_8", "higher SH in 8 bit, steps of 1/128 (SPZ)", 1.0 / 128, -1, 127.0 / 128, 8, -1},
 }};
 
 /// The nearest point of the grid low + k step within the range; if low is infinite, of the grid k step.

@@ -73,8 +73,8 @@ void print_table(const Options& options, const SceneFacts& facts,
   row("steps/s (physics + RGB-D)",
       t.physics + t.render > 0 ? static_cast<double>(t.steps) / (t.physics + t.render) : 0.0, "%10.1f");
   row("render (ms, RGB-D in one pass)", 1e3 * per(t.render, t.renders), "%10.2f");
-  row("physics (ms a step)", 1e3 * per(t.physics, t.steps), "%10.3f");
-  row("policy (ms a step)", 1e3 * per(t.policy, t.steps), "%10.2f");
+  row("physics (ms per step)", 1e3 * per(t.physics, t.steps), "%10.3f");
+  row("policy (ms per step)", 1e3 * per(t.policy, t.steps), "%10.2f");
   std::printf("\n");
 }
 

@@ -164,7 +164,7 @@ Status make_from_mesh(const MeshCommand& c, bool makehuman) {
       100 * capsules->outside_greatest, 100 * capsules->over_mean, 100 * capsules->over_p99);
   std::printf(
       "of the body's %.1f l they leave %.2f %% uncovered (%.2f %% in the worst pose) and cover %.0f %% "
-      "as much outside\n",
+      "of its volume outside\n",
       1e3 * capsules->body_volume, 100 * capsules->uncovered_mean, 100 * capsules->uncovered_greatest,
       100 * capsules->over_volume);
   std::printf(

@@ -92,8 +92,8 @@ inline Status validate(const Selection& selection, std::size_t chunks) {
   if (!selection.seen.empty() && !seen_may_have(selection.seen.size, chunks)) {
     return {Errc::invalid_argument,
             "GaussianSet: selection.seen has " + std::to_string(selection.seen.size) + " words where " +
-                std::to_string(seen_chunk_words(chunks)) + " are needed, or twice as many and " +
-                std::to_string(kSeenRowWords) + " a chunk that is seen"};
+                std::to_string(seen_chunk_words(chunks)) + " are needed, or twice that and " +
+                std::to_string(kSeenRowWords) + " per visible chunk"};
   }
   if (selection.drawn_chunks.size > chunks) {
     return {Errc::invalid_argument, "GaussianSet: selection.drawn_chunks has " +
