@@ -11,7 +11,7 @@ A page names the source in a comment before a code block, and optionally a regio
 
 A C++ source marks a region with the lines `// [snippet: render]` and `// [/snippet]`, a Python or shell
 source with `# [snippet: render]`. Whole files are shown without their licence line and their markers. In
-README.md and docs/guide all C++ comes from sources.
+README.md, docs/guide and docs/concepts all C++ and Python comes from sources.
 
 usage: include_snippets.py                rewrite the code blocks of README.md and docs/**/*.md
        include_snippets.py --check        name each block that differs; exit status 1 if there is any
@@ -26,7 +26,8 @@ import tempfile
 import textwrap
 
 BLOCK = re.compile(r"^<!-- snippet: (\S+)(?: (\S+))? -->\n+```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-CPP_BLOCK = re.compile(r"^```(?:cpp|c\+\+|cuda)\n", re.MULTILINE)
+CODE_BLOCK = re.compile(r"^```(?:cpp|c\+\+|cuda|python|py)\n", re.MULTILINE)
+COMPILED = ("docs/guide", "docs/concepts")  # folders where all code comes from sources
 COMMENT = re.compile(r"^<!-- snippet:", re.MULTILINE)
 BEGIN = re.compile(r"\s*(?://|#) \[snippet: (\S+)\]$")
 END = re.compile(r"\s*(?://|#) \[/snippet\]$")
@@ -89,11 +90,11 @@ def rewritten(root, page):
         if comment.start() not in starts:
             line = text.count("\n", 0, comment.start()) + 1
             wrong.append(f"{name}:{line}: no code block follows this comment")
-    if name == pathlib.Path("README.md") or name.is_relative_to("docs/guide"):
+    if name == pathlib.Path("README.md") or any(name.is_relative_to(folder) for folder in COMPILED):
         blocks = [m.span() for m in BLOCK.finditer(text)]
-        for code in CPP_BLOCK.finditer(text):
+        for code in CODE_BLOCK.finditer(text):
             if not any(begin < code.start() < end for begin, end in blocks):
-                wrong.append(f"{name}:{text.count(chr(10), 0, code.start()) + 1}: C++ without a snippet comment")
+                wrong.append(f"{name}:{text.count(chr(10), 0, code.start()) + 1}: code without a snippet comment")
     return result, wrong
 
 
@@ -131,7 +132,8 @@ def self_test():
             ("<!-- snippet: examples/absent.cpp a -->\n```cpp\n```\n", "no such file", None),
             ("<!-- snippet: examples/s.cpp a -->\ntext\n", "no code block follows", None),
             ("<!-- snippet: examples/s.cpp -->\n```cpp\n```\n", "differs from examples/s.cpp", whole),
-            ("```cpp\nlone();\n```\n", "C++ without a snippet comment", None),
+            ("```cpp\nlone();\n```\n", "code without a snippet comment", None),
+            ("```python\nlone()\n```\n", "code without a snippet comment", None),
         ]
         failed = 0
         for text, finds, after in cases:

@@ -317,3 +317,24 @@ TEST_CASE("batch simulator: the bits of the template, on every device") {
   CHECK(BatchSimulator::create_from_library(Device(), nullptr, config, 1, episode_of).code() ==
         Errc::invalid_argument);
 }
+
+TEST_CASE("batch simulator: scenes from a library have the bits of scenes that are held") {
+  const auto episodes = generate_episodes(*flat()->navmesh, 4, 1).value();
+  const auto episode_of = [&episodes](std::size_t e, std::size_t k) -> Result<BatchEpisode> {
+    return BatchEpisode{(e + k) % 2, episodes[(2 * k + e) % episodes.size()]};
+  };
+  const BatchConfig config{small_rgbd()};
+  const Device device;
+  const auto load = []() -> Result<SimulatorScene> { return *flat(); };
+  // [snippet: library]
+  std::vector<gsnav::SceneEntry> entries{{"flat A", load}, {"flat B", load}};
+  auto library = gsnav::SceneLibrary::create(entries, std::size_t{8} << 30).value();  // 8 GiB
+  auto sim = gsnav::BatchSimulator::create_from_library(device, library, config, 2, episode_of).value();
+  // [/snippet]
+  auto want = BatchSimulator::create(device, {flat(), flat()}, config, 2, episode_of).value();
+  auto got = sim.reset().value(), expected = want.reset().value();
+  CHECK(sim.scene_of(0) == 0);
+  CHECK(sim.scene_of(1) == 1);
+  for (std::size_t i = 0; i < got.images.size(); ++i)
+    CHECK(std::ranges::equal(got.images[i].data, expected.images[i].data));
+}
