@@ -161,6 +161,8 @@ def self_test():
 if __name__ == "__main__":
     if sys.argv[1:] == ["--self-test"]:
         self_test()
+    elif sys.argv[1:2] in (["--help"], ["-h"]):
+        print(__doc__)
     else:
         tree = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else pathlib.Path(__file__).parents[1]
         checked, violations = check(tree)

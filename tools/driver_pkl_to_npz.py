@@ -137,9 +137,14 @@ def self_test():
 
 
 if __name__ == "__main__":
+    if sys.argv[1:2] in (["--help"], ["-h"]):
+        print(__doc__)
+        sys.exit()
     if numpy is None:
-        print("SKIP: NumPy is not there")
-        sys.exit(0 if sys.argv[1:] == ["--self-test"] else 1)
+        if sys.argv[1:] == ["--self-test"]:
+            print("SKIP: NumPy is not there")
+            sys.exit()
+        sys.exit("driver_pkl_to_npz.py: NumPy is missing: pip install numpy")
     if sys.argv[1:] == ["--self-test"]:
         self_test()
     elif len(sys.argv) == 3:

@@ -11,6 +11,11 @@
 # GSNAV_JOBS       number of parallel compilations, and of readers that run at a time
 set -euo pipefail
 
+if [[ ${1:-} == --help || ${1:-} == -h ]]; then
+  sed -n '4,11s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
+  exit 0
+fi
+[[ ${1:-20} =~ ^[0-9]+$ ]] || { echo "fuzz.sh: $1: seconds per reader are a whole number; see --help" >&2; exit 2; }
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 build=$root/build/asan-ubsan
 out=${GSNAV_FUZZ_OUT:-$root/build/fuzz}

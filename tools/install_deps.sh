@@ -15,6 +15,12 @@
 set -euo pipefail
 
 job=${1:-demo}
+usage() { sed -n '4,13s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"; }
+case $job in
+  demo | tests | ci) ;;
+  --help | -h) usage; exit 0 ;;
+  *) usage >&2; exit 2 ;;
+esac
 packages=(g++ cmake ninja-build libpng-dev libjpeg-dev libwebp-dev libzstd-dev zlib1g-dev nlohmann-json3-dev
           librecast-dev libcli11-dev)
 if [[ $job == tests || $job == ci ]]; then

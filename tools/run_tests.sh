@@ -16,6 +16,10 @@
 # GSNAV_FLAT_GENERATOR=FILE  source of the generator that test_flat draws; it is skipped without it
 set -euo pipefail
 
+if [[ ${1:-} == --help || ${1:-} == -h ]]; then
+  sed -n '4,16s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
+  exit 0
+fi
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 preset=${GSNAV_PRESET:-tests}
 build=$root/build/$preset

@@ -55,6 +55,10 @@ TEST_CASE("render tool: without cameras, views around the scene with its own gro
   CAPTURE(out.text);
   REQUIRE(out.ok);
   CHECK(out.says("up: +z, seen from the ground"));
+  write_file(folder / "none.json", "[]");
+  const Outcome none = run(folder, "--scene a.ply --out n --cameras none.json");
+  CHECK_FALSE(none.ok);
+  CHECK(none.says("none.json: has no cameras"));
   for (const char* name : {"o/0000.rgb.png", "o/0001.rgb.png", "o/0002.rgb.png"}) {
     CAPTURE(name);
     const io::PngImage image = io::load_png(folder / name).value();

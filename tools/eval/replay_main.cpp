@@ -265,7 +265,11 @@ int main(int argc, char** argv) try {
   app.add_option("--last", r.last, "last action to draw (default: the end)");
   app.add_flag("--inset", r.inset, "draw the agent's own view in the corner")->needs("--eye");
   if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
-  gsnav::Status s;
+  gsnav::Status s = gsnav_eval::can_write_video(r.video);
+  if (!s) {
+    std::fprintf(stderr, "gsnav-replay: %s\n", s.message().c_str());
+    return 1;
+  }
   if (const auto recorded = gsnav_eval::Journal::recorded_options(o.out); !recorded) {
     s = recorded.status();
   } else if (s = gsnav_eval::take_options(app, *recorded, o); !s) {

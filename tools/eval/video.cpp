@@ -6,8 +6,10 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <system_error>
 
 #include "gsnav/core/lower_case.hpp"
@@ -163,16 +165,35 @@ Result<std::unique_ptr<Video>> opened(const std::string& path, int width, int he
   return std::unique_ptr<Video>(std::move(video));
 }
 
+bool is_webp(const std::string& path) {
+  return gsnav::lower_case(fs::path(path).extension().string()) == ".webp";
+}
+
 }  // namespace
 
-Result<std::unique_ptr<Video>> open_video(const std::string& path, int width, int height, double rate) {
-  if (gsnav::lower_case(fs::path(path).extension().string()) != ".webp")
-    return opened<PipedVideo>(path, width, height, rate);
-#if defined(GSNAV_HAS_WEBPMUX)
-  return opened<AnimatedWebp>(path, width, height, rate);
-#else
-  return {Errc::unsupported, path + ": this build has no libwebpmux: use .mp4, or install libwebp-dev"};
+Status can_write_video(const std::string& path) {
+  if (path.empty()) return {};
+  if (is_webp(path)) {
+#if !defined(GSNAV_HAS_WEBPMUX)
+    return {Errc::unsupported,
+            "--video " + path + ": this build has no libwebpmux: use .mp4, or install libwebp-dev"};
 #endif
+    return {};
+  }
+  const char* const folders = std::getenv("PATH");
+  std::stringstream all(folders != nullptr ? folders : "");
+  for (std::string folder; std::getline(all, folder, ':');) {
+    if (::access((fs::path(folder) / "ffmpeg").c_str(), X_OK) == 0) return {};
+  }
+  return {Errc::unsupported, "--video " + path + ": ffmpeg is not installed; install it, or use .webp"};
+}
+
+Result<std::unique_ptr<Video>> open_video(const std::string& path, int width, int height, double rate) {
+  if (Status s = can_write_video(path); !s) return s;
+#if defined(GSNAV_HAS_WEBPMUX)
+  if (is_webp(path)) return opened<AnimatedWebp>(path, width, height, rate);
+#endif
+  return opened<PipedVideo>(path, width, height, rate);
 }
 
 }  // namespace gsnav_eval

@@ -20,6 +20,10 @@ class Video {
   virtual gsnav::Status close() = 0;
 };
 
+/// Checks, before any work, that a video can be written: a path that ends in .webp, or ffmpeg on the
+/// PATH. An empty path is right. Errors: unsupported, with a remedy.
+gsnav::Status can_write_video(const std::string& path);
+
 /// Opens a video of `rate` pictures per second. A path that ends in .webp gives an animated WebP by
 /// libwebpmux, every other path a video by ffmpeg. Errors: invalid_argument (the path, sizes),
 /// unsupported (ffmpeg cannot be run; a build without libwebpmux).

@@ -106,8 +106,8 @@ std::optional<int> parse_options(int argc, char** argv, Options& o) {
       "Renders RGB, depth and alpha images of a scene of 3D Gaussians.\nChoose cameras by --cameras, by "
       "--eye and --target, or by --orbit (views around the scene).\nWrites NNNN.rgb.npy ([H][W][3] "
       "float32, unclamped), NNNN.depth.npy and NNNN.alpha.npy\n([H][W] float32; metres, 0 = no return), "
-      "and the same as PNG.\nExample: gsnav-render --scene apartment.ply --cameras cameras.json --out "
-      "views"};
+      "and RGB and depth as PNG.\nExample: gsnav-render --scene apartment.ply --cameras cameras.json "
+      "--out views"};
   o.navmesh = "none";
   o.avatars = 0;
   add_images(app, o);

@@ -35,6 +35,7 @@ Result<std::vector<Camera>> cameras_of(const Options& o, const OpenedScene& scen
   if (!o.cameras.empty()) {
     auto cameras = io::load_cameras(o.cameras, o.width, o.height);
     if (!cameras) return cameras.status();
+    if (cameras->empty()) return {Errc::invalid_file, o.cameras + ": has no cameras"};
     if (scene.up == "keep") return cameras;
     const auto placed = upright(scene.up);
     if (!placed) return placed.status();
