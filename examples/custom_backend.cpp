@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <thread>
 #include <vector>
 
@@ -34,7 +35,7 @@ struct MyBackend {
 static_assert(gsnav::Backend<MyBackend>);
 // [/snippet]
 
-int main() {
+int main() try {
   // [snippet: use]
   const auto scene = gsnav::make_default_scene(0.1).value();
   const auto view = gsnav::default_scene_views()[0];
@@ -48,4 +49,6 @@ int main() {
   // [/snippet]
   std::puts(same ? "the same bits" : "other bits");
   return same ? 0 : 1;
+} catch (const std::exception& e) {
+  return std::fprintf(stderr, "%s\n", e.what()), 1;
 }

@@ -2,12 +2,13 @@
 // Renders sixteen environments and leaves their images in the memory of the GPU.
 // usage: on_gpu [DEVICE]
 #include <cstdio>
+#include <exception>
 #include <memory>
 
 #include "gsnav/demo.hpp"
 #include "gsnav/device/simulator.hpp"
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   // [snippet: device]
   auto device = gsnav::Device::parse(argc > 1 ? argv[1] : "cuda");
   if (!device) {  // the message lists the devices of this build and machine
@@ -35,4 +36,6 @@ int main(int argc, char** argv) {
   std::printf("%s: %zu images, %s\n", device->description().c_str(), rgb.environments,
               rgb.on_backend != nullptr ? "in the device's memory" : "in host memory");
   return (rgb.on_backend != nullptr) == (device->kind() == gsnav::DeviceKind::cuda) ? 0 : 1;
+} catch (const std::exception& e) {
+  return std::fprintf(stderr, "%s\n", e.what()), 1;
 }

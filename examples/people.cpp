@@ -2,6 +2,7 @@
 // Renders eight images of people who walk through the embedded flat.
 // usage: people [DEVICE]; writes people_0.png to people_7.png
 #include <cstdio>
+#include <exception>
 #include <memory>
 #include <string>
 
@@ -9,7 +10,7 @@
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/io.hpp"
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   // [snippet: people]
   auto device = gsnav::Device::parse(argc > 1 ? argv[1] : "best").value();
   auto scene =
@@ -30,4 +31,6 @@ int main(int argc, char** argv) {
     std::printf("\n");
   }
   // [/snippet]
+} catch (const std::exception& e) {
+  return std::fprintf(stderr, "%s\n", e.what()), 1;
 }

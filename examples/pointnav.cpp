@@ -2,12 +2,13 @@
 // Runs three PointNav episodes among people.
 // usage: pointnav [DEVICE]
 #include <cstdio>
+#include <exception>
 
 #include "gsnav/demo.hpp"
 #include "gsnav/device/simulator.hpp"
 #include "gsnav/sim/follower.hpp"
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   // [snippet: scene]
   auto device = gsnav::Device::parse(argc > 1 ? argv[1] : "best").value();
   auto scene = gsnav::default_simulator_scene(3).value();  // the embedded flat and three people
@@ -26,4 +27,6 @@ int main(int argc, char** argv) {
                 m.collision_rate, m.psi);
   }
   // [/snippet]
+} catch (const std::exception& e) {
+  return std::fprintf(stderr, "%s\n", e.what()), 1;
 }

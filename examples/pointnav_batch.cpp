@@ -2,12 +2,13 @@
 // Runs PointNav episodes in sixteen environments that share one scene.
 // usage: pointnav_batch [DEVICE]
 #include <cstdio>
+#include <exception>
 
 #include "gsnav/demo.hpp"
 #include "gsnav/device/simulator.hpp"
 #include "gsnav/sim/follower.hpp"
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   // [snippet: create]
   auto device = gsnav::Device::parse(argc > 1 ? argv[1] : "best").value();
   auto scene =
@@ -33,4 +34,6 @@ int main(int argc, char** argv) {
   }
   // [/snippet]
   std::printf("%zu episodes, SR %.2f\n", ended.size(), gsnav::summarize(ended).success_rate);
+} catch (const std::exception& e) {
+  return std::fprintf(stderr, "%s\n", e.what()), 1;
 }

@@ -2,6 +2,7 @@
 // Draws only the Gaussians that can be seen from the camera's cell. usage: view_cells [DEVICE]
 #include <cmath>
 #include <cstdio>
+#include <exception>
 #include <memory>
 
 #include "gsnav/demo.hpp"
@@ -9,7 +10,7 @@
 #include "gsnav/nav.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   auto device = gsnav::Device::parse(argc > 1 ? argv[1] : "best").value();
   auto flat = gsnav::default_simulator_scene(0, 1, 0.2).value();
   gsnav::SceneAsset& asset = flat.assets[0];
@@ -37,4 +38,6 @@ int main(int argc, char** argv) {
                 100 * static_cast<double>(drawn) / static_cast<double>(rows),
                 -10 * std::log10(squares / pixels));
   }
+} catch (const std::exception& e) {
+  return std::fprintf(stderr, "%s\n", e.what()), 1;
 }
