@@ -11,7 +11,7 @@
 #
 #   --out DIR          folder for scenes, references and results (default: out/benchmarks)
 #   --gaussians LIST   sizes of the flat (default: 100000,300000,1000000)
-#   --sizes LIST       image sizes (default: 256x256,640x480,1920x1080)
+#   --sizes LIST       image sizes (default: 256x256,640x480,1920x1080; on a GPU also 64x64 and 128x128)
 #   --cameras LIST     cameras per call on a GPU (default: 1,64,256)
 #   --no-gpu           processor alone
 #
@@ -23,7 +23,7 @@ set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 build="" out=$root/out/benchmarks gaussians=100000,300000,1000000 sizes=256x256,640x480,1920x1080 cameras=1,64,256
-rounds=2 gpu=1
+rounds=2 gpu=1 small="64x64 128x128"  # of a GPU, with the last of --cameras
 usage() { sed -n '4,21s/^# \{0,1\}//p' "$root/tools/benchmarks.sh"; }
 stop() { echo "benchmarks.sh: $*" >&2; exit 2; }
 while [[ $# -gt 0 ]]; do
@@ -33,7 +33,7 @@ while [[ $# -gt 0 ]]; do
       printf -v "${1#--}" '%s' "$2"
       shift
       ;;
-    --quick) gaussians=100000 sizes=256x256 rounds=1 ;;
+    --quick) gaussians=100000 sizes=256x256 small="" rounds=1 ;;
     --no-gpu) gpu=0 ;;
     --help | -h) usage; exit 0 ;;
     *) usage >&2; exit 2 ;;
@@ -91,9 +91,10 @@ if [[ $gpu == 1 ]]; then
          "depth p99, m | scratch, MB |"
     echo "|---|---|---:|---|---:|---:|---:|---:|---:|---:|"
     for count in ${gaussians//,/ }; do
-      for size in ${sizes//,/ }; do
+      for size in $small ${sizes//,/ }; do
         counts=1
         [[ $size != 256x256 ]] || counts=$cameras
+        [[ " $small " != *" $size "* ]] || counts=${cameras##*,}
         echo "GPU: $(of "$count"), $size" >&2
         # shellcheck disable=SC2086
         GSNAV_BENCH_SCENE=$out/flat_$count.ply GSNAV_BENCH_CAMERAS=$out/cameras.json \

@@ -173,6 +173,8 @@ def self_test():
 if __name__ == "__main__":
     if sys.argv[1:] == ["--self-test"]:
         self_test()
+    elif sys.argv[1:2] in (["--help"], ["-h"]):
+        print(__doc__)
     else:
         checked, violations = check(ROOT)
         print("\n".join(violations) or f"{checked} files are short")

@@ -3,7 +3,7 @@
 """Makes the table of CPU renderers in docs/benchmarks.md: time, error and memory of gsnav and baselines.
 
     tools/cpu_table.py --build build/dev            # the flats that gsnav-scene makes
-    tools/cpu_table.py --build build/dev --page     # writes the table into docs/benchmarks.md
+    tools/cpu_table.py --build build/dev
     tools/cpu_table.py --build build/dev --scene flat=flat.ply:cameras.json --baseline NAME=BINARY
 
 A scene is any file that gsnav-convert reads; all renderers get the same PLY. A baseline is a binary or a
@@ -28,7 +28,6 @@ PROFILES = ("exact", "fast")
 Baseline = collections.namedtuple("Baseline", "source least_gain")
 BASELINES = {"prototype": Baseline("proto.cpp", 2), "row renderer": Baseline("surrogate.cpp", 4)}
 FLATS = {"flat 100K": 100_000, "flat 300K": 300_000, "flat 1M": 1_000_000}
-MARKS = ("<!-- cpu-table: begin -->", "<!-- cpu-table: end -->")
 TIMEOUT_S = 900
 # Bound on spinning in GNU's OpenMP, for all renderers alike. Without it a waiting thread may occupy the core that
 # the working thread needs, for 8 ms at every barrier.
@@ -264,15 +263,6 @@ def summary(rows, threads, baselines):
     return "\n".join(lines)
 
 
-def put_into_page(text):
-    page = ROOT / "docs/benchmarks.md"
-    old = page.read_text()
-    if old.count(MARKS[0]) != 1 or old.count(MARKS[1]) != 1:
-        stop(f"docs/benchmarks.md lacks the lines {MARKS[0]} and {MARKS[1]}")
-    head, rest = old.split(MARKS[0])
-    page.write_text(head + MARKS[0] + "\n" + text + "\n" + MARKS[1] + rest.split(MARKS[1])[1])
-
-
 def parse_options():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", type=pathlib.Path, required=True,
@@ -293,7 +283,6 @@ def parse_options():
                         help="folder for scenes, binaries and references (default: BUILD/cpu_table)")
     parser.add_argument("--out", type=pathlib.Path,
                         help="Markdown file, with JSON next to it (default: CACHE/table.md)")
-    parser.add_argument("--page", action="store_true", help="replace the marked block of docs/benchmarks.md")
     options = parser.parse_args()
     options.build = options.build.resolve()
     if not (options.build / "CMakeCache.txt").exists():
@@ -322,8 +311,6 @@ def main():
     options.out.write_text(text + "\n")
     options.out.with_suffix(".json").write_text(json.dumps(rows, indent=1) + "\n")
     print(text + "\n\n" + summary(rows, options.threads, names))
-    if options.page:
-        put_into_page(text)
 
 
 if __name__ == "__main__":

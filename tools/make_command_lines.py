@@ -33,7 +33,7 @@ HEAD = """# Command lines
 <!-- Made by tools/make_command_lines.py; do not edit. -->
 
 For people who use gsnav's programs. After reading you know every option of every program. Each program
-prints the same for `--help`.
+prints the same for `--help`, in longer lines.
 
 | program | what it does |
 |---|---|

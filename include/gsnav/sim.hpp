@@ -18,6 +18,7 @@
 #include "gsnav/detail/sim/sensor.hpp"
 #include "gsnav/detail/sim/start_times.hpp"
 #include "gsnav/detail/sim/task.hpp"
+#include "gsnav/detail/sim/team.hpp"
 #include "gsnav/device/device.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/device/simulator.hpp"

@@ -70,7 +70,8 @@ Result<LoadedCloud> load_one(const fs::path& path, const LoadSceneOptions& optio
   if (fs::is_directory(path, ignored)) {
     if (fs::exists(path / "meta.json", ignored)) return load_sog(path);
     if (fs::exists(path / "lod-meta.json", ignored)) return load_lod_set(path, lod);
-    return {Errc::file_not_found, name + ": the folder has no meta.json and no lod-meta.json"};
+    return {Errc::file_not_found,
+            name + ": the folder has no meta.json and no lod-meta.json; name a file in it"};
   }
   const std::string extension = lower_case(path.extension().string());
   if (extension == ".ply") return load_ply_at(path, options, apart);

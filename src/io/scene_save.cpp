@@ -62,10 +62,11 @@ std::optional<SceneWriter> writer_of(const std::filesystem::path& path) {
 }
 
 Status unknown_name(const std::filesystem::path& path) {
-  return {Errc::unsupported,
-          path.string() +
-              ": not a name that is written here: .ply, .compressed.ply, .splat, .spz, "
-              ".sog, meta.json or .glb"};
+  return {
+      Errc::unsupported,
+      path.string() +
+          ": unknown kind of file to write: use .ply, .compressed.ply, .splat, .spz, .sog, meta.json "
+          "or .glb"};
 }
 
 }  // namespace

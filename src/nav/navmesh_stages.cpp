@@ -122,7 +122,7 @@ Status check_grid(const NavMeshSettings& settings, const Vec3d& low, const Vec3d
   if (!(columns < most && rows < most &&
         (columns + 1) * (rows + 1) <= static_cast<double>(settings.max_cells))) {
     return Status(Errc::invalid_argument, "NavMesh: a grid of " + size() +
-                                              " exceeds 65000 a side or NavMeshSettings.max_cells = " +
+                                              " exceeds 65000 per side or NavMeshSettings.max_cells = " +
                                               std::to_string(settings.max_cells) +
                                               "; raise cell_size or crop the scene");
   }

@@ -325,7 +325,7 @@ TEST_CASE("convert: a name that cannot be written is said before anything is rea
     CHECK(out.says(part));
     CHECK_FALSE(out.says("absent.ply"));
   };
-  says("absent.ply out.txt", "out.txt: not a name that is written here");
+  says("absent.ply out.txt", "out.txt: unknown kind of file to write");
   says("absent.ply none/out.ply", "none does not exist");
   std::filesystem::create_directory(folder / "folder.ply");
   says("absent.ply folder.ply", "it is a folder");
@@ -486,7 +486,7 @@ TEST_CASE("convert: what cannot be done is said") {
     CHECK(out.text.find(part) != std::string::npos);
   };
   says("none.ply out.ply", "none.ply");
-  says("a.ply out.txt", "not a name that is written here");
+  says("a.ply out.txt", "unknown kind of file to write");
   says("a.ply none/out.ply", "none does not exist");
   says("a.ply out.ply --crop 100 100 100 101 101 101", "no Gaussian is left");
   says("a.ply out.ply --rotate 0 0 0 90", "the axis is zero");

@@ -181,7 +181,6 @@ class Tree(unittest.TestCase):
         html = self.root / "out/html"
         self.write("out/html/b.html", '<a id="it"></a>')
         for link, said in (('<a href="b.html#it">', ""), ('<a href="#own">', ""), ('<a href="https://a.b/#c">', ""),
-                           ('<a href="b.html#nested-classes">', ""),
                            ('<a href="c.html">', "c.html: there is no such file"),
                            ('<img src="../b.png"/>', "../b.png: there is no such file"),
                            ('<a href="b.html#own">', "b.html#own: there is no such anchor"),

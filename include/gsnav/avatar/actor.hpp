@@ -85,9 +85,9 @@ class AvatarActor {
   double blend_begin() const noexcept { return options_.loop_period - options_.loop_blend; }
   bool blending(double t) const noexcept { return options_.loop_blend > 0 && t > blend_begin(); }
 
-  /// Narrows [from, to] to the time during which the actor is present, on a looping clock. An actor that
-  /// does not blend is absent while the clock wraps. If it is present at neither end, the interval
-  /// becomes the first stay between them. Returns false if it is never present.
+  /// Narrows [from, to] to the time during which the actor is present, on a looping clock. An actor
+  /// without a blend (loop_blend = 0) is absent while the clock wraps. If it is present at neither end,
+  /// the interval becomes the first stay between them. Returns false if it is never present.
   bool narrow_to_stay(double& from, double& to) const noexcept;
 
   /// `needed` [J] marks the joints to pose; null means all joints.

@@ -53,7 +53,7 @@ inline constexpr std::size_t kSeenRowWords = kProjectChunk / 32;
 /// Rows of a chunk that may be visible, one bit per row. Without words, all rows may be.
 struct SeenRows {
   const std::uint32_t* words = nullptr;  ///< [kSeenRowWords], or null
-  /// Bits of the rows 32 k to 32 k + 31.
+  /// Visibility of the rows 32 k to 32 k + 31, the first row in the lowest bit. All ones without words.
   GSNAV_HD std::uint32_t word(std::size_t k) const noexcept { return words == nullptr ? ~0u : words[k]; }
   /// True if `row` may be visible.
   GSNAV_HD bool has(std::size_t row) const noexcept { return (word(row / 32) >> (row % 32) & 1u) != 0; }

@@ -228,8 +228,9 @@ class NavMesh {
   /// @param island Sample this island only. If it does not exist, the result has no polygon (kNoPoly).
   NavPoint random_point(Rng& rng, std::optional<std::size_t> island = {}) const;
   /// Random point, uniform over the part of the surface within `radius` metres (3D) of p.
-  /// @return nothing if that part is empty, or smaller than about 1/1000 of the surface in the vertical
-  /// column of width 2 * radius around p.
+  /// @return nothing if that part is empty, or too small for the sampler to find. The sampler searches
+  /// the surface in the square column of width 2 * radius around p. It finds parts that have at least
+  /// about 1/1000 of that surface.
   std::optional<NavPoint> random_point_near(Rng& rng, const Vec3d& p, double radius,
                                             std::optional<std::size_t> island = {}) const;
   /// Ground-plane distance from p to the nearest boundary edge, metres. p is snapped first. Only edges

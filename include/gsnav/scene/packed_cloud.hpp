@@ -99,7 +99,8 @@ inline std::array<std::uint16_t, 3> pack_quat(const Quatd& q) noexcept {
   return out;
 }
 
-/// Fills the steps and codes of a cloud's positions, shapes and opacities.
+/// Quantizes positions, shapes and opacities of a cloud: the codes of its rows and the steps of its
+/// chunks.
 inline void pack_shapes(const GaussianCloud& cloud, PackedCloud& out) {
   const std::size_t n = cloud.size();
   out.codes = huge_vector<std::uint16_t>(ShapeRows::kCodePlanes * n);

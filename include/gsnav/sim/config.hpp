@@ -41,7 +41,7 @@ struct SimulatorConfig {
   std::uint64_t seed = 0;  ///< Seed of the sensor noise.
 };
 
-/// Part of the assets that a simulator with this configuration draws.
+/// Settings for levels of detail and visible sets. They decide which Gaussians a simulator draws.
 inline DetailChoice detail_choice(const SimulatorConfig& config) {
   return {config.lod, config.visible_sets};
 }
