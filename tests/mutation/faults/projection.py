@@ -27,7 +27,7 @@ FAULTS = [
 """,
           EXPONENT, "N07_alpha_long_needle", "N08_power_sign",
           why="positive powers and holes in long needles"),
-    fault("exponent_from_the_corner", "column_exponent", "const L w2 = fma(py - ref_y, b, terms.w2);",
+    fault("exponent_from_the_corner", "column_exponent", "const L w2 = whitened_2(terms.w2, py - ref_y, b);",
           "const L w2 = fma(py, b, fma(-ref_y, b, terms.w2));",
           EXPONENT, "N07_alpha_long_needle", why="offsets from the image's corner cancel"),
     fault("response_ignored", "splat_exponent", "if (along_rays) return perspective_exponent",
