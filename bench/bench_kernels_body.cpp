@@ -105,14 +105,12 @@ struct Poses {
   std::vector<std::int32_t> parents;
   std::vector<Quat<S>> rotations;
   std::vector<Vec3<S>> translations;
-  std::vector<Affine3<S>> inverse_binds, globals, matrices;
+  std::vector<Affine3<S>> globals;
 
   explicit Poses(std::size_t actors) {
     Rng rng(13);
     for (std::size_t j = 0; j < kJoints; ++j) {
       parents.push_back(j == 0 ? -1 : static_cast<std::int32_t>((j - 1) / 2));
-      inverse_binds.push_back(
-          {Mat3<S>::identity(), vec_cast<S>(Vec3d{rng.uniform(-1, 1), rng.uniform(-1, 1), 0})});
     }
     for (std::size_t i = 0; i < actors * kJoints; ++i) {
       const Quat<double> q = random_turn(rng, 1);
@@ -121,17 +119,15 @@ struct Poses {
       translations.push_back(vec_cast<S>(Vec3d{0.1 * rng.normal(), 0.3, 0.1 * rng.normal()}));
     }
     globals.resize(actors * kJoints);
-    matrices.resize(actors * kJoints);
   }
-  ForwardKinematics<S> kernel() {
-    ForwardKinematicsArgs<S> args;
-    args.parents = view_of(std::as_const(parents));
-    args.rotations = view_of(std::as_const(rotations));
-    args.translations = view_of(std::as_const(translations));
-    args.inverse_binds = view_of(std::as_const(inverse_binds));
-    args.globals = view_of(globals);
-    args.joint_matrices = view_of(matrices);
-    return {args};
+  /// Callable that poses actor a.
+  auto kernel() {
+    return [parents = view_of(std::as_const(parents)), rotations = rotations.data(),
+            translations = translations.data(), globals = globals.data()](std::size_t a) noexcept {
+      const std::size_t at = a * kJoints;
+      forward_kinematics<S>(parents, {rotations + at, kJoints}, {translations + at, kJoints},
+                            {globals + at, kJoints});
+    };
   }
 };
 
@@ -140,7 +136,7 @@ struct KinematicsBody {
   void operator()(benchmark::State& state, B& backend) const {
     constexpr std::size_t kActors = 256;
     Poses<S> poses(kActors);
-    const ForwardKinematics<S> kernel = poses.kernel();
+    const auto kernel = poses.kernel();
     for (auto _ : state) {
       backend.parallel_for(kActors, kernel);
       benchmark::ClobberMemory();
@@ -149,12 +145,12 @@ struct KinematicsBody {
     Poses<double> truth(kActors);
     SerialBackend().parallel_for(kActors, truth.kernel());
     double position = 0, rotation = 0;
-    for (std::size_t i = 0; i < truth.matrices.size(); ++i) {
-      const Affine3<double> m = affine_cast<double>(poses.matrices[i]);
+    for (std::size_t i = 0; i < truth.globals.size(); ++i) {
+      const Affine3<double> m = affine_cast<double>(poses.globals[i]);
       for (int r = 0; r < 3; ++r) {
-        position = std::max(position, std::abs(m.translation[r] - truth.matrices[i].translation[r]));
+        position = std::max(position, std::abs(m.translation[r] - truth.globals[i].translation[r]));
         for (int c = 0; c < 3; ++c) {
-          rotation = std::max(rotation, std::abs(m.linear(r, c) - truth.matrices[i].linear(r, c)));
+          rotation = std::max(rotation, std::abs(m.linear(r, c) - truth.globals[i].linear(r, c)));
         }
       }
     }

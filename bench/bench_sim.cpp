@@ -151,7 +151,7 @@ void pose_crowd(benchmark::State& state) {
   double worst = 0.0;
   std::vector<Affine3<double>> joints;
   for (std::size_t i = 0; i < kPeople; ++i) {
-    people[i].joint_matrices(t, joints);
+    people[i].joint_globals(t, joints);
     const std::vector<Vec3d> centers = skinned_centers(*body, joints);
     const ShapeRows v = crowd.set(i).gaussians.shape;
     for (std::size_t k = 0; k < centers.size(); ++k) {

@@ -9,8 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/detail/skin/fk.hpp"
-
 namespace gsnav {
 
 Result<AvatarActor> AvatarActor::create(std::shared_ptr<const AvatarAsset> asset,
@@ -83,7 +81,7 @@ void AvatarActor::joint_matrices(double t, std::vector<Affine3<double>>& out) co
 }
 
 void AvatarActor::to_joint_matrices(std::vector<Affine3<double>>& globals) const {
-  for (std::size_t j = 0; j < globals.size(); ++j) globals[j] = globals[j] * inverse_binds_[j];
+  gsnav::to_joint_matrices(globals, inverse_binds_);
 }
 
 template <class F>
@@ -91,14 +89,7 @@ void AvatarActor::for_each_capsule(double t, const F& f) const {
   thread_local LocalPose pose;
   thread_local std::vector<Affine3<double>> globals;
   const Similarity world = placement(t, pose, &holds_capsules_);
-  const Skeleton& skeleton = asset_->skeleton;
-  globals.resize(skeleton.size());
-  // Only the joints that capsules depend on.
-  for (std::size_t j = 0; j < globals.size(); ++j) {
-    if (holds_capsules_[j] == 0) continue;
-    const Affine3<double> local{rotation_matrix(pose.rotations[j]), pose.translations[j]};
-    globals[j] = joint_global(globals.data(), skeleton.parents[j], local);
-  }
+  forward_kinematics(asset_->skeleton, pose, globals, holds_capsules_);
   for (std::size_t c = 0; c < asset_->capsules.size(); ++c) {
     const ProxyCapsule& proxy = asset_->capsules[c];
     const Affine3<double>& g = globals[proxy.joint];

@@ -112,14 +112,15 @@ Status Skeleton::validate() const {
 }
 
 void forward_kinematics(const Skeleton& skeleton, const LocalPose& pose,
-                        std::vector<Affine3<double>>& globals) {
+                        std::vector<Affine3<double>>& globals, const std::vector<char>& needed) {
   globals.resize(skeleton.size());
-  ForwardKinematicsArgs<double> args;
-  args.parents = view_of(skeleton.parents);
-  args.rotations = view_of(pose.rotations);
-  args.translations = view_of(pose.translations);
-  args.globals = view_of(globals);
-  ForwardKinematics<double>{args}(0);
+  forward_kinematics<double>(view_of(skeleton.parents), view_of(pose.rotations),
+                             view_of(pose.translations), view_of(globals), view_of(needed));
+}
+
+void to_joint_matrices(std::vector<Affine3<double>>& globals,
+                       const std::vector<Affine3<double>>& bind_inverses) noexcept {
+  for (std::size_t j = 0; j < globals.size(); ++j) globals[j] = globals[j] * bind_inverses[j];
 }
 
 }  // namespace gsnav

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-#include <cmath>
 #include <string>
 #include <vector>
 
@@ -165,20 +163,6 @@ Result<AvatarScene> load_avatar_scene(const fs::path& path) {
     if (!json) return json.status();
     return SceneReader(path, *json).run();
   });
-}
-
-double scene_time(const AvatarScene& scene, const std::vector<AvatarActor>& actors,
-                  double seconds) noexcept {
-  double last = scene.time_max;
-  if (scene.time_loop && !actors.empty() && actors[0].options().loop_period > 0)
-    last = actors[0].options().loop_period;
-  if (!(last > 0)) {
-    for (const AvatarActor& a : actors) {
-      if (std::isfinite(a.options().time_end)) last = std::max(last, a.options().time_end);
-    }
-  }
-  if (!(last > 0)) return seconds;
-  return scene.time_loop ? seconds - std::floor(seconds / last) * last : std::clamp(seconds, 0.0, last);
 }
 
 }  // namespace gsnav::io

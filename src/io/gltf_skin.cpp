@@ -7,6 +7,7 @@
 #include <string>
 
 #include "file.hpp"
+#include "gsnav/skin/lbs.hpp"
 
 namespace gsnav::io {
 namespace detail {
@@ -26,19 +27,22 @@ class RigidError final : public PoseObserver {
   void look(const std::vector<Affine3<double>>& globals) override {
     const std::size_t joints = skin_.nodes.size();
     std::vector<Affine3<double>> rigid = rigid_joints(skin_, globals), full(joints);
+    to_joint_matrices(rigid, mesh_.skeleton.inverse_binds);
     for (std::size_t j = 0; j < joints; ++j) {
-      rigid[j] = rigid[j] * mesh_.skeleton.inverse_binds[j];
       full[j] = Affine3<double>{turn_, {}} * (globals[skin_.nodes[j]] * skin_.inverse_binds[j]);
     }
     const std::size_t k = mesh_.influences;
     for (std::size_t v = 0; v < raw_.size(); ++v) {
-      Vec3d a{}, b{};
-      for (std::size_t i = v * k; i < (v + 1) * k; ++i) {
-        const double w = static_cast<double>(mesh_.weights[i]);
-        a += (full[mesh_.joint_indices[i]] * raw_[v]) * w;
-        b += (rigid[mesh_.joint_indices[i]] * mesh_.positions[v]) * w;
-      }
-      worst = std::max(worst, norm(a - b));
+      const auto place = [&](const std::vector<Affine3<double>>& by, const Vec3d& x) {
+        const auto joint = [&](int i) -> const Affine3<double>& {
+          return by[mesh_.joint_indices[v * k + static_cast<std::size_t>(i)]];
+        };
+        const auto weight = [&](int i) {
+          return static_cast<double>(mesh_.weights[v * k + static_cast<std::size_t>(i)]);
+        };
+        return blend_influences(static_cast<int>(k), joint, weight) * x;
+      };
+      worst = std::max(worst, norm(place(full, raw_[v]) - place(rigid, mesh_.positions[v])));
     }
   }
   double worst = 0.0;

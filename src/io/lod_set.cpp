@@ -54,7 +54,7 @@ class LodReader {
     return out;
   }
 
-  Result<LoadedLodSet> run_levels() {
+  Result<std::optional<LoadedLodSet>> run_levels() {
     if (Status s = read(true); !s) return s;
     LoadedLodSet out;
     std::vector<LodLevel> levels;
@@ -75,13 +75,14 @@ class LodReader {
       out.report.warnings.push_back(std::to_string(dropped) +
                                     " rows of coarser levels are not drawn: transparent or not finite");
     }
+    if (!gsnav::detail::fills_chunks(levels, nodes_ + 1)) return std::optional<LoadedLodSet>();
     PoolBackend backend(threads_for(levels[0].cloud.size()) == 1 ? 1 : detail::io_threads());
     auto joined = join_levels(backend, std::move(levels), nodes_ + 1);
     if (!joined) return Status(joined.code(), source_ + ": " + joined.message());
     out.cloud = std::move(joined->cloud);
     out.tree = std::move(joined->tree);
     describe(out.cloud, out.report, {0, -1, 0});
-    return out;
+    return std::optional<LoadedLodSet>(std::move(out));
   }
 
  private:
@@ -286,7 +287,8 @@ Result<LoadedCloud> load_lod_set(const std::filesystem::path& path, const LoadLo
   });
 }
 
-Result<LoadedLodSet> load_lod_levels(const std::filesystem::path& path, const LoadLodOptions& options) {
+Result<std::optional<LoadedLodSet>> load_lod_levels(const std::filesystem::path& path,
+                                                    const LoadLodOptions& options) {
   return detail::guarded(path.string(), [&] {
     std::error_code ignored;
     const bool folder = std::filesystem::is_directory(path, ignored);

@@ -234,17 +234,17 @@ Result<std::optional<LoadedLodSet>> load_shipped_levels(const std::string& spec,
         folder ? !fs::exists(path / "meta.json", ignored) && fs::exists(path / "lod-meta.json", ignored)
                : path.filename() == "lod-meta.json" && fs::exists(path, ignored);
     if (!set) return std::optional<LoadedLodSet>();
-    auto levels = load_lod_levels(path, {.level = options.level});
-    if (levels.code() == Errc::unsupported) return std::optional<LoadedLodSet>();
-    if (!levels) return levels.status();
-    if (levels->tree.merged.size() == 0) return std::optional<LoadedLodSet>();
-    const LoadReport before = levels->report;
+    auto read = load_lod_levels(path, {.level = options.level});
+    if (!read) return read.status();
+    std::optional<LoadedLodSet>& levels = *read;
+    if (!levels || levels->tree.merged.size() == 0) return std::optional<LoadedLodSet>();
+    const auto kept = levels->report.kept;
     GaussianCloud& merged = levels->tree.merged;
     if (!options.keep_zero_bands)
       levels->report.sh_bytes_let_go += limit_sh_degree(merged, sh_degree_in_use(merged));
     store(levels->cloud, levels->report, options);
-    levels->report.kept = before.kept;
-    return std::optional<LoadedLodSet>(std::move(*levels));
+    levels->report.kept = kept;
+    return read;
   });
 }
 

@@ -56,12 +56,4 @@ std::vector<NavLevel> find_levels(const NavMesh& mesh, const LevelOptions& optio
   return levels;
 }
 
-std::optional<std::size_t> level_at(std::span<const NavLevel> levels, double y,
-                                    double tolerance) noexcept {
-  if (levels.empty() || std::isnan(y)) return {};
-  std::size_t at = 0;
-  while (at + 1 < levels.size() && levels[at + 1].height <= y + tolerance) ++at;
-  return at;
-}
-
 }  // namespace gsnav

@@ -171,13 +171,10 @@ CapsuleReport measure_capsules(const AvatarAsset& asset, const std::vector<Proxy
   CapsuleReport report;
   report.capsules = capsules.size();
   report.poses = poses.size();
-  const std::vector<Affine3<double>> inverse = asset.skeleton.bind_inverses();
   double sum = 0.0;
   std::vector<double> over;
   for (const auto& pose : poses) {
-    std::vector<Affine3<double>> joints(pose.size());
-    for (std::size_t j = 0; j < pose.size(); ++j) joints[j] = pose[j] * inverse[j];
-    const std::vector<Vec3d> centers = skinned_centers(asset, joints);
+    const std::vector<Vec3d> centers = skinned_centers(asset, pose);
     std::vector<Capsule<double>> placed;
     for (const ProxyCapsule& c : capsules)
       placed.push_back({pose[c.joint] * c.p0, pose[c.joint] * c.p1, c.radius});
@@ -249,14 +246,11 @@ Result<CapsuleReport> fit_body_capsules(AvatarAsset& asset,
 
   const std::size_t row = static_cast<std::size_t>(asset.influences);
   const std::vector<std::size_t> owner = capsule_owners(asset, options);
-  const std::vector<Affine3<double>> inverse = asset.skeleton.bind_inverses();
   std::vector<std::vector<Vec3d>> local(asset.skeleton.size());
   // A percentile does not need all centres: use each Gaussian in some of the poses only.
   const std::size_t stride = max<std::size_t>(1, asset.size() * poses.size() / 2000000);
   for (std::size_t s = 0; s < poses.size(); ++s) {
-    std::vector<Affine3<double>> joints(poses[s].size());
-    for (std::size_t j = 0; j < joints.size(); ++j) joints[j] = poses[s][j] * inverse[j];
-    const std::vector<Vec3d> centers = skinned_centers(asset, joints);
+    const std::vector<Vec3d> centers = skinned_centers(asset, poses[s]);
     for (std::size_t i = s % stride; i < centers.size(); i += stride) {
       const std::size_t j = owner[asset.joint_indices[i * row]];
       local[j].push_back(rigid_inverse(poses[s][j]) * centers[i]);

@@ -11,38 +11,29 @@
 
 namespace gsnav {
 
-std::vector<Vec3d> skinned_centers(const AvatarAsset& asset,
-                                   const std::vector<Affine3<double>>& joints) {
-  std::vector<Vec3d> out(asset.size());
-  const std::size_t row = static_cast<std::size_t>(asset.influences);
+std::vector<Vec3d> skinned_centers(const AvatarAsset& asset, std::vector<Affine3<double>> globals) {
+  to_joint_matrices(globals, asset.skeleton.bind_inverses());
+  std::vector<DualQuat<double>> duals;
   if (asset.skinning == Skinning::dual_quaternion) {
-    std::vector<DualQuat<double>> duals;
-    for (const Affine3<double>& m : joints) duals.push_back(dual_quat(m));
-    SkinningArgs<double, double> args;
-    args.influences = asset.influences;
-    args.joint_indices = view_of(asset.joint_indices);
-    args.weights = view_of(asset.skinning_weights);
-    args.dual_joints = view_of(duals);
-    const SkinGaussianDual<double, double> kernel{args};
-    for (std::size_t i = 0; i < out.size(); ++i)
-      out[i] = skin(kernel.blend(i), asset.cloud.mean(i), Quatd{}).mean;
-    return out;
+    for (const Affine3<double>& m : globals) duals.push_back(dual_quat(m));
   }
+  SkinningArgs<double, double> args;
+  args.influences = asset.influences;
+  args.joint_indices = view_of(asset.joint_indices);
+  args.weights = view_of(asset.skinning_weights);
+  args.joints = view_of(std::as_const(globals));
+  args.dual_joints = view_of(std::as_const(duals));
+  std::vector<Vec3d> out(asset.size());
   for (std::size_t i = 0; i < out.size(); ++i) {
     const Vec3d p = asset.cloud.mean(i);
-    for (std::size_t k = i * row; k < (i + 1) * row; ++k) {
-      if (asset.skinning_weights[k] > 0) {
-        out[i] += (joints[asset.joint_indices[k]] * p) * weight_of_parts(asset.skinning_weights[k]);
-      }
-    }
+    out[i] = duals.empty() ? blended_joint(args, i) * p : skin(blended_dual(args, i), p, Quatd{}).mean;
   }
   return out;
 }
 
 void fit_capsules(AvatarAsset& asset, const std::vector<std::vector<Affine3<double>>>& poses,
                   double percentile) {
-  const std::vector<Affine3<double>> rest = asset.skeleton.rest_globals(),
-                                     inverse = asset.skeleton.bind_inverses();
+  const std::vector<Affine3<double>> rest = asset.skeleton.rest_globals();
   std::vector<ProxyCapsule>& capsules = asset.capsules;
   std::vector<std::vector<std::size_t>> members(capsules.size());
   for (std::size_t i = 0; i < asset.size(); ++i) {
@@ -63,11 +54,7 @@ void fit_capsules(AvatarAsset& asset, const std::vector<std::vector<Affine3<doub
     members[to].push_back(i);
   }
   std::vector<std::vector<Vec3d>> centers;
-  for (const auto& pose : poses) {
-    std::vector<Affine3<double>> joints(pose.size());
-    for (std::size_t j = 0; j < pose.size(); ++j) joints[j] = pose[j] * inverse[j];
-    centers.push_back(skinned_centers(asset, joints));
-  }
+  for (const auto& pose : poses) centers.push_back(skinned_centers(asset, pose));
   std::vector<ProxyCapsule> fitted;
   for (std::size_t c = 0; c < capsules.size(); ++c) {
     if (members[c].empty()) continue;

@@ -15,15 +15,12 @@ using namespace gsnav_test;
 
 namespace {
 
-std::vector<Affine3<double>> joints_at(const WalkMotion& walk, double cycles, double walking,
-                                       std::vector<Affine3<double>>& globals) {
+std::vector<Affine3<double>> globals_at(const WalkMotion& walk, double cycles, double walking) {
   LocalPose pose;
   walk.pose(cycles, walking, 0, pose);
+  std::vector<Affine3<double>> globals;
   forward_kinematics(person()->skeleton, pose, globals);
-  const auto inverse = person()->skeleton.bind_inverses();
-  std::vector<Affine3<double>> out;
-  for (std::size_t j = 0; j < globals.size(); ++j) out.push_back(globals[j] * inverse[j]);
-  return out;
+  return globals;
 }
 
 }  // namespace
@@ -74,7 +71,7 @@ TEST_CASE("there are no holes: every surface point has neighbours in all directi
   const WalkMotion walk = WalkMotion::create(a.skeleton).value();
   for (const double phase : {0.0, 0.3, 0.7}) {
     std::vector<Affine3<double>> globals;
-    const auto posed = skinned_centers(a, joints_at(walk, phase, 1.0, globals));
+    const auto posed = skinned_centers(a, globals_at(walk, phase, 1.0));
     // Gaussians that were within reach of each other stay so, but for the inside of bent joints, where
     // they come nearer.
     double stretched = 0;
@@ -119,8 +116,7 @@ TEST_CASE("standing feet do not slide, and nothing goes through the floor") {
         double low = 1e9, high = -1e9;
         for (int k = 0; k <= 100; ++k) {
           const double p = from + (to - from) * k / 100, cycles = p + (side == 0 ? 0.0 : 0.5) + 3;
-          std::vector<Affine3<double>> g;
-          joints_at(walk, cycles, 1.0, g);
+          const auto g = globals_at(walk, cycles, 1.0);
           const Vec3d at = g[ankle[side]] * (part == 0 ? heel : toes);
           const double z = at.z - cycles * walk.stride();  // the root goes along -Z
           low = std::min(low, z);
@@ -136,8 +132,7 @@ TEST_CASE("standing feet do not slide, and nothing goes through the floor") {
     CHECK(lift < 0.005);
     double lowest = 1;
     for (int k = 0; k < 40; ++k) {
-      std::vector<Affine3<double>> g;
-      for (const Vec3d& p : skinned_centers(a, joints_at(walk, k / 40.0, 1.0, g)))
+      for (const Vec3d& p : skinned_centers(a, globals_at(walk, k / 40.0, 1.0)))
         lowest = std::min(lowest, p.y);
     }
     MESSAGE("lowest Gaussian " << 1e3 * lowest << " mm");
@@ -207,16 +202,15 @@ TEST_CASE("arms swing against the legs") {
   const auto at = [](const char* name) {
     return static_cast<std::size_t>(person()->skeleton.find(name));
   };
-  std::vector<Affine3<double>> g;
-  joints_at(walk, 0.0, 1.0, g);  // right heel strikes
+  auto g = globals_at(walk, 0.0, 1.0);  // right heel strikes
   CHECK(g[at("right_ankle")].translation.z < g[at("left_ankle")].translation.z - 0.4);
   CHECK(g[at("right_wrist")].translation.z > g[at("left_wrist")].translation.z + 0.25);
-  joints_at(walk, 0.5, 1.0, g);
+  g = globals_at(walk, 0.5, 1.0);
   CHECK(g[at("right_ankle")].translation.z > g[at("left_ankle")].translation.z + 0.4);
   CHECK(g[at("right_wrist")].translation.z < g[at("left_wrist")].translation.z - 0.25);
   // Knees never bend the wrong way.
   for (int k = 0; k < 60; ++k) {
-    joints_at(walk, k / 60.0, 1.0, g);
+    g = globals_at(walk, k / 60.0, 1.0);
     for (const std::string s : {"left_", "right_"}) {
       const Vec3d hip = g[at((s + "hip").c_str())].translation,
                   knee = g[at((s + "knee").c_str())].translation,
@@ -276,12 +270,11 @@ TEST_CASE("capsules hold the body in every frame") {
   double least = 1, deepest = 0;
   for (int k = 0; k <= 24; ++k) {
     // 24 is standing; phases lie between those that were fitted to.
-    std::vector<Affine3<double>> g;
-    const auto joints = joints_at(walk, (k + 0.37) / 24, k == 24 ? 0.0 : 1.0, g);
+    const auto g = globals_at(walk, (k + 0.37) / 24, k == 24 ? 0.0 : 1.0);
     std::vector<Capsule<double>> capsules;
     for (const ProxyCapsule& c : a.capsules)
       capsules.push_back({g[c.joint] * c.p0, g[c.joint] * c.p1, c.radius});
-    const auto centers = skinned_centers(a, joints);
+    const auto centers = skinned_centers(a, g);
     least = std::min(least, capsule_coverage(capsules, centers));
     deepest = std::max(deepest, 1 - capsule_coverage(capsules, centers, 0.01));
     if (k == 0) CHECK(capsule_coverage(capsules, centers, -0.06) < 0.7);  // they are not just huge

@@ -188,7 +188,7 @@ TEST_CASE("it does not matter which of its two quaternions a joint has") {
   std::vector<DualQuat<double>> duals{dual_quat(joints[0]), dual_quat(joints[1])};
   const auto place = [&](std::size_t i) {
     args.dual_joints = view_of(duals);
-    return skin(SkinGaussianDual<double, double>{args}.blend(i), asset.cloud.mean(i), Quatd{}).mean;
+    return skin(blended_dual(args, i), asset.cloud.mean(i), Quatd{}).mean;
   };
   for (std::size_t i = 0; i < asset.size(); i += 7) {
     const Vec3d before = place(i);
@@ -342,9 +342,9 @@ TEST_CASE("the box of a body holds it in every mode") {
       forward_kinematics(asset.skeleton, pose, globals);
       const ChunkBounds box = bounds.at(globals);
       const auto binds = asset.skeleton.bind_inverses();
+      const auto centers = skinned_centers(asset, globals);
       for (std::size_t j = 0; j < binds.size(); ++j) globals[j] = globals[j] * binds[j];
       const auto skinned = skin_all<float, float>(asset, globals);
-      const auto centers = skinned_centers(asset, globals);
       for (std::size_t i = 0; i < asset.size(); ++i) {
         const Vec3d p = skinned.mean(i);
         REQUIRE(norm(p - centers[i]) < 2e-5);

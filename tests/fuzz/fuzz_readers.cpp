@@ -152,8 +152,9 @@ void read_lod_set(const std::string& input) {
   (void)made;
   write_file(folder / "lod-meta.json", input);
   check(io::load_lod_set(folder.path(), {.level = input.size() % 2 == 0 ? 0 : 1}));
-  const auto levels = io::load_lod_levels(folder.path());
-  if (!levels) return;
+  const auto read = io::load_lod_levels(folder.path());
+  if (!read || !*read) return;
+  const auto& levels = *read;
   bool ok = validate(levels->cloud.set()).ok() && validate(levels->tree.merged.set()).ok();
   for (const LodBox& p : levels->tree.boxes) {
     const GaussianCloud& of = p.finer == LodBox::kNone ? levels->cloud : levels->tree.merged;

@@ -87,12 +87,8 @@ TEST_CASE("N60_slerp_vs_lerp") {
           translations.push_back(vec_cast<float>(pose.translations[j]));
         }
         std::vector<Affine3<float>> globals_f(joints);
-        ForwardKinematicsArgs<float> args;
-        args.parents = view_of(std::as_const(skeleton.parents));
-        args.rotations = view_of(std::as_const(rotations));
-        args.translations = view_of(std::as_const(translations));
-        args.globals = view_of(globals_f);
-        ForwardKinematics<float>{args}(0);
+        forward_kinematics<float>(view_of(skeleton.parents), view_of(std::as_const(rotations)),
+                                  view_of(std::as_const(translations)), view_of(globals_f));
         const Vec3d seen_f = vec_cast<double>(globals_f.back() * Vec3f{0, 0.5f, 0});
         // What mixing the keys' matrices would give, for one joint half a metre long.
         const Mat3d a = rotation_matrix(keys[0][0]), b = rotation_matrix(keys[1][0]);

@@ -117,12 +117,6 @@ TEST_CASE("avatar scene: Habitat-GS's file puts people where its frames say") {
   CHECK(apart(joints_in_world((*actors)[1], 8.9), joints_in_world((*actors)[1], 3.0)) < 1e-9);
   CHECK((*actors)[0].active(0.99));
   CHECK_FALSE((*actors)[0].active(1.01));
-  CHECK(io::scene_time(*scene, *actors, 9.5) == doctest::Approx(0.5));
-  io::AvatarScene held = *scene;
-  held.time_loop = false;
-  CHECK(io::scene_time(held, *actors, 9.5) == 9.0);
-  held.time_max = 4;
-  CHECK(io::scene_time(held, *actors, 9.5) == 4.0);
 }
 
 TEST_CASE("avatar scene: a body of several roots is moved as one, by a path and by coordinates") {

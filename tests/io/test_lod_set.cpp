@@ -165,7 +165,7 @@ TEST_CASE("lod set: levels to be drawn by view, each box's own") {
   LodFolder set;
   const LoadedLodSet levels = [&] {
     static_cast<void>(set.load());  // writes the file
-    return io::load_lod_levels(set.folder.path()).value();
+    return io::load_lod_levels(set.folder.path()).value().value();
   }();
   CHECK(levels.report.kept == 10);
   REQUIRE(levels.tree.roots.size() == 2);
@@ -218,7 +218,7 @@ TEST_CASE("lod set: levels that make no sense, or are not there") {
   refused(Errc::invalid_file, "two nodes share rows of 0_0/meta.json from 5");
   set.first = R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":0,"offset":0,"count":6}})";
   write_file(set.folder / "lod-meta.json", set.text());
-  CHECK(io::load_lod_levels(set.folder.path()).value().tree.boxes.size() == 3);
+  CHECK(io::load_lod_levels(set.folder.path()).value().value().tree.boxes.size() == 3);
   for (const char* bad :
        {R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":9,"offset":0,"count":2}})",
         R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":1,"offset":-1,"count":2}})",
@@ -232,7 +232,7 @@ TEST_CASE("lod set: levels that make no sense, or are not there") {
   // A coarser level that is not there is left out.
   set.first = R"({"0":{"file":0,"offset":0,"count":6},"1":{"file":2,"offset":0,"count":2}})";
   write_file(set.folder / "lod-meta.json", set.text());
-  CHECK(io::load_lod_levels(set.folder.path()).value().tree.boxes.size() == 3);
+  CHECK(io::load_lod_levels(set.folder.path()).value().value().tree.boxes.size() == 3);
   set.first = first;
   refused(Errc::invalid_argument, "level 3", {.level = 3});
   write_file(set.folder / "lod-meta.json", "{");
@@ -258,11 +258,13 @@ TEST_CASE("lod set: the levels of a damaged set fit their cloud, or it is refuse
       }
     }
     write_file(set.folder / "lod-meta.json", bad);
-    const auto got = io::load_lod_levels(set.folder.path());
-    if (!got) {
-      CHECK(!got.message().empty());
+    const auto read = io::load_lod_levels(set.folder.path());
+    if (!read) {
+      CHECK(!read.message().empty());
       continue;
     }
+    const auto& got = *read;
+    if (!got) continue;
     ++taken;
     for (const LodBox& p : got->tree.boxes) {
       const GaussianCloud& of = p.finer == LodBox::kNone ? got->cloud : got->tree.merged;
@@ -289,7 +291,7 @@ TEST_CASE("lod set: real sets, level by level") {
   if (!showroom.empty()) {
     CHECK(io::load_lod_set(showroom, {.level = 2}).value().report.read == 1495636);
     CHECK(io::load_lod_set(showroom, {.level = 3}).value().report.read == 746973);
-    const LoadedLodSet levels = io::load_lod_levels(showroom).value();
+    const LoadedLodSet levels = io::load_lod_levels(showroom).value().value();
     CHECK(levels.report.read == 1495636);
     CHECK(levels.tree.roots.size() == 362);
     CHECK(levels.tree.boxes.size() == 362 + 356);

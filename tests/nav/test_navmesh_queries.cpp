@@ -128,13 +128,6 @@ TEST_CASE("levels: storeys from the lowest up; ramps, daises and small pieces ar
   CHECK(levels[1].height == doctest::Approx(3.0).epsilon(0.01));
   CHECK(levels[2].height == doctest::Approx(6.5).epsilon(1e-3));
   CHECK(levels[2].area == doctest::Approx(4.7 * 4.7).epsilon(0.02));
-  CHECK(level_at(levels, 0.4) == 0);
-  CHECK(level_at(levels, 2.8) == 1);
-  CHECK(level_at(levels, 5.0) == 1);
-  CHECK(level_at(levels, 100) == 2);
-  CHECK(level_at(levels, -100) == 0);
-  CHECK_FALSE(level_at({}, 0));
-  CHECK_FALSE(level_at(levels, std::numeric_limits<double>::quiet_NaN()));
   CHECK(find_levels(mesh, {.min_gap = 0.1}).size() > 3);  // the dais too
   CHECK(find_levels(mesh, {.min_area = 30}).size() == 2);
   CHECK_FALSE(find_levels(mesh, {.min_gap = 0, .min_area = 0}).empty());

@@ -45,10 +45,8 @@ cuda::DepthBins depth_bins_of(std::span<const BatchCamera> cameras, int key_bits
   double near_plane = cameras[0].camera.near_plane;
   for (const BatchCamera& c : cameras) near_plane = std::min<double>(near_plane, c.camera.near_plane);
   const KeyCode code = KeyCode::of(key_bits, static_cast<float>(near_plane));
-  // Bit patterns of positive floats are in the same order as the floats. So are the codes of keys with
-  // fewer bits, which begin at the near plane.
-  const float first = std::max(static_cast<float>(near_plane), Policy::kNear);
-  const std::uint32_t base = code.base == 0 ? bits_of(first) : code(first);
+  // Codes are in the same order as keys.
+  const std::uint32_t base = code(std::max(static_cast<float>(near_plane), Policy::kNear));
   return {base, std::max(0, 23 - code.shift + Policy::kOctaves - bits), bits};
 }
 

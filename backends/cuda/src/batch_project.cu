@@ -163,7 +163,7 @@ class WarpProjection {
       out.key = row_key<float>(key_camera_of(packed), from);
       out.camera = packed.axes.camera;
       const float near_plane = packed.key.near_plane;
-      if (exists && out.key.z > near_plane) {
+      if (exists && beyond_near_plane(near_plane, out.key.z)) {
         ProjectionCamera<float> camera = camera_of(a_, packed.axes);
         camera.near_plane = near_plane;
         out.code = packed.code.key(out.key.z);
@@ -175,7 +175,7 @@ class WarpProjection {
       const InstanceRow from({rows_, at}, {{gaussians_->shape, exists ? first_ + at : 0}, args.offsets});
       out.key = row_key<float>(args.camera64, from);
       out.camera = instance.camera;
-      if (exists && out.key.z > args.camera.near_plane) {
+      if (exists && beyond_near_plane(args.camera.near_plane, out.key.z)) {
         out.code = args.camera.key_code(sort_key(args.camera64, out.key));
         project_row(args.camera, from,
                     [&]() -> const ProjectionCamera<double>& { return args.camera64; });

@@ -55,8 +55,14 @@ struct Skeleton {
 };
 
 /// Fills `globals` with the transforms from joints to the root frame, [J]. `pose` has one rotation and
-/// translation for each joint of the skeleton.
+/// translation for each joint of the skeleton. `needed` [J] is 0 for joints to leave out; empty: all
+/// joints are computed.
 void forward_kinematics(const Skeleton& skeleton, const LocalPose& pose,
-                        std::vector<Affine3<double>>& globals);
+                        std::vector<Affine3<double>>& globals, const std::vector<char>& needed = {});
+
+/// Turns transforms from joints to the root frame into the matrices that skinning reads, in place: each
+/// times its inverse bind (Skeleton::bind_inverses). Both are [J].
+void to_joint_matrices(std::vector<Affine3<double>>& globals,
+                       const std::vector<Affine3<double>>& bind_inverses) noexcept;
 
 }  // namespace gsnav

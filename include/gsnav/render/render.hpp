@@ -139,12 +139,9 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
                       const RenderConfig& config, const KeyRange& range, const TileProgress<S>& progress,
                       const MeshLayer<S>& mesh, const FrameImages<S>& images, RenderStats& stats) {
   // ---- sort
-  // Lower bound of all keys. A distance may round to slightly less than the near plane, but not to half
-  // of it.
-  const float near_plane =
-      ws.projections.empty() ? 0 : ws.projections[0].camera.near_plane;  // the same for all sets
-  const std::uint32_t base =
-      config.quality.key_bits < 32 ? 0 : std::max(bits_of(0.5f * near_plane), range.low);
+  std::uint32_t base = range.low;  // lower bound of all keys
+  if (!ws.projections.empty())     // all sets have the same near plane
+    base = std::max(base, ws.projections[0].camera.key_code.lowest(ws.projections[0].camera.near_plane));
   const Result<std::size_t> ordered =
       order_visible(backend, ws.visible, base, config.quality.key_bits, range);
   if (!ordered) return ordered.status();

@@ -220,13 +220,26 @@ GSNAV_HD Affine3<L> weighted(const L& weight, const Affine3<L>& a, const Affine3
   return out;
 }
 
-/// Blended transform of a Gaussian: the sum of weight(k) * joint(k) for k < K, in the order of k. A
-/// joint may be of any type that has the two functions `weighted`.
-template <int K, class Joint, class Weight>
-GSNAV_HD auto blend_influences(const Joint& joint, const Weight& weight) noexcept {
+/// Blended transform of a Gaussian: the sum of weight(k) * joint(k) for k < count, in the order of k;
+/// count >= 1. A joint may be of any type that has the two functions `weighted`.
+template <class Joint, class Weight>
+GSNAV_HD auto blend_influences(int count, const Joint& joint, const Weight& weight) noexcept {
   auto sum = weighted(weight(0), joint(0));
-  for (int k = 1; k < K; ++k) sum = weighted(weight(k), joint(k), sum);
+  for (int k = 1; k < count; ++k) sum = weighted(weight(k), joint(k), sum);
   return sum;
+}
+
+/// Blended joint of Gaussian i, for linear blending.
+template <class S, class Out>
+GSNAV_HD Affine3<S> blended_joint(const SkinningArgs<S, Out>& args, std::size_t i) noexcept {
+  const std::size_t row = static_cast<std::size_t>(args.influences) * i;
+  return blend_influences(
+      args.influences,
+      [&](int k) GSNAV_INLINED -> const Affine3<S>& {
+        return args.joints[args.joint_indices[row + static_cast<std::size_t>(k)]];
+      },
+      [&](int k)
+          GSNAV_INLINED { return skinning_weight<S>(args.weights[row + static_cast<std::size_t>(k)]); });
 }
 
 /// Inputs of skinning for one Gaussian.
@@ -256,7 +269,7 @@ template <class S, int K, class JointAt>
 GSNAV_HD Skinned<S> skin_row(const SkinRow<K>& row, const JointAt& joint_at, bool rotation) noexcept {
   const auto joint = [&](int k) GSNAV_INLINED -> decltype(auto) { return joint_at(row.joints[k]); };
   const auto weight = [&](int k) GSNAV_INLINED { return skinning_weight<S>(row.parts[k]); };
-  const Affine3<S> blend = blend_influences<K>(joint, weight);
+  const Affine3<S> blend = blend_influences(K, joint, weight);
   const auto first = [&]() GSNAV_INLINED { return joint_at(row.joints[0]).linear; };
   return skin<S>(blend, first, vec_cast<S>(row.mean), quat_cast<S>(row.quat), rotation);
 }

@@ -137,17 +137,32 @@ struct ColumnTerms {
   L column, w2;
 };
 
+/// Whitened offset (w1, w2) of a pixel centre from the mean, with dx = px - ref_x.
+template <class L, class S>
+GSNAV_HD L whitened_1(const SplatGeometry<S>& g, const L& dx) noexcept {
+  return fma(dx, L(g.a), L(g.w1));
+}
+/// w2 in the row of the reference pixel. `whitened_2` gives it for any row, with dy = py - ref_y.
+template <class L, class S>
+GSNAV_HD L whitened_2(const SplatGeometry<S>& g, const L& dx) noexcept {
+  return fma(dx, L(g.k), L(g.w2));
+}
+template <class L>
+GSNAV_HD L whitened_2(const L& in_reference_row, const L& dy, const L& b) noexcept {
+  return fma(dy, b, in_reference_row);
+}
+
 template <class L, class S>
 GSNAV_HD ColumnTerms<L> column_terms(const SplatGeometry<S>& g, L px) noexcept {
   const L dx = px - L(g.ref_x);
-  const L w1 = fma(dx, L(g.a), L(g.w1));
-  return {fma(-w1, w1, L(g.log2_opacity)), fma(dx, L(g.k), L(g.w2))};
+  const L w1 = whitened_1(g, dx);
+  return {fma(-w1, w1, L(g.log2_opacity)), whitened_2(g, dx)};
 }
 
 /// log2 alpha at the pixel centre `py` of a column. Never greater than log2 of the opacity.
 template <class L>
 GSNAV_HD L column_exponent(const ColumnTerms<L>& terms, L ref_y, L b, L py) noexcept {
-  const L w2 = fma(py - ref_y, b, terms.w2);
+  const L w2 = whitened_2(terms.w2, py - ref_y, b);
   return fma(-w2, w2, terms.column);
 }
 
@@ -157,8 +172,7 @@ template <class L, class S>
 GSNAV_HD L perspective_exponent(const SplatGeometry<S>& g, const SplatPerspective<S>& v, L px,
                                 L py) noexcept {
   const L dx = px - L(g.ref_x), dy = py - L(g.ref_y);
-  const L w1 = fma(dx, L(g.a), L(g.w1));
-  const L w2 = fma(dy, L(g.b), fma(dx, L(g.k), L(g.w2)));
+  const L w1 = whitened_1(g, dx), w2 = whitened_2(whitened_2(g, dx), dy, L(g.b));
   const L s = fma(w2, w2, w1 * w1);
   const L f = fma(dx, L(v.fx), fma(dy, L(v.fy), L(v.f0)));
   const L exponent = L(g.log2_opacity) - s / fma(f, f, L(v.c) * s);

@@ -103,7 +103,7 @@ GSNAV_HD bool lies_in_view(const ProjectionCamera<double>& camera, const ChunkBo
   const auto inside = [&](const Vec3d& axis, double f, double c, double extent) GSNAV_INLINED {
     return chunk.largest(axis * -f - z * c) <= 0 && chunk.largest(axis * f + z * (c - extent)) <= 0;
   };
-  return -chunk.largest(-z) * camera.scale > camera.near_plane &&
+  return beyond_near_plane(camera.near_plane, -chunk.largest(-z) * camera.scale) &&
          inside(camera.rotation.row[0], camera.fx, camera.cx, static_cast<double>(camera.width)) &&
          inside(camera.rotation.row[1], camera.fy, camera.cy, static_cast<double>(camera.height));
 }

@@ -167,7 +167,7 @@ GSNAV_HD bool project_row(const ViewedSet<S>& args, bool depth, std::size_t i,
   const ViewedRow row({args.gaussians.shape, i}, args.offsets);
   RowKey<float> key = row_key<float>(args.camera64, row);
   if constexpr (sizeof(S) == sizeof(float)) {
-    if (!(key.z > args.camera.near_plane)) return false;
+    if (!beyond_near_plane(args.camera.near_plane, key.z)) return false;
     const ProjectedRow<float> seen(args.camera, row, key);
     if (!seen.splat.visible) return false;
     out.key = sort_key(args.camera64, key);

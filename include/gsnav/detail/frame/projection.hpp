@@ -221,7 +221,7 @@ GSNAV_HD Projected<L> project(const ProjectionCamera<scalar_of<L>>& camera, cons
 
   const L huge(S(3e38));  // finite in float: Gaussians that overflow are culled, never drawn as NaN
   const L half(S(0.5));
-  out.visible = (key_z > F(camera.near_plane)) && (out.s_max >= L(S(0))) && (det <= huge) &&
+  out.visible = beyond_near_plane(camera.near_plane, key_z) && (out.s_max >= L(S(0))) && (det <= huge) &&
                 (big_a <= huge) && (abs(out.mean_x) <= huge) && (abs(out.mean_y) <= huge) &&
                 (out.center_x + out.half_width >= half) && (out.center_y + out.half_height >= half) &&
                 (out.center_x - out.half_width <= L(S(camera.width)) - half) &&

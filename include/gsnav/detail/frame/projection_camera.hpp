@@ -43,7 +43,17 @@ struct KeyCode {
     const std::uint32_t code = (bits > base ? bits - base : 0u) >> shift;
     return code < largest ? code : largest;
   }
+  /// Lower bound of all codes. A distance may round to slightly less than the near plane, but not to
+  /// half of it.
+  std::uint32_t lowest(float near_plane) const noexcept { return (*this)(0.5f * near_plane); }
 };
+
+/// True for a centre beyond the near plane.
+/// @param z depth_key of the centre, rounded to float32, metres
+template <class F>
+GSNAV_HD mask_of<F> beyond_near_plane(float near_plane, const F& z) noexcept {
+  return z > F(near_plane);
+}
 
 /// Settings of the projection besides the camera.
 struct ProjectionRules {

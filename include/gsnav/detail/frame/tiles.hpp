@@ -50,6 +50,12 @@ struct TileGrid {
     return static_cast<std::size_t>(y / tile_size) * static_cast<std::size_t>(columns) +
            static_cast<std::size_t>(x / tile_size);
   }
+  /// Pixels of a tile that lie in the image, as a half-open box.
+  GSNAV_HD SplatBounds pixels_of(std::size_t tile) const noexcept {
+    const int x = static_cast<int>(tile % static_cast<std::size_t>(columns)) * tile_size;
+    const int y = static_cast<int>(tile / static_cast<std::size_t>(columns)) * tile_size;
+    return {x, y, min(x + tile_size, width), min(y + tile_size, height)};
+  }
   /// Tiles that contain a non-empty box of pixels (SplatBounds, MeshTriangle).
   template <class Box>
   GSNAV_HD TileRange<int> tiles_of(const Box& box) const noexcept {

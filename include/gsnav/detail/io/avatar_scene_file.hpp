@@ -59,10 +59,4 @@ Result<AvatarScene> load_avatar_scene(const std::filesystem::path& path);
 /// those of the loaders, with the avatar's name.
 Result<std::vector<AvatarActor>> load_scene_actors(const AvatarScene& scene);
 
-/// The time on the scene's clock `seconds` after the start: in [0, time_max + blend) if it loops,
-/// otherwise limited to time_max. `actors` are the actors of the scene; they determine time_max if the
-/// file has none.
-double scene_time(const AvatarScene& scene, const std::vector<AvatarActor>& actors,
-                  double seconds) noexcept;
-
 }  // namespace gsnav::io

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/detail/io/read_limits.hpp"
@@ -39,10 +40,10 @@ struct LoadedLodSet {
 
 /// Reads all available levels of a streamed set, from `options.level` on. The finest is what
 /// load_lod_set reads; each node may be drawn at any coarser level. `row_ids` are places in the order of
-/// load_lod_set. The environment is always drawn whole. Errors: those of load_lod_set; invalid_file
-/// (rows that two levels share, unless one node names the same rows twice); unsupported (nodes of so few
-/// rows that chunks would be mostly empty). Never throws.
-Result<LoadedLodSet> load_lod_levels(const std::filesystem::path& path,
-                                     const LoadLodOptions& options = {});
+/// load_lod_set. The environment is always drawn whole. Returns nothing if nodes have so few rows that
+/// chunks would be mostly empty. Errors: those of load_lod_set; invalid_file (rows that two levels
+/// share, unless one node names the same rows twice). Never throws.
+Result<std::optional<LoadedLodSet>> load_lod_levels(const std::filesystem::path& path,
+                                                    const LoadLodOptions& options = {});
 
 }  // namespace gsnav::io

@@ -52,8 +52,8 @@ struct BlendedRow {
 template <int K>
 GSNAV_HD BlendedRow blend_row(const float* joints, const std::uint16_t* indices,
                               const float* weights) noexcept {
-  return blend_influences<K>(
-      [&](int k) GSNAV_INLINED { return BlendedRow::load(joints + std::size_t{12} * indices[k]); },
+  return blend_influences(
+      K, [&](int k) GSNAV_INLINED { return BlendedRow::load(joints + std::size_t{12} * indices[k]); },
       [&](int k) GSNAV_INLINED { return BlendedRow::Weight(weights[k]); });
 }
 

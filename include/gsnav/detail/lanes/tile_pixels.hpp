@@ -39,8 +39,8 @@ class TilePixels {
 
   TilePixels(const RasterArgs<float>& args, std::size_t tile) noexcept
       : size(args.grid.tile_size),
-        left(static_cast<int>(tile % static_cast<std::size_t>(args.grid.columns)) * size),
-        top(static_cast<int>(tile / static_cast<std::size_t>(args.grid.columns)) * size),
+        left(args.grid.pixels_of(tile).x0),
+        top(args.grid.pixels_of(tile).y0),
         args_(args),
         tile_(tile) {
     float x[kWidth], y[kWidth];

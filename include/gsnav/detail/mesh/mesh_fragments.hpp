@@ -34,15 +34,11 @@ template <class S, class F>
 GSNAV_HD void for_each_fragment(const FragmentArgs<S>& args, std::size_t tile, const F& f) noexcept {
   const BinArgs<S>& bin = args.raster.bin;
   const TileGrid& grid = bin.grid;
-  const int ts = grid.tile_size;
-  const int tile_x = static_cast<int>(tile % static_cast<std::size_t>(grid.columns)) * ts;
-  const int tile_y = static_cast<int>(tile / static_cast<std::size_t>(grid.columns)) * ts;
+  const SplatBounds box = grid.pixels_of(tile);
   for (std::uint64_t i = bin.tile_offsets[tile]; i < bin.tile_offsets[tile + 1]; ++i) {
     const MeshTriangle<S>& t = args.raster.triangles[bin.tile_splats[i]];
-    for_each_span(grid, t, max(tile_x, int{t.x0}), max(tile_y, int{t.y0}),
-                  min(min(tile_x + ts, grid.width), int{t.x1}),
-                  min(min(tile_y + ts, grid.height), int{t.y1}),
-                  [&](int y, int left, int right) GSNAV_INLINED {
+    for_each_span(grid, t, max(box.x0, int{t.x0}), max(box.y0, int{t.y0}), min(box.x1, int{t.x1}),
+                  min(box.y1, int{t.y1}), [&](int y, int left, int right) GSNAV_INLINED {
                     for (int x = left; x < right; ++x) {
                       const std::size_t pixel =
                           static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.width) +
@@ -57,11 +53,9 @@ GSNAV_HD void for_each_fragment(const FragmentArgs<S>& args, std::size_t tile, c
 /// Calls f(pixel) for each pixel of a tile, row by row.
 template <class F>
 GSNAV_HD void for_each_tile_pixel(const TileGrid& grid, std::size_t tile, const F& f) noexcept {
-  const int ts = grid.tile_size;
-  const int tile_x = static_cast<int>(tile % static_cast<std::size_t>(grid.columns)) * ts;
-  const int tile_y = static_cast<int>(tile / static_cast<std::size_t>(grid.columns)) * ts;
-  for (int y = tile_y; y < min(tile_y + ts, grid.height); ++y) {
-    for (int x = tile_x; x < min(tile_x + ts, grid.width); ++x) {
+  const SplatBounds box = grid.pixels_of(tile);
+  for (int y = box.y0; y < box.y1; ++y) {
+    for (int x = box.x0; x < box.x1; ++x) {
       f(static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.width) +
         static_cast<std::size_t>(x));
     }

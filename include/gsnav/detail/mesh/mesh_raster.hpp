@@ -236,14 +236,11 @@ struct ShowSpan {
 template <class S>
 GSNAV_HD void rasterize_mesh_tile(const MeshRasterArgs<S>& args, std::size_t tile) noexcept {
   const TileGrid& grid = args.bin.grid;
-  const int ts = grid.tile_size;
-  const int tile_x = static_cast<int>(tile % static_cast<std::size_t>(grid.columns)) * ts;
-  const int tile_y = static_cast<int>(tile / static_cast<std::size_t>(grid.columns)) * ts;
-  const int tile_right = min(tile_x + ts, grid.width), tile_bottom = min(tile_y + ts, grid.height);
+  const SplatBounds box = grid.pixels_of(tile);
   const std::size_t stride = static_cast<std::size_t>(grid.width);
   const auto row_at = [&](int y) GSNAV_INLINED { return static_cast<std::size_t>(y) * stride; };
-  for (int y = tile_y; y < tile_bottom; ++y) {
-    for (int x = tile_x; x < tile_right; ++x) {
+  for (int y = box.y0; y < box.y1; ++y) {
+    for (int x = box.x0; x < box.x1; ++x) {
       // holds 1 / z until the tile is finished
       args.depth[row_at(y) + static_cast<std::size_t>(x)] = S(0);
       args.visible[row_at(y) + static_cast<std::size_t>(x)] = kNoTriangle;
@@ -252,13 +249,13 @@ GSNAV_HD void rasterize_mesh_tile(const MeshRasterArgs<S>& args, std::size_t til
   for (std::uint64_t i = args.bin.tile_offsets[tile]; i < args.bin.tile_offsets[tile + 1]; ++i) {
     const std::uint32_t id = args.bin.tile_splats[i];
     const MeshTriangle<S>& t = args.triangles[id];
-    const int x0 = max(tile_x, int{t.x0}), x1 = min(tile_right, int{t.x1});
-    const int y0 = max(tile_y, int{t.y0}), y1 = min(tile_bottom, int{t.y1});
+    const int x0 = max(box.x0, int{t.x0}), x1 = min(box.x1, int{t.x1});
+    const int y0 = max(box.y0, int{t.y0}), y1 = min(box.y1, int{t.y1});
     detail::for_each_span(grid, t, x0, y0, x1, y1, detail::ShowSpan<S>{args, t, id});
   }
   S far(0);
-  for (int y = tile_y; y < tile_bottom; ++y) {
-    for (int x = tile_x; x < tile_right; ++x) {
+  for (int y = box.y0; y < box.y1; ++y) {
+    for (int x = box.x0; x < box.x1; ++x) {
       S& depth = args.depth[row_at(y) + static_cast<std::size_t>(x)];
       depth = S(1) / depth;  // infinity where there is no triangle
       far = max(far, depth);

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <optional>
-#include <span>
 #include <vector>
 
 #include "gsnav/nav/navmesh.hpp"
@@ -28,10 +26,5 @@ struct LevelOptions {
 /// largest area are chosen first, each at least `min_gap` from those before. Surface steeper than 10
 /// degrees (stairs, ramps) is ignored.
 std::vector<NavLevel> find_levels(const NavMesh& mesh, const LevelOptions& options = {});
-
-/// Index of the storey for the height `y`: the highest storey that is at most `tolerance` above y. If
-/// all are higher, the lowest. Nothing if there are no storeys or y is NaN.
-std::optional<std::size_t> level_at(std::span<const NavLevel> levels, double y,
-                                    double tolerance = 0.25) noexcept;
 
 }  // namespace gsnav

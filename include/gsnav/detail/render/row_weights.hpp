@@ -27,12 +27,7 @@ struct WeighTile {
 
   void operator()(std::size_t tile) const noexcept {
     const TileGrid& grid = args.grid;
-    const std::size_t side = static_cast<std::size_t>(grid.tile_size),
-                      columns = static_cast<std::size_t>(grid.columns);
-    const int left = static_cast<int>(tile % columns * side),
-              top = static_cast<int>(tile / columns * side);
-    const int right = std::min(left + grid.tile_size, grid.width),
-              bottom = std::min(top + grid.tile_size, grid.height);
+    const auto [left, top, right, bottom] = grid.pixels_of(tile);
     std::array<BlendState<float, DepthMode::none>, kSide * kSide> pixels{};
     int open = (right - left) * (bottom - top);
     for (std::uint64_t i = args.tile_offsets[tile]; i < args.tile_offsets[tile + 1] && open > 0; ++i) {

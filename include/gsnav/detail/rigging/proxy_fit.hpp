@@ -17,8 +17,9 @@ inline double segment_distance2(const Vec3d& a, const Vec3d& b, const Vec3d& p) 
   return dot(d, d);
 }
 
-/// Centres of the canonical Gaussians after skinning by joint matrices (in double, root frame, metres).
-std::vector<Vec3d> skinned_centers(const AvatarAsset& asset, const std::vector<Affine3<double>>& joints);
+/// Centres of the Gaussians after skinning, in the root frame, metres. `globals` [J] takes joints to the
+/// root frame.
+std::vector<Vec3d> skinned_centers(const AvatarAsset& asset, std::vector<Affine3<double>> globals);
 
 /// Fits the asset's `capsules` to its Gaussians over poses ([J] joint to root frame each). Each centre
 /// goes to the capsule of one of its joints whose axis is nearest in the bind pose. The ends then move

@@ -46,16 +46,17 @@ struct BoxRows {
   std::size_t row(std::size_t i) const noexcept { return first_chunk * kProjectChunk + i; }
 };
 
-/// Number of rows of all levels once each box fills whole chunks.
-inline std::size_t filled_rows(const std::vector<LodLevel>& levels, std::size_t boxes) {
-  std::size_t chunks = 0;
+/// False if the boxes are so small that filled chunks would take more than about four times the rows.
+inline bool fills_chunks(const std::vector<LodLevel>& levels, std::size_t boxes) {
+  std::size_t rows = 0, chunks = 0;
   std::vector<std::uint32_t> counts;
   for (const LodLevel& level : levels) {
     counts.assign(boxes, 0);
     for (const std::uint32_t b : level.boxes) ++counts[b];
     for (const std::uint32_t n : counts) chunks += (n + kProjectChunk - 1) / kProjectChunk;
+    rows += level.boxes.size();
   }
-  return chunks * kProjectChunk;
+  return chunks * kProjectChunk <= 4 * rows + (std::size_t{1} << 20);
 }
 
 /// Sorts the rows of a level by box, and within a box like sort_spatially: along Hilbert's curve, large
@@ -169,7 +170,7 @@ inline Status check_levels(const std::vector<LodLevel>& levels, std::size_t boxe
       if (b >= boxes) return bad_level(l, "box " + std::to_string(b) + " of " + std::to_string(boxes));
     }
   }
-  if (filled_rows(levels, boxes) <= 4 * all + (std::size_t{1} << 20)) return {};
+  if (fills_chunks(levels, boxes)) return {};
   return {Errc::unsupported, "join_levels: " + std::to_string(all) +
                                  " rows in so many small boxes that chunks of " +
                                  std::to_string(kProjectChunk) + " would be mostly empty"};

@@ -76,30 +76,41 @@ GSNAV_HD Quat<S> canonical_quat(const SkinningArgs<S, Out>& args, std::size_t i)
 
 }  // namespace detail
 
+/// All elements of `q` times the weight.
+template <class L>
+GSNAV_HD DualQuat<L> weighted(const L& weight, const DualQuat<L>& q) noexcept {
+  return {q.real * weight, q.dual * weight};
+}
+/// All elements of `q` times the weight, added to `sum`.
+template <class L>
+GSNAV_HD DualQuat<L> weighted(const L& weight, const DualQuat<L>& q, const DualQuat<L>& sum) noexcept {
+  return {sum.real + q.real * weight, sum.dual + q.dual * weight};
+}
+
+/// Blended dual quaternion of Gaussian i, as skin() needs it. Its length is at least the greatest
+/// weight.
+template <class S, class Out>
+GSNAV_HD DualQuat<S> blended_dual(const SkinningArgs<S, Out>& args, std::size_t i) noexcept {
+  const std::size_t row = static_cast<std::size_t>(args.influences) * i;
+  const auto joint = [&](int k) GSNAV_INLINED -> const DualQuat<S>& {
+    return args.dual_joints[args.joint_indices[row + static_cast<std::size_t>(k)]];
+  };
+  const Quat<S> first = joint(0).real;
+  return blend_influences(args.influences, joint, [&](int k) GSNAV_INLINED {
+    const S w = skinning_weight<S>(args.weights[row + static_cast<std::size_t>(k)]);
+    return k > 0 && dot(joint(k).real, first) < S(0) ? -w : w;
+  });
+}
+
 /// Kernel that skins Gaussian i by dual quaternion blending.
 template <class S, class Out = float>
 struct SkinGaussianDual {
   SkinningArgs<S, Out> args;
 
-  /// Blended dual quaternion of Gaussian i, as skin() needs it. Its length is at least the greatest
-  /// weight.
-  GSNAV_HD DualQuat<S> blend(std::size_t i) const noexcept {
-    const std::size_t row = static_cast<std::size_t>(args.influences);
-    const std::uint16_t* const indices = args.joint_indices.data + row * i;
-    const std::uint16_t* const parts = args.weights.data + row * i;
-    const DualQuat<S> first = args.dual_joints[indices[0]];
-    const S w0 = skinning_weight<S>(parts[0]);
-    DualQuat<S> sum{first.real * w0, first.dual * w0};
-    for (std::size_t k = 1; k < row; ++k) {
-      const DualQuat<S>& q = args.dual_joints[indices[k]];
-      const S w = skinning_weight<S>(parts[k]), signed_w = select(dot(q.real, first.real) < S(0), -w, w);
-      sum = {sum.real + q.real * signed_w, sum.dual + q.dual * signed_w};
-    }
-    return sum;
-  }
   GSNAV_HD void operator()(std::size_t i) const noexcept {
-    store_skinned(args, i,
-                  skin(blend(i), detail::canonical_mean(args, i), detail::canonical_quat(args, i)));
+    store_skinned(
+        args, i,
+        skin(blended_dual(args, i), detail::canonical_mean(args, i), detail::canonical_quat(args, i)));
   }
 };
 
