@@ -168,6 +168,10 @@ TEST_CASE("pointnav: three episodes end") {
   CHECK(made.ok);
   CHECK(std::count(made.text.begin(), made.text.end(), '\n') == 3);
   CHECK(made.says("success 1"));
+  const Outcome wrong = run_command(EXAMPLE_POINTNAV, "abacus", folder.path());
+  CHECK_FALSE(wrong.ok);
+  CHECK(wrong.says("abacus"));
+  CHECK_FALSE(wrong.says("terminate"));
 }
 
 TEST_CASE("pointnav_batch: episodes of sixteen environments end") {
