@@ -9,7 +9,7 @@
 namespace gsnav::python {
 
 void ImagePool::Free::operator()(float* p) const noexcept {
-  ::operator delete(p, std::align_val_t{kAlignment});
+  ::operator delete (p, std::align_val_t{kAlignment});
 }
 
 void ImagePool::put_back(Block block) noexcept {
@@ -45,7 +45,7 @@ Result<std::span<float>> ImagePool::take(std::size_t floats) {
   } else {
     block.floats = floats;
     block.data.reset(static_cast<float*>(
-        ::operator new(floats * sizeof(float), std::align_val_t{kAlignment}, std::nothrow)));
+        ::operator new (floats * sizeof(float), std::align_val_t{kAlignment}, std::nothrow)));
     if (block.data == nullptr) {
       return {Errc::out_of_memory,
               "cannot allocate " + std::to_string(floats * sizeof(float)) + " bytes for images"};
