@@ -87,7 +87,7 @@ class VectorEnv(BaseVectorEnv):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._rgb = _task.rgb_sensor(config, render_mode)
         self.render_mode = render_mode
-        names = list(scene) if isinstance(scene, (list, tuple)) else [scene]
+        names: list[Any] = list(scene) if isinstance(scene, (list, tuple)) else [scene]
         self.scenes = [_task.scene_of(one, config) for one in names]
         drawn = episodes if callable(episodes) else _task.Episodes(self.scenes, episodes, rules)
         self._source = Source(drawn, self.num_envs)

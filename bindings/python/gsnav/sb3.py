@@ -36,7 +36,8 @@ class VecEnv(BaseVecEnv):  # type: ignore[misc, unused-ignore]  # without stable
         self._steps = np.zeros(envs.num_envs, np.int64)
         self._seed: int | None = None
         self.render_mode = envs.render_mode
-        super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
+        spaces: Any = envs  # Their types are those of Gymnasium, where it is installed.
+        super().__init__(envs.num_envs, spaces.single_observation_space, spaces.single_action_space)
 
     def reset(self) -> Any:
         """Starts an episode in each environment. Returns the observations."""
