@@ -3,6 +3,7 @@
 
 #include "actions.hpp"
 #include "bind.hpp"
+#include "device_array.hpp"
 #include "episode_source.hpp"
 #include "fields.hpp"
 #include "gsnav/device/simulator.hpp"
@@ -18,6 +19,7 @@ struct PythonBatch {
   BatchSimulator sim;
   std::shared_ptr<PythonSource> source;
   std::size_t scenes = 0;
+  std::shared_ptr<Consumers> consumers;
   bool begun = false;  ///< Worlds exist from the first reset on.
   Busy busy;
 };
@@ -26,7 +28,7 @@ struct PythonBatch {
 struct PythonStep {
   nb::object rewards, terminated, truncated, infos, point_goals, times, finished, final_metrics,
       final_point_goals;
-  nb::dict images, final_images;
+  nb::dict images, final_images, on_backend, final_on_backend;
 };
 
 /// dtypes of structured arrays. They live as long as the process.
@@ -41,6 +43,7 @@ const Types& types() {
 nb::dict image_arrays(std::span<const BatchObservation> images, nb::handle owner) {
   nb::dict out;
   for (const BatchObservation& o : images) {
+    if (o.on_backend != nullptr) continue;
     const std::vector<std::size_t> shape{o.environments, static_cast<std::size_t>(o.height),
                                          static_cast<std::size_t>(o.width),
                                          static_cast<std::size_t>(o.channels)};
@@ -56,7 +59,7 @@ nb::object bool_view(std::span<const std::uint8_t> values, nb::handle owner) {
 
 /// Arrays of a step. Those with a row per environment are views; others are copies, because their sizes
 /// change from step to step.
-PythonStep step_arrays(const BatchStep& s, nb::handle self) {
+PythonStep step_arrays(const BatchStep& s, const PythonBatch& b, nb::handle self) {
   static_assert(sizeof(PointGoal) == 2 * sizeof(double));
   PythonStep out;
   const std::size_t n = s.rewards.size();
@@ -74,6 +77,8 @@ PythonStep step_arrays(const BatchStep& s, nb::handle self) {
   out.final_metrics = structured_copy(s.final_metrics, types().metrics);
   out.images = image_arrays(s.images, self);
   out.final_images = image_arrays(s.final_images, nb::handle());
+  out.on_backend = device_images(s.images, b.sim.device(), b.consumers, self);
+  out.final_on_backend = device_images(s.final_images, b.sim.device(), b.consumers, self);
   return out;
 }
 
@@ -85,6 +90,7 @@ PythonStep observe(nb::handle self, PythonBatch& b, const char* what, const F& f
   std::optional<Result<BatchStep>> result;
   {
     nb::gil_scoped_release release;
+    b.consumers->wait();
     result.emplace(f(b.sim));
   }
   if (!result->ok()) {
@@ -95,7 +101,7 @@ PythonStep observe(nb::handle self, PythonBatch& b, const char* what, const F& f
     }
     result->status().throw_if_error();
   }
-  return step_arrays(**result, self);
+  return step_arrays(**result, b, self);
 }
 
 void make(PythonBatch* self, const DeviceArg& device, const std::vector<SceneArg>& scenes,
@@ -117,6 +123,7 @@ void make(PythonBatch* self, const DeviceArg& device, const std::vector<SceneArg
           .value(),
       std::move(source),
       count,
+      std::make_shared<Consumers>(chosen.index()),
       false,
       {}};
 }
@@ -209,11 +216,24 @@ void bind_step(nb::module_& m) {
           "final_images", [](const S& s) { return s.final_images; },
           nb::sig((std::string("def final_images(self) ") + images).c_str()),
           "Last images of the episodes in `finished`, with AutoReset.same_step only. A copy.")
+      .def_prop_ro(
+          "on_backend", [](const S& s) { return s.on_backend; },
+          nb::sig("def on_backend(self) -> dict[str, DeviceArray]"),
+          "Images in the memory of a GPU, with ImageMemory.backend. `images` is then empty.")
+      .def_prop_ro(
+          "final_on_backend", [](const S& s) { return s.final_on_backend; },
+          nb::sig("def final_on_backend(self) -> dict[str, DeviceArray]"),
+          "`final_images` in the memory of a GPU. Valid until the next call.")
       .def(
           "__getitem__",
           [](const S& s, const std::string& uuid) -> nb::object {
             const nb::str key(uuid.data(), uuid.size());
             if (s.images.contains(key)) return s.images[key];
+            if (s.on_backend.contains(key)) {
+              throw nb::key_error(("the images of \"" + uuid +
+                                   "\" are in the memory of the GPU: use on_backend[\"" + uuid + "\"]")
+                                      .c_str());
+            }
             const std::string known = text_of(nb::list(s.images.keys()));
             throw nb::key_error(("no sensor \"" + uuid + "\"; the sensors are " + known).c_str());
           },
