@@ -8,6 +8,7 @@
 #include "fields.hpp"
 #include "gsnav/device/simulator.hpp"
 #include "guard.hpp"
+#include "image_source.hpp"
 #include "structured.hpp"
 #include "world.hpp"
 
@@ -20,6 +21,7 @@ struct PythonBatch {
   std::shared_ptr<PythonSource> source;
   std::size_t scenes = 0;
   std::shared_ptr<Consumers> consumers;
+  std::shared_ptr<PythonImageSource> images;
   bool begun = false;  ///< Worlds exist from the first reset on.
   Busy busy;
 };
@@ -75,9 +77,13 @@ PythonStep step_arrays(const BatchStep& s, const PythonBatch& b, nb::handle self
   const auto* const goals = reinterpret_cast<const double*>(s.final_point_goals.data());
   out.final_point_goals = array_copy(std::span(goals, 2 * ended), {ended, 2});
   out.final_metrics = structured_copy(s.final_metrics, types().metrics);
-  out.images = image_arrays(s.images, self);
+  // Images are views of memory that belongs to the simulator, or to the arrays of the source.
+  const nb::object owner = b.images->given.size() == 0
+                               ? nb::borrow(self)
+                               : nb::object(nb::make_tuple(nb::borrow(self), b.images->given));
+  out.images = image_arrays(s.images, owner);
   out.final_images = image_arrays(s.final_images, nb::handle());
-  out.on_backend = device_images(s.images, b.sim.device(), b.consumers, self);
+  out.on_backend = device_images(s.images, b.sim.device(), b.consumers, owner);
   out.final_on_backend = device_images(s.final_images, b.sim.device(), b.consumers, self);
   return out;
 }
@@ -87,6 +93,8 @@ template <class F>
 PythonStep observe(nb::handle self, PythonBatch& b, const char* what, const F& f) {
   check_fork(b.sim.device(), what);
   b.source->error.reset();
+  b.images->error.reset();
+  b.images->given = nb::list();
   std::optional<Result<BatchStep>> result;
   {
     nb::gil_scoped_release release;
@@ -94,9 +102,10 @@ PythonStep observe(nb::handle self, PythonBatch& b, const char* what, const F& f
     result.emplace(f(b.sim));
   }
   if (!result->ok()) {
-    if (b.source->error) {
-      nb::python_error error = std::move(*b.source->error);
-      b.source->error.reset();
+    for (std::optional<nb::python_error>* raised : {&b.source->error, &b.images->error}) {
+      if (!*raised) continue;
+      nb::python_error error = std::move(**raised);
+      raised->reset();
       throw error;
     }
     result->status().throw_if_error();
@@ -105,10 +114,14 @@ PythonStep observe(nb::handle self, PythonBatch& b, const char* what, const F& f
 }
 
 void make(PythonBatch* self, const DeviceArg& device, const std::vector<SceneArg>& scenes,
-          const BatchConfig& config, std::size_t environments, nb::object next_episode) {
+          BatchConfig config, std::size_t environments, nb::object next_episode, nb::object images) {
   if (!PyCallable_Check(next_episode.ptr())) {
     throw nb::type_error(
         ("BatchSimulator: next_episode must be callable, got " + type_of(next_episode)).c_str());
+  }
+  if (!images.is_none() && !PyCallable_Check(images.ptr())) {
+    throw nb::type_error(
+        ("BatchSimulator: image_source must be callable or None, got " + type_of(images)).c_str());
   }
   const Device chosen = device.value();
   check_fork(chosen, "BatchSimulator");
@@ -117,6 +130,8 @@ void make(PythonBatch* self, const DeviceArg& device, const std::vector<SceneArg
   const std::size_t count = shared.size();
   auto source = std::make_shared<PythonSource>(PythonSource{std::move(next_episode), {}});
   EpisodeSource episodes = episode_source(source);
+  auto held = std::make_shared<PythonImageSource>(PythonImageSource{std::move(images), {}, {}});
+  if (!held->function.is_none()) config.image_source = image_source(held, chosen, config);
   nb::gil_scoped_release release;
   new (self) PythonBatch{
       BatchSimulator::create(chosen, std::move(shared), config, environments, std::move(episodes))
@@ -124,6 +139,7 @@ void make(PythonBatch* self, const DeviceArg& device, const std::vector<SceneArg
       std::move(source),
       count,
       std::make_shared<Consumers>(chosen.index()),
+      std::move(held),
       false,
       {}};
 }
@@ -173,10 +189,14 @@ int traverse(PyObject* self, visitproc visit, void* arg) {
   const PythonBatch* const b = nb::inst_ptr<PythonBatch>(self);
   const nb::handle function = b->source->function;
   Py_VISIT(function.ptr());
+  const nb::handle images = b->images->function;
+  Py_VISIT(images.ptr());
   return 0;
 }
 int clear(PyObject* self) {
-  if (nb::inst_ready(self)) nb::inst_ptr<PythonBatch>(self)->source->function = nb::none();
+  if (!nb::inst_ready(self)) return 0;
+  nb::inst_ptr<PythonBatch>(self)->source->function = nb::none();
+  nb::inst_ptr<PythonBatch>(self)->images->function = nb::none();
   return 0;
 }
 PyType_Slot slots[] = {{Py_tp_traverse, reinterpret_cast<void*>(traverse)},
@@ -254,16 +274,21 @@ void bind_batch(nb::module_& m) {
       "use it at a time; a call during another call raises an error.")
       .def(
           "__init__", make, nb::arg("device"), nb::arg("scenes"), nb::arg("config"),
-          nb::arg("environments"), nb::arg("next_episode"),
+          nb::arg("environments"), nb::arg("next_episode"), nb::arg("image_source") = nb::none(),
           nb::sig("def __init__(self, device: Device | str, "
                   "scenes: collections.abc.Sequence[SimulatorScene | OpenedScene], config: BatchConfig, "
                   "environments: int, next_episode: collections.abc.Callable[[int, int], "
-                  "BatchEpisode | PointNavEpisode]) -> None"),
+                  "BatchEpisode | PointNavEpisode], image_source: "
+                  "collections.abc.Callable[[int, int], typing.Any] | None = None) -> None"),
           "Creates a simulator that shares `scenes`.\n\n"
           "`next_episode(environment, count)` is called once for each episode of each environment. It "
           "returns "
           "a BatchEpisode, or a PointNavEpisode in scene 0. Its exceptions reach the caller of reset or "
-          "step. After that, reset all environments.")
+          "step. After that, reset all environments.\n\n"
+          "`image_source(sensor, floats)` is called at each step for each sensor, by its index. It "
+          "returns an array of at least that many float32 (DLPack) where `config.images` leaves images. "
+          "The step draws into it, so a learner can keep images without a copy. Other libraries must "
+          "have finished their work on this memory.")
       .def(
           "reset", reset, nb::arg("mask") = nb::none(),
           nb::sig("def reset(self, mask: numpy.typing.NDArray[numpy.bool_] | None = None) -> BatchStep"),

@@ -102,8 +102,8 @@ nb::dict cuda_interface(const DeviceArray& a) {
 }
 
 std::string text(const DeviceArray& a) {
-  return "DeviceArray(shape=" + text_of(shape_of(a)) + ", dtype=float32, device=cuda:" +
-         std::to_string(a.device) + ")";
+  return "DeviceArray(shape=" + text_of(shape_of(a)) +
+         ", dtype=float32, device=cuda:" + std::to_string(a.device) + ")";
 }
 
 }  // namespace
@@ -178,12 +178,14 @@ void bind_device_array(nb::module_& m) {
       "to `__dlpack__`. It keeps the simulator alive.")
       .def_prop_ro("shape", shape_of, nb::sig("def shape(self) -> tuple[int, ...]"), "(N, H, W, C).")
       .def(
-          "__dlpack_device__", [](const A& a) { return nb::make_tuple(nb::device::cuda::value, a.device); },
+          "__dlpack_device__",
+          [](const A& a) { return nb::make_tuple(nb::device::cuda::value, a.device); },
           nb::sig("def __dlpack_device__(self) -> tuple[int, int]"), "(2, index of the GPU).")
-      .def("__dlpack__", to_capsule, nb::kw_only(), nb::arg("stream") = nb::none(), nb::arg("others"),
-           nb::sig("def __dlpack__(self, *, stream: int | None = None, **others: typing.Any) -> object"),
-           "The memory as a DLPack capsule. `stream`: the consumer's stream; None is the default stream, "
-           "and -1 leaves the order to the caller. `others` are the further arguments of the protocol.")
+      .def(
+          "__dlpack__", to_capsule, nb::kw_only(), nb::arg("stream") = nb::none(), nb::arg("others"),
+          nb::sig("def __dlpack__(self, *, stream: int | None = None, **others: typing.Any) -> object"),
+          "The memory as a DLPack capsule. `stream`: the consumer's stream; None is the default stream, "
+          "and -1 leaves the order to the caller. `others` are the further arguments of the protocol.")
       .def_prop_ro("__cuda_array_interface__", cuda_interface,
                    nb::sig("def __cuda_array_interface__(self) -> dict[str, typing.Any]"),
                    "The memory for libraries without DLPack. Use the default stream with it.")

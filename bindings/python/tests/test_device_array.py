@@ -17,9 +17,10 @@ N = 6
 def parts(opened):
     episodes = gsnav.generate_episodes(opened.scene.navmesh, 32, 1)
 
-    def make(device="cuda", **settings):
+    def make(device="cuda", source=None, **settings):
         config = gsnav.BatchConfig(sensors=gsnav.rgbd_sensors(24, 32), task=gsnav.TaskConfig(max_steps=9), **settings)
-        return gsnav.BatchSimulator(device, [opened.scene], config, N, lambda e, k: episodes[(e + 5 * k) % 32])
+        return gsnav.BatchSimulator(device, [opened.scene], config, N, lambda e, k: episodes[(e + 5 * k) % 32],
+                                    source)
 
     return make
 
@@ -87,6 +88,23 @@ def test_a_step_waits_for_readers_on_the_consumers_stream(parts):
     sim.step([2] * N)  # must not overwrite the images before they are read
     torch.cuda.synchronize()
     assert torch.equal(late, before)
+
+
+def test_a_batch_draws_into_memory_of_torch(parts):
+    torch = pytest.importorskip("torch")
+    memory = {0: torch.zeros(4, N, 24, 32, 3, device="cuda"), 1: torch.zeros(4, N, 24, 32, 1, device="cuda")}
+    at, expected = 0, []
+    given, host = on_backend(parts, source=lambda sensor, floats: memory[sensor][at]), parts()
+    given.reset()
+    expected.append(host.reset()["rgb"].copy())
+    for at in range(1, 4):
+        step = given.step([2] * N)
+        assert torch.from_dlpack(step.on_backend["depth"]).data_ptr() == memory[1][at].data_ptr()
+        expected.append(host.step([2] * N)["rgb"].copy())
+    assert np.array_equal(memory[0].cpu().numpy(), np.stack(expected))
+    on_host = on_backend(parts, source=lambda sensor, floats: np.zeros(floats, np.float32))
+    with pytest.raises(gsnav.InvalidArgument, match="it must be on cuda:0"):
+        on_host.reset()
 
 
 def test_wrong_actions_on_the_device_are_refused(parts):
