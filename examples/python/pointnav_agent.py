@@ -51,7 +51,8 @@ class Worlds:
         # With as many slots as environments, one pass draws all images.
         config = gsnav.BatchConfig(task=self.task, sensors=[depth] if images else [], pose_slots=environments,
                                    images=gsnav.ImageMemory.backend, auto_reset=gsnav.AutoReset.next_step)
-        return gsnav.BatchSimulator(args.device, self.scenes, config, environments, next_episode, image_source)
+        return gsnav.BatchSimulator(args.device, self.scenes, config, environments, next_episode,
+                                    image_source=image_source)
 
 
 def mixed(*numbers: int) -> int:

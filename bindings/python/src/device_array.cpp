@@ -198,7 +198,7 @@ void bind_device_array(nb::module_& m) {
         const nb::object copy = array_from_device(array);
         return copy.is_valid() ? copy : nb::borrow(array);
       },
-      nb::arg("array"), nb::sig("def to_host(array: object) -> object"),
+      nb::arg("array").none(), nb::sig("def to_host(array: object) -> object"),
       "A numpy copy of a one-dimensional array on a GPU. Other objects are returned as they are.");
 }
 

@@ -20,7 +20,7 @@ def parts(opened):
     def make(device="cuda", source=None, **settings):
         config = gsnav.BatchConfig(sensors=gsnav.rgbd_sensors(24, 32), task=gsnav.TaskConfig(max_steps=9), **settings)
         return gsnav.BatchSimulator(device, [opened.scene], config, N, lambda e, k: episodes[(e + 5 * k) % 32],
-                                    source)
+                                    image_source=source)
 
     return make
 

@@ -16,8 +16,9 @@ def make(opened):
     episodes = gsnav.generate_episodes(opened.scene.navmesh, 16, 1)
     config = gsnav.BatchConfig(sensors=gsnav.rgbd_sensors(8, 12), task=gsnav.TaskConfig(max_steps=5))
 
-    def batch(*source):
-        return gsnav.BatchSimulator("cpu", [opened.scene], config, N, lambda e, k: episodes[(e + 5 * k) % 16], *source)
+    def batch(source=None):
+        return gsnav.BatchSimulator("cpu", [opened.scene], config, N, lambda e, k: episodes[(e + 5 * k) % 16],
+                                    image_source=source)
 
     return batch
 
