@@ -66,6 +66,30 @@ double closest(const Way& a, const std::vector<Way>& others) {
   return least;
 }
 
+/// A flat with its NavMesh, and people who walk in it.
+Result<SimulatorScene> inhabited(Result<DefaultScene> flat, std::size_t people, std::uint64_t seed,
+                                 double people_density, const TaskConfig& task) {
+  if (!flat) return flat.status();
+  const auto build = [&](double radius, double height) {
+    NavMeshSettings settings;
+    settings.agent_radius = radius;
+    settings.agent_height = height;
+    return NavMesh::build(settings, flat->vertices, flat->triangles);
+  };
+  auto mesh = build(task.agent_radius, task.agent_height);
+  if (!mesh) return mesh.status();
+  SimulatorScene scene;
+  scene.assets.push_back({std::make_shared<const GaussianCloud>(std::move(flat->cloud)), {}});
+  scene.navmesh = std::make_shared<const NavMesh>(std::move(*mesh));
+  if (people == 0) return scene;
+  const auto walkways = build(0.3, 1.8);
+  if (!walkways) return walkways.status();
+  auto actors = walking_people(*walkways, people, seed, people_density);
+  if (!actors) return actors.status();
+  scene.avatars = std::move(*actors);
+  return scene;
+}
+
 }  // namespace
 
 Vec3d person_color(std::size_t index) noexcept {
@@ -114,26 +138,17 @@ Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::si
 
 Result<SimulatorScene> default_simulator_scene(std::size_t people, std::uint64_t seed, double density,
                                                const TaskConfig& task) {
-  auto flat = make_default_scene(density);
-  if (!flat) return flat.status();
-  const auto build = [&](double radius, double height) {
-    NavMeshSettings settings;
-    settings.agent_radius = radius;
-    settings.agent_height = height;
-    return NavMesh::build(settings, flat->vertices, flat->triangles);
-  };
-  auto mesh = build(task.agent_radius, task.agent_height);
-  if (!mesh) return mesh.status();
-  SimulatorScene scene;
-  scene.assets.push_back({std::make_shared<const GaussianCloud>(std::move(flat->cloud)), {}});
-  scene.navmesh = std::make_shared<const NavMesh>(std::move(*mesh));
-  if (people == 0) return scene;
-  const auto walkways = build(0.3, 1.8);
-  if (!walkways) return walkways.status();
-  auto actors = walking_people(*walkways, people, seed);
-  if (!actors) return actors.status();
-  scene.avatars = std::move(*actors);
-  return scene;
+  return inhabited(make_default_scene(density), people, seed, 1.0, task);
+}
+
+Result<SimulatorScene> planned_simulator_scene(const FloorPlanOptions& plan, std::size_t people,
+                                               std::uint64_t seed, double density,
+                                               const TaskConfig& task) {
+  const auto drawn = make_floor_plan(plan);
+  if (!drawn) return drawn.status();
+  SceneSampling sampling;
+  sampling.density = density;
+  return inhabited(make_planned_scene(*drawn, sampling), people, seed, density, task);
 }
 
 }  // namespace gsnav

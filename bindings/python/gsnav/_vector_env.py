@@ -17,13 +17,16 @@ from ._gsnav import (
     BatchSimulator,
     BatchStep,
     Device,
+    DeviceArray,
     EpisodeRules,
     SimulatorConfig,
     to_bytes,
+    to_host,
 )
 from ._spaces import AutoresetMode, BaseVectorEnv, batch_space, make_generator
 
-Observation = dict[str, npt.NDArray[np.float32]]
+# An array per sensor: float32 of numpy, or a DeviceArray.
+Observation = dict[str, Any]
 
 AUTO_RESETS = {"NextStep": AutoReset.next_step, "SameStep": AutoReset.same_step, "Disabled": AutoReset.disabled}
 
@@ -73,7 +76,8 @@ class VectorEnv(BaseVectorEnv):
         copy: True returns observations as new arrays, which stay as they are. The simulator draws into them, so
             nothing is copied, except with the mode DISABLED. Their memory is used again when they are dead.
             False returns read-only views of the simulator's memory, which the next call overwrites.
-        Other arguments are those of Env. `config` may be a BatchConfig.
+        Other arguments are those of Env. `config` may be a BatchConfig. With `images=ImageMemory.backend` and a GPU,
+        images are DeviceArrays: views that torch and JAX take without a copy.
         """
         config = SimulatorConfig() if config is None else config
         mode = AutoresetMode(getattr(autoreset_mode, "value", autoreset_mode))
@@ -143,6 +147,8 @@ class VectorEnv(BaseVectorEnv):
             return None
         if self._last is None:
             raise InvalidArgument("VectorEnv.render: call reset() first")
+        if isinstance(self._last[self._rgb], DeviceArray):
+            raise InvalidArgument("VectorEnv.render: images are on the GPU; use images=ImageMemory.host to see them")
         return tuple(to_bytes(self._last[self._rgb]))
 
     def close_extras(self, **kwargs: Any) -> None:
@@ -172,7 +178,7 @@ class VectorEnv(BaseVectorEnv):
         return mask
 
     def _checked(self, actions: Any) -> npt.NDArray[np.integer[Any]]:
-        array = np.asarray(_task.from_dlpack(actions, "VectorEnv.step: actions"))
+        array = np.asarray(_task.from_dlpack(to_host(actions), "VectorEnv.step: actions"))
         if array.dtype.kind not in "iu":
             raise TypeError(f"VectorEnv.step: actions have dtype {array.dtype}: use integers")
         if array.shape != (self.num_envs,):
@@ -185,7 +191,7 @@ class VectorEnv(BaseVectorEnv):
         return array
 
     def _observation(self, step: BatchStep) -> Observation:
-        made = dict(step.images)
+        made: Observation = {**step.images, **step.on_backend}
         made[_task.POINT_GOAL] = step.point_goals.astype(np.float32)
         # Images that are not needed would keep the simulator from using their memory again.
         self._last = dict(made) if self.render_mode is not None else {}
@@ -220,7 +226,8 @@ class VectorEnv(BaseVectorEnv):
         observations = np.full(self.num_envs, None, object)
         goals = step.final_point_goals.astype(np.float32)
         for i, e in enumerate(step.finished):
-            observations[e] = {name: image[i] for name, image in step.final_images.items()}
+            images = {**step.final_images, **step.final_on_backend}
+            observations[e] = {name: image[i] for name, image in images.items()}
             observations[e][_task.POINT_GOAL] = goals[i]
             fresh = self.simulator.world(int(e)).last_step  # of the episode that has begun
             for name in _task.INFO_FIELDS:

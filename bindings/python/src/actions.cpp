@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "device_array.hpp"
 #include "fields.hpp"
 
 namespace gsnav::python {
@@ -95,6 +96,8 @@ BatchActions batch_actions(nb::handle source, std::size_t environments) {
   Array array;
   if (!PyList_Check(source.ptr()) && !PyTuple_Check(source.ptr())) {
     if (nb::try_cast(source, array, false)) return from_array(array, environments);
+    const nb::object copy = array_from_device(source);
+    if (copy.is_valid() && nb::try_cast(copy, array, false)) return from_array(array, environments);
     throw nb::type_error(
         ("actions: expected an array of integers or a list, got " + type_of(source)).c_str());
   }

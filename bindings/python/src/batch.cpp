@@ -3,11 +3,13 @@
 
 #include "actions.hpp"
 #include "bind.hpp"
+#include "device_array.hpp"
 #include "episode_source.hpp"
 #include "fields.hpp"
 #include "gsnav/device/simulator.hpp"
 #include "guard.hpp"
 #include "image_pool.hpp"
+#include "image_source.hpp"
 #include "structured.hpp"
 #include "world.hpp"
 
@@ -19,12 +21,20 @@ struct PythonBatch {
   BatchSimulator sim;
   std::shared_ptr<PythonSource> source;
   std::shared_ptr<ImagePool> pool;  ///< Images are drawn there, or null.
-  bool copy = false;                ///< Images are new arrays.
-  bool begun = false;               ///< Worlds exist from the first reset on.
+  std::shared_ptr<PythonImageSource> images;
+  std::shared_ptr<Consumers> consumers;
+  bool copy = false;   ///< Images are new arrays.
+  bool begun = false;  ///< Worlds exist from the first reset on.
   Busy busy;
 
-  PythonBatch(BatchSimulator s, std::shared_ptr<PythonSource> e, std::shared_ptr<ImagePool> p, bool c)
-      : sim(std::move(s)), source(std::move(e)), pool(std::move(p)), copy(c) {}
+  PythonBatch(BatchSimulator s, std::shared_ptr<PythonSource> e, std::shared_ptr<ImagePool> p,
+              std::shared_ptr<PythonImageSource> i, bool c)
+      : sim(std::move(s)),
+        source(std::move(e)),
+        pool(std::move(p)),
+        images(std::move(i)),
+        consumers(std::make_shared<Consumers>(sim.device().index())),
+        copy(c) {}
   PythonBatch(const PythonBatch&) = delete;
   PythonBatch& operator=(const PythonBatch&) = delete;
   ~PythonBatch() {
@@ -36,7 +46,7 @@ struct PythonBatch {
 struct PythonStep {
   nb::object rewards, terminated, truncated, infos, point_goals, times, finished, final_metrics,
       final_point_goals;
-  nb::dict images, final_images;
+  nb::dict images, final_images, on_backend, final_on_backend;
 };
 
 /// dtypes of structured arrays. They live as long as the process.
@@ -57,7 +67,9 @@ std::vector<std::size_t> shape_of(const BatchObservation& o) {
 template <class F>
 nb::dict image_arrays(std::span<const BatchObservation> images, const F& array) {
   nb::dict out;
-  for (const BatchObservation& o : images) out[nb::str(o.uuid.data(), o.uuid.size())] = array(o);
+  for (const BatchObservation& o : images) {
+    if (o.on_backend == nullptr) out[nb::str(o.uuid.data(), o.uuid.size())] = array(o);
+  }
   return out;
 }
 
@@ -94,8 +106,14 @@ PythonStep step_arrays(const BatchStep& s, const PythonBatch& b, nb::handle self
   const auto* const goals = reinterpret_cast<const double*>(s.final_point_goals.data());
   out.final_point_goals = array_copy(std::span(goals, 2 * ended), {ended, 2});
   out.final_metrics = structured_copy(s.final_metrics, types().metrics);
-  out.images = step_images(s.images, b, self);
+  // Images are views of memory that belongs to the simulator, or to the arrays of the source.
+  const nb::object owner = b.images->given.size() == 0
+                               ? nb::borrow(self)
+                               : nb::object(nb::make_tuple(nb::borrow(self), b.images->given));
+  out.images = step_images(s.images, b, owner);
   out.final_images = image_arrays(s.final_images, copied);
+  out.on_backend = device_images(s.images, b.sim.device(), b.consumers, owner);
+  out.final_on_backend = device_images(s.final_images, b.sim.device(), b.consumers, self);
   return out;
 }
 
@@ -104,16 +122,20 @@ template <class F>
 PythonStep observe(nb::handle self, PythonBatch& b, const char* what, const F& f) {
   check_fork(b.sim.device(), what);
   b.source->error.reset();
+  b.images->error.reset();
+  b.images->given = nb::list();
   if (b.pool != nullptr) b.pool->begin();
   std::optional<Result<BatchStep>> result;
   {
     nb::gil_scoped_release release;
+    b.consumers->wait();
     result.emplace(f(b.sim));
   }
   if (!result->ok()) {
-    if (b.source->error) {
-      nb::python_error error = std::move(*b.source->error);
-      b.source->error.reset();
+    for (std::optional<nb::python_error>* raised : {&b.source->error, &b.images->error}) {
+      if (!*raised) continue;
+      nb::python_error error = std::move(**raised);
+      raised->reset();
       throw error;
     }
     result->status().throw_if_error();
@@ -123,9 +145,11 @@ PythonStep observe(nb::handle self, PythonBatch& b, const char* what, const F& f
 
 /// Memory for the images of a batch whose arrays own them. It keeps as many bytes as two steps need, for
 /// a caller that holds the arrays of one step while it takes the next. Null if a call may draw only some
-/// of the environments: the others would have to be drawn again.
-std::shared_ptr<ImagePool> image_pool(const BatchConfig& config, std::size_t environments) {
+/// of the environments: the others would have to be drawn again. Null if images stay on a GPU.
+std::shared_ptr<ImagePool> image_pool(const Device& device, const BatchConfig& config,
+                                      std::size_t environments) {
   if (config.auto_reset == AutoReset::disabled) return nullptr;
+  if (config.images == ImageMemory::backend && device.kind() == DeviceKind::cuda) return nullptr;
   double bytes = 0;
   for (const SensorSpec& s : config.sensors) {
     bytes += 2.0 * sizeof(float) * static_cast<double>(environments) * s.resolution[0] *
@@ -136,10 +160,19 @@ std::shared_ptr<ImagePool> image_pool(const BatchConfig& config, std::size_t env
 }
 
 void make(PythonBatch* self, const DeviceArg& device, const std::vector<SceneArg>& scenes,
-          BatchConfig config, std::size_t environments, nb::object next_episode, bool copy) {
+          BatchConfig config, std::size_t environments, nb::object next_episode, bool copy,
+          nb::object images) {
   if (!PyCallable_Check(next_episode.ptr())) {
     throw nb::type_error(
         ("BatchSimulator: next_episode must be callable, got " + type_of(next_episode)).c_str());
+  }
+  if (!images.is_none() && !PyCallable_Check(images.ptr())) {
+    throw nb::type_error(
+        ("BatchSimulator: image_source must be callable or None, got " + type_of(images)).c_str());
+  }
+  if (copy && !images.is_none()) {
+    throw Error(Errc::invalid_argument,
+                "BatchSimulator: copy = True and image_source both choose memory; give one of them");
   }
   const Device chosen = device.value();
   check_fork(chosen, "BatchSimulator");
@@ -147,15 +180,17 @@ void make(PythonBatch* self, const DeviceArg& device, const std::vector<SceneArg
   for (const SceneArg& s : scenes) shared.push_back(s.scene);
   auto source = std::make_shared<PythonSource>(PythonSource{std::move(next_episode), {}});
   EpisodeSource episodes = episode_source(source);
-  std::shared_ptr<ImagePool> pool = copy ? image_pool(config, environments) : nullptr;
+  std::shared_ptr<ImagePool> pool = copy ? image_pool(chosen, config, environments) : nullptr;
   if (pool != nullptr) {
     config.image_source = [pool](std::size_t, std::size_t floats) { return pool->take(floats); };
   }
+  auto held = std::make_shared<PythonImageSource>(PythonImageSource{std::move(images), {}, {}});
+  if (!held->function.is_none()) config.image_source = image_source(held, chosen, config);
   nb::gil_scoped_release release;
   new (self) PythonBatch(BatchSimulator::create(chosen, std::move(shared), std::move(config),
                                                 environments, std::move(episodes))
                              .value(),
-                         std::move(source), std::move(pool), copy);
+                         std::move(source), std::move(pool), std::move(held), copy);
 }
 
 PythonStep reset(nb::handle self, nb::handle mask) {
@@ -203,10 +238,14 @@ int traverse(PyObject* self, visitproc visit, void* arg) {
   const PythonBatch* const b = nb::inst_ptr<PythonBatch>(self);
   const nb::handle function = b->source->function;
   Py_VISIT(function.ptr());
+  const nb::handle images = b->images->function;
+  Py_VISIT(images.ptr());
   return 0;
 }
 int clear(PyObject* self) {
-  if (nb::inst_ready(self)) nb::inst_ptr<PythonBatch>(self)->source->function = nb::none();
+  if (!nb::inst_ready(self)) return 0;
+  nb::inst_ptr<PythonBatch>(self)->source->function = nb::none();
+  nb::inst_ptr<PythonBatch>(self)->images->function = nb::none();
   return 0;
 }
 PyType_Slot slots[] = {{Py_tp_traverse, reinterpret_cast<void*>(traverse)},
@@ -247,11 +286,24 @@ void bind_step(nb::module_& m) {
           "final_images", [](const S& s) { return s.final_images; },
           nb::sig((std::string("def final_images(self) ") + images).c_str()),
           "Last images of the episodes in `finished`, with AutoReset.same_step only. A copy.")
+      .def_prop_ro(
+          "on_backend", [](const S& s) { return s.on_backend; },
+          nb::sig("def on_backend(self) -> dict[str, DeviceArray]"),
+          "Images in the memory of a GPU, with ImageMemory.backend. `images` is then empty.")
+      .def_prop_ro(
+          "final_on_backend", [](const S& s) { return s.final_on_backend; },
+          nb::sig("def final_on_backend(self) -> dict[str, DeviceArray]"),
+          "`final_images` in the memory of a GPU. Valid until the next call.")
       .def(
           "__getitem__",
           [](const S& s, const std::string& uuid) -> nb::object {
             const nb::str key(uuid.data(), uuid.size());
             if (s.images.contains(key)) return s.images[key];
+            if (s.on_backend.contains(key)) {
+              throw nb::key_error(("the images of \"" + uuid +
+                                   "\" are in the memory of the GPU: use on_backend[\"" + uuid + "\"]")
+                                      .c_str());
+            }
             const std::string known = text_of(nb::list(s.images.keys()));
             throw nb::key_error(("no sensor \"" + uuid + "\"; the sensors are " + known).c_str());
           },
@@ -273,10 +325,12 @@ void bind_batch(nb::module_& m) {
       .def(
           "__init__", make, nb::arg("device"), nb::arg("scenes"), nb::arg("config"),
           nb::arg("environments"), nb::arg("next_episode"), nb::arg("copy") = false,
+          nb::arg("image_source") = nb::none(),
           nb::sig("def __init__(self, device: Device | str, "
                   "scenes: collections.abc.Sequence[SimulatorScene | OpenedScene], config: BatchConfig, "
                   "environments: int, next_episode: collections.abc.Callable[[int, int], "
-                  "BatchEpisode | PointNavEpisode], copy: bool = False) -> None"),
+                  "BatchEpisode | PointNavEpisode], copy: bool = False, image_source: "
+                  "collections.abc.Callable[[int, int], typing.Any] | None = None) -> None"),
           "Creates a simulator that shares `scenes`.\n\n"
           "`next_episode(environment, count)` is called once for each episode of each environment. It "
           "returns "
@@ -285,7 +339,11 @@ void bind_batch(nb::module_& m) {
           "`copy` False returns images as read-only views. True returns new writable arrays, aligned to "
           "64 bytes. The simulator draws into their memory, and uses it again when they are dead. It "
           "keeps unused memory for the images of up to two steps. With AutoReset.disabled the arrays "
-          "are copies of the simulator's images.")
+          "are copies of the simulator's images. Images on a GPU are always views.\n\n"
+          "`image_source(sensor, floats)` is called at each step for each sensor, by its index. It "
+          "returns an array of at least that many float32 (DLPack) where `config.images` leaves images. "
+          "The step draws into it, so a learner can keep images without a copy. Other libraries must "
+          "have finished their work on this memory.")
       .def(
           "reset", reset, nb::arg("mask") = nb::none(),
           nb::sig("def reset(self, mask: numpy.typing.NDArray[numpy.bool_] | None = None) -> BatchStep"),

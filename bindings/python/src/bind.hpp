@@ -14,9 +14,11 @@ void bind_render_settings(nb::module_& m);
 void bind_renderer(nb::module_& m);
 void bind_task(nb::module_& m);
 void bind_episodes(nb::module_& m);
+void bind_planned_scene(nb::module_& m);
 void bind_settings(nb::module_& m);
 void bind_world(nb::module_& m);
 void bind_simulator(nb::module_& m);
+void bind_device_array(nb::module_& m);
 void bind_batch(nb::module_& m);
 
 }  // namespace gsnav::python

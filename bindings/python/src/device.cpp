@@ -15,7 +15,7 @@ void bind_device(nb::module_& m) {
   nb::enum_<DeviceKind>(m, "DeviceKind", "Kind of hardware that a program computes on.")
       .value("serial", DeviceKind::serial, "One thread of portable code: the reference.")
       .value("cpu", DeviceKind::cpu, "All CPU cores and SIMD lanes.")
-      .value("cuda", DeviceKind::cuda, "An NVIDIA GPU. This package has no GPU code yet.");
+      .value("cuda", DeviceKind::cuda, "An NVIDIA GPU, in a package that was built with GSNAV_CUDA=ON.");
 
   nb::class_<Device>(
       m, "Device",
@@ -24,7 +24,8 @@ void bind_device(nb::module_& m) {
       .def(nb::init<>(), "The serial device.")
       .def_static(
           "parse", [](const std::string& text) { return Device::parse(text).value(); }, nb::arg("text"),
-          "Parses the name of a device: \"best\", \"cpu\", \"cpu:4\" (four threads) or \"serial\".\n\n"
+          "Parses the name of a device: \"best\", \"cpu\", \"cpu:4\" (four threads), \"cuda\", "
+          "\"cuda:1\" or \"serial\".\n\n"
           "Raises InvalidArgument for any other text, and Unsupported if this machine has no such "
           "device.")
       .def_static("available", &Device::available,

@@ -162,6 +162,7 @@ void bind_episodes(nb::module_& m) {
       "The embedded flat with its NavMesh for the body of `task`, and people who walk in it. `density` "
       "is "
       "the factor on the number of Gaussians of the flat, in [0.05, 20].");
+  bind_planned_scene(m);
 }
 
 }  // namespace gsnav::python

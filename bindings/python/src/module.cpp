@@ -22,5 +22,6 @@ NB_MODULE(_gsnav, m) {
   bind_settings(m);
   bind_world(m);
   bind_simulator(m);
+  bind_device_array(m);
   bind_batch(m);
 }

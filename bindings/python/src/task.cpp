@@ -143,9 +143,12 @@ void bind_settings(nb::module_& m) {
              "The next step ignores its action and begins an episode.")
       .value("same_step", AutoReset::same_step, "The step that ends an episode begins the next one.")
       .value("disabled", AutoReset::disabled, "The environment waits for reset(mask).");
+  nb::enum_<ImageMemory>(m, "ImageMemory", "Where a batch returns its images.")
+      .value("host", ImageMemory::host, "In host memory, as numpy arrays.")
+      .value("backend", ImageMemory::backend, "In the memory of the device, as DeviceArray on a GPU.");
   using B = BatchConfig;
   Struct<B, C>(m, "BatchConfig",
-               "Settings of a batch of environments: those of SimulatorConfig and two more.")
+               "Settings of a batch of environments: those of SimulatorConfig and three more.")
       .field("task", &B::task, "Agent, actions and rules of the task.")
       .field("sensors", &B::sensors,
              "Sensors of the agent. Reading gives a new list; assign to change it.")
@@ -157,6 +160,7 @@ void bind_settings(nb::module_& m) {
       .field("seed", &B::seed, "Seed of the sensor noise; environment e has seed + e.")
       .field("auto_reset", &B::auto_reset, "When an environment that is done begins its next episode.")
       .field("pose_slots", &B::pose_slots, "Number of poses of avatars that are held at once, >= 1.")
+      .field("images", &B::images, "Where images are returned.")
       .done();
 }
 

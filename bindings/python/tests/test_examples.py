@@ -12,7 +12,12 @@ NEEDS = {"vector_env.py": "gymnasium", "plot.py": "matplotlib", "on_ray.py": "ra
 WRITES = {"render_scan.py": "scan.npz", "plot.py": "plot.png", "on_ray.py": "journal.jsonl"}
 
 
-@pytest.mark.parametrize("name", sorted(p.name for p in EXAMPLES.glob("*.py")))
+# These have tests of their own (test_train_pointnav.py), and need torch.
+LONG = sorted(EXAMPLES.glob("*pointnav*.py"))
+SHORT = sorted(set(EXAMPLES.glob("*.py")) - set(LONG))
+
+
+@pytest.mark.parametrize("name", [p.name for p in SHORT])
 def test_example(name, tmp_path):
     if name in NEEDS:
         pytest.importorskip(NEEDS[name])
@@ -25,6 +30,7 @@ def test_example(name, tmp_path):
 
 def test_types_of_the_examples(tmp_path):
     pytest.importorskip("mypy")
-    run = subprocess.run([sys.executable, "-m", "mypy", "--strict", "--cache-dir", tmp_path, *EXAMPLES.glob("*.py")],
+    run = subprocess.run([sys.executable, "-m", "mypy", "--strict", "--cache-dir", tmp_path, *SHORT],
                          capture_output=True, text=True, cwd=tmp_path)
     assert run.returncode == 0, run.stdout
+    assert len(LONG[-1].read_text().splitlines()) <= 400

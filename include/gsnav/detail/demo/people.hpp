@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "gsnav/detail/demo/floor_plan.hpp"
 #include "gsnav/detail/sim/task.hpp"
 #include "gsnav/sim/scene.hpp"
 
@@ -27,5 +28,11 @@ Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::si
 /// that of the flat's Gaussians, not of the people's (see walking_people). Errors: those of the parts.
 Result<SimulatorScene> default_simulator_scene(std::size_t people = 3, std::uint64_t seed = 1,
                                                double density = 1.0, const TaskConfig& task = {});
+
+/// The flat of make_floor_plan(`plan`) with its NavMesh for the body of `task`, and people who walk in
+/// it. `density` is that of the Gaussians of the flat and of the people. Errors: those of the parts.
+Result<SimulatorScene> planned_simulator_scene(const FloorPlanOptions& plan, std::size_t people = 0,
+                                               std::uint64_t seed = 1, double density = 1.0,
+                                               const TaskConfig& task = {});
 
 }  // namespace gsnav

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <nanobind/stl/shared_ptr.h>
+
+#include "bind.hpp"
+#include "fields.hpp"
+#include "gsnav/demo.hpp"
+
+namespace gsnav::python {
+
+void bind_planned_scene(nb::module_& m) {
+  using O = FloorPlanOptions;
+  Struct<O>(m, "FloorPlanOptions", "Settings of the flat that planned_simulator_scene makes.")
+      .field("seed", &O::seed, "Seed of all random choices.")
+      .field("rooms", &O::rooms, "Number of rooms, 1 to 12.")
+      .field("clearance", &O::clearance,
+             "A disc of this radius passes through every doorway, metres, in [0.1, 0.35].")
+      .done();
+  m.def(
+      "planned_simulator_scene",
+      [](const O& plan, std::size_t people, std::uint64_t seed, double density, const TaskConfig& task) {
+        return std::make_shared<SimulatorScene>(
+            planned_simulator_scene(plan, people, seed, density, task).value());
+      },
+      nb::arg("plan") = O{}, nb::arg("people") = 0, nb::arg("seed") = 1, nb::arg("density") = 1.0,
+      nb::arg("task") = TaskConfig{}, nb::call_guard<nb::gil_scoped_release>(),
+      "A random furnished flat with its NavMesh for the body of `task`, and people who walk in it. The "
+      "same arguments give the same scene. `density` is the factor on the number of Gaussians of the "
+      "flat and of the people, in [0.05, 20].");
+}
+
+}  // namespace gsnav::python

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Random flats: a seed gives one flat, and agents can walk in it."""
+
+import numpy as np
+import pytest
+
+import gsnav
+
+
+def image(scene):
+    config = gsnav.SimulatorConfig(sensors=gsnav.rgbd_sensors(16, 24))
+    sim = gsnav.Simulator("cpu", scene, config)
+    return sim.reset(gsnav.generate_episodes(scene.navmesh, 1, 1)[0])["rgb"].copy()
+
+
+def test_a_seed_gives_one_flat():
+    made = [gsnav.planned_simulator_scene(gsnav.FloorPlanOptions(seed=s, rooms=2), density=0.05) for s in (5, 5, 6)]
+    images = [image(scene) for scene in made]
+    assert np.array_equal(images[0], images[1]) and not np.array_equal(images[0], images[2])
+    assert made[0].avatar_count == 0
+
+
+def test_people_walk_on_the_floor_of_the_flat():
+    scene = gsnav.planned_simulator_scene(gsnav.FloorPlanOptions(seed=5), people=3, seed=2, density=0.05)
+    assert scene.avatar_count == 3
+    rules = gsnav.EpisodeRules(min_distance=2.0)
+    for episode in gsnav.generate_episodes(scene.navmesh, 5, 1, rules):
+        path = scene.navmesh.find_path(episode.start_position, episode.goal_position)
+        assert path.length == pytest.approx(episode.geodesic_distance) and path.length >= 2
+
+
+def test_wrong_options_are_named():
+    with pytest.raises(gsnav.InvalidArgument, match="rooms = 13"):
+        gsnav.planned_simulator_scene(gsnav.FloorPlanOptions(rooms=13))
+    with pytest.raises(gsnav.InvalidArgument, match="density"):
+        gsnav.planned_simulator_scene(density=0)
+    with pytest.raises(TypeError, match="no field"):
+        gsnav.FloorPlanOptions(doors=3)

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Trains examples/python/train_pointnav.py for a few updates on the CPU: the same arguments give the same bits."""
+
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+torch = pytest.importorskip("torch")
+
+FOLDER = pathlib.Path(__file__).parents[3] / "examples" / "python"
+TINY = ["--device", "cpu:1", "--flats", "2", "--density", "0.05", "--episodes-per-flat", "10", "--rollout", "16"]
+ONE_THREAD = {**os.environ, "OMP_NUM_THREADS": "1"}
+
+
+def command(out, *more, environments=4, ranks=1, updates=10, every=5):
+    start = [sys.executable]
+    if ranks > 1:
+        start += ["-m", "torch.distributed.run", "--standalone", "--nproc-per-node", str(ranks)]
+    steps = 16 * environments * ranks * updates
+    return [*start, FOLDER / "train_pointnav.py", *TINY, "--out", out, "--environments", str(environments), "--every",
+            str(every), "--steps", str(steps), *more]
+
+
+def trained(*arguments, **keywords):
+    """Hash of the run."""
+    run = subprocess.run(command(*arguments, **keywords), env=ONE_THREAD, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    return re.search(r"^hash (\w{16})$", run.stdout, re.MULTILINE)[1]
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory):
+    """Folder and hash of ten updates in four environments."""
+    out = tmp_path_factory.mktemp("first")
+    return out, trained(out)
+
+
+def rows(out):
+    """The log without its last column, the time."""
+    return [line.split(",")[:-1] for line in (out / "log.csv").read_text().splitlines()]
+
+
+def test_two_runs_give_the_same_hash(first, tmp_path):
+    assert trained(tmp_path) == first[1]
+    assert trained(tmp_path / "other", "--seed", "2") != first[1]
+    assert rows(tmp_path) == rows(first[0]) and len(rows(first[0])) == 11
+
+
+def test_a_killed_run_goes_on_with_the_same_bits(first, tmp_path):
+    run = subprocess.Popen(command(tmp_path), env=ONE_THREAD, stdout=subprocess.DEVNULL)
+    while not (tmp_path / "checkpoint.pt").exists() and run.poll() is None:
+        time.sleep(0.001)
+    run.send_signal(signal.SIGKILL)
+    assert run.wait() == -signal.SIGKILL  # else it was done before it could be killed
+    assert torch.load(tmp_path / "checkpoint.pt", weights_only=True)["update"] == 5
+    assert trained(tmp_path) == first[1]
+
+
+def weights(out):
+    return torch.load(out / "checkpoint.pt", weights_only=True)["agent"]
+
+
+def test_two_ranks_make_the_update_of_one_with_twice_the_environments(tmp_path):
+    # Adam divides by the size of the gradient, so that small gradients would show every rounding: one update.
+    trained(tmp_path / "one", "--lr", "0.01", environments=8, updates=1, every=1)
+    trained(tmp_path / "two", "--lr", "0.01", environments=4, ranks=2, updates=1, every=1)
+    one, two = weights(tmp_path / "one"), weights(tmp_path / "two")
+    for name, value in one.items():
+        assert torch.allclose(value, two[name], atol=2e-4), f"{name}: {(value - two[name]).abs().max()}"
+    log = [[float(x) for x in rows(tmp_path / name)[1]] for name in ("one", "two")]
+    assert log[0] == pytest.approx(log[1], abs=1e-5)
+
+
+def test_errors_say_what_to_do(first, tmp_path):
+    def refused(*words, script="train_pointnav.py"):
+        run = subprocess.run([sys.executable, FOLDER / script, *words], capture_output=True, text=True)
+        assert run.returncode != 0
+        return run.stderr
+
+    assert "another folder" in refused(*TINY, "--out", first[0], "--people", "1")
+    assert "there are" in refused("--device", "tpu", "--out", tmp_path)
+    assert "multiple of --chunks" in refused("--chunks", "3")
+    assert "Train first" in refused("--out", tmp_path, script="play_pointnav.py")
+
+
+def test_the_agent_plays_held_out_episodes(first):
+    run = subprocess.run([sys.executable, FOLDER / "play_pointnav.py", "--device", "cpu:1", "--out", first[0],
+                          "--episodes", "16", "--policies", "agent", "follower"],
+                         env=ONE_THREAD, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    rows = {line.split("|")[1].strip(): line.split("|") for line in run.stdout.splitlines()[2:]}
+    assert float(rows["follower"][3]) > 0.9 > float(rows["agent"][3])

@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The worlds and the agent of train_pointnav.py and play_pointnav.py."""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import concurrent.futures
+import csv
+import hashlib
+import os
+import pathlib
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+import gsnav
+
+ACTIONS = 4  # stop, forward, left, right
+TRAIN_SEEDS, HELD_OUT_SEEDS = range(64), range(64, 80)
+METRICS = ("success", "spl", "soft_spl", "collision_rate", "psi", "steps")
+
+
+class Worlds:
+    """Flats and their episodes. The same arguments give the same ones."""
+
+    def __init__(self, seeds: range, args: argparse.Namespace, episodes: int) -> None:
+        self.task = gsnav.TaskConfig.avatar_pointnav() if args.people else gsnav.TaskConfig()
+
+        def make(seed: int) -> tuple[gsnav.SimulatorScene, list[gsnav.PointNavEpisode]]:
+            plan = gsnav.FloorPlanOptions(seed=seed, rooms=args.rooms)
+            scene = gsnav.planned_simulator_scene(plan, args.people, seed, args.density, self.task)
+            assert scene.navmesh is not None
+            return scene, list(gsnav.generate_episodes(scene.navmesh, episodes, seed))
+
+        with concurrent.futures.ThreadPoolExecutor(min(16, os.cpu_count() or 1)) as pool:
+            made = list(pool.map(make, seeds))
+        self.scenes = [scene for scene, _ in made]
+        self.episodes = [gsnav.BatchEpisode(scene=s, episode=made[s][1][k])
+                         for k in range(episodes) for s in range(len(made))]
+
+    def simulator(self, args: argparse.Namespace, environments: int, images: bool,
+                  next_episode: Callable[[int, int], gsnav.BatchEpisode],
+                  image_source: Callable[[int, int], Tensor] | None = None) -> gsnav.BatchSimulator:
+        """Environments with a depth sensor, or with none. After an episode, a step without effect begins the next."""
+        depth = gsnav.SensorSpec(uuid="depth", kind=gsnav.SensorKind.depth, resolution=[args.size, args.size])
+        # With as many slots as environments, one pass draws all images.
+        config = gsnav.BatchConfig(task=self.task, sensors=[depth] if images else [], pose_slots=environments,
+                                   images=gsnav.ImageMemory.backend, auto_reset=gsnav.AutoReset.next_step)
+        return gsnav.BatchSimulator(args.device, self.scenes, config, environments, next_episode,
+                                    image_source=image_source)
+
+
+def mixed(*numbers: int) -> int:
+    """A number of 64 bits that depends on all arguments."""
+    return int.from_bytes(hashlib.blake2b(repr(numbers).encode(), digest_size=8).digest(), "little")
+
+
+class Draw:
+    """Source of the training episodes. They depend on the environment's number among all ranks."""
+
+    def __init__(self, worlds: Worlds, seed: int, first: int) -> None:
+        self.episodes, self.seed, self.first = worlds.episodes, seed, first
+        self.begin(0)
+
+    def begin(self, epoch: int) -> None:
+        """From here on, episodes depend on `epoch` and not on those that were played before."""
+        self.epoch, self.given = epoch, collections.Counter[int]()
+
+    def __call__(self, environment: int, count: int) -> gsnav.BatchEpisode:
+        self.given[environment] += 1
+        at = mixed(self.seed, self.epoch, self.first + environment, self.given[environment])
+        return self.episodes[at % len(self.episodes)]
+
+
+# [snippet: rows]
+class Rows:
+    """Memory of a rollout's images, [T + 1][N][H][W][1]. The simulator draws into row `at`."""
+
+    def __init__(self, images: Tensor) -> None:
+        self.images, self.at = images, 0
+
+    def __call__(self, sensor: int, floats: int) -> Tensor:
+        return self.images[self.at]
+# [/snippet]
+
+
+class Agent(nn.Module):
+    """Three convolutions and a GRU, from depth, goal and last action to the next action and the value."""
+
+    def __init__(self, size: int, blind: bool) -> None:
+        super().__init__()
+        self.size, self.cnn = size, None
+        if not blind:
+            layers = [nn.Conv2d(1, 32, 8, 4), nn.Conv2d(32, 64, 4, 2), nn.Conv2d(64, 32, 3, 1)]
+            self.cnn = nn.Sequential(*(part for layer in layers for part in (layer, nn.ReLU())), nn.Flatten())
+            with torch.no_grad():
+                layers[0].weight.div_(10.0)  # depth in units of 10 m, without a pass over the images
+                length = self.cnn(torch.zeros(1, 1, size, size)).shape[1]
+            self.image = nn.Sequential(nn.Linear(length, 256), nn.ReLU())
+        self.goal, self.last = nn.Linear(3, 32), nn.Embedding(ACTIONS + 1, 32)
+        self.gru = nn.GRU(64 if blind else 320, 256)
+        self.policy, self.value = nn.Linear(256, ACTIONS), nn.Linear(256, 1)
+        with torch.no_grad():
+            self.policy.weight.mul_(0.01)
+
+    def features(self, depth: Tensor, goal: Tensor, last: Tensor) -> Tensor:
+        """Inputs of the GRU for images [B][H][W][1], goals [B][3] and last actions [B]."""
+        parts = [self.goal(goal), self.last(last)]
+        if self.cnn is not None:
+            parts.append(self.image(self.cnn(depth.view(-1, 1, self.size, self.size))))
+        return torch.cat(parts, -1)
+
+    def heads(self, y: Tensor) -> tuple[Tensor, Tensor]:
+        """Logarithms of the actions' probabilities, [B][4], and values, [B]."""
+        return torch.log_softmax(self.policy(y), -1), self.value(y)[:, 0]
+
+    def act(self, depth: Tensor, goal: Tensor, last: Tensor, start: Tensor, hidden: Tensor,
+            noise: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Samples actions: actions, their log-probabilities, values and hidden states."""
+        last = torch.where(start > 0, ACTIONS, last)
+        y, hidden = self.gru(self.features(depth, goal, last)[None], (hidden * (1 - start[:, None]))[None])
+        log_p, value = self.heads(y[0])
+        action = (log_p - torch.log(-torch.log(noise))).argmax(-1)
+        return action, log_p.gather(-1, action[:, None])[:, 0], value, hidden[0]
+
+
+class Reorder(torch.autograd.Function):
+    """Rows in another order. The gradient is a gather too, which is deterministic and fast."""
+
+    @staticmethod
+    def forward(ctx: Any, rows: Tensor, order: Tensor, inverse: Tensor) -> Tensor:
+        ctx.save_for_backward(inverse)
+        return rows[order]
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, None, None]:
+        return gradients[0][ctx.saved_tensors[0]], None, None
+
+
+def pieces(start: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Cuts a chunk at the starts of episodes, bool [L][N], so that a GRU runs over each piece.
+
+    Returns the order of the rows of a PackedSequence, its batch sizes, and for each piece its environment and
+    whether it begins with an episode."""
+    length, environments = start.shape
+    begin = start.copy()
+    begin[0] = True
+    env, first = np.nonzero(begin.T)
+    end = np.append(first[1:], length)
+    end[np.append(env[1:] != env[:-1], True)] = length
+    longest = np.argsort(first - end, kind="stable")
+    env, first, count = env[longest], first[longest], (end - first)[longest]
+    sizes = (count[:, None] > np.arange(length)).sum(0)
+    sizes = sizes[sizes > 0]
+    order = np.concatenate([(first[:n] + k) * environments + env[:n] for k, n in enumerate(sizes)])
+    return order, sizes, env, start[first, env]
+
+
+def goals(seen: gsnav.BatchStep) -> np.ndarray:
+    """Goals as the agent gets them, [N][3]: distance (metres), cosine and sine of the angle."""
+    distance, angle = seen.point_goals.T
+    return np.stack([distance, np.cos(angle), np.sin(angle)], 1)
+
+
+def clear(noise: Tensor) -> Tensor:
+    """Random numbers whose logarithm of the logarithm is finite."""
+    return noise.clamp_(1e-9, 1 - 1e-7)
+
+
+def world_arguments(p: argparse.ArgumentParser) -> None:
+    """Adds the arguments for the worlds and the sensors."""
+    p.add_argument("--device", default="best", help="device of gsnav and torch: best, cuda, cuda:1, cpu, ...")
+    p.add_argument("--people", type=int, default=0, help="people in each flat")
+    p.add_argument("--blind", action="store_true", help="the agent sees no images")
+    p.add_argument("--size", type=int, default=64, help="edge of the depth images, pixels, 36 or more")
+    p.add_argument("--density", type=float, default=0.05, help="factor on the number of Gaussians")
+    p.add_argument("--rooms", type=int, default=4, help="rooms of a flat")
+
+
+def device_of(name: str) -> tuple[str, torch.device]:
+    """The device of gsnav and the one of torch."""
+    try:
+        device = gsnav.Device.parse(name)
+    except gsnav.Error as e:
+        sys.exit(f"--device {name}: {e}")
+    if device.kind != gsnav.DeviceKind.cuda:
+        return device.name, torch.device("cpu")
+    if not torch.cuda.is_available():
+        sys.exit(f"--device {device.name}: this torch has no CUDA. Install one that has, or use --device cpu.")
+    torch.cuda.set_device(device.index)
+    return device.name, torch.device("cuda", device.index)
+
+
+def progress(log: list[dict[str, float]], updates: int, rate: float) -> None:
+    """Prints a line: means over the episodes of the last ten updates."""
+    recent, row = log[-10:], log[-1]
+    weight = sum(r["episodes"] for r in recent) or 1
+    success, spl = (sum(r[name] * r["episodes"] for r in recent) / weight for name in ("success", "spl"))
+    print(f"update {row['update']}/{updates}, {row['frames']:,.0f} steps, {rate:,.0f}/s, success {success:.3f}, "
+          f"SPL {spl:.3f}, entropy {row['entropy']:.2f}", end="\r" if sys.stdout.isatty() else "\n", flush=True)
+
+
+def write_log(out: pathlib.Path, log: list[dict[str, float]]) -> None:
+    """Writes log.csv, and its curves as curves.png."""
+    with open(out / "log.csv", "w", newline="") as file:
+        writer = csv.DictWriter(file, log[0].keys())
+        writer.writeheader()
+        writer.writerows(log)
+    try:
+        import matplotlib
+    except ImportError:
+        print("curves.png needs matplotlib, and is left out: pip install matplotlib", file=sys.stderr)
+        return
+    matplotlib.use("agg")
+    from matplotlib import pyplot
+    figure, axes = pyplot.subplots(1, 2, figsize=(10, 4))
+    frames = [row["frames"] for row in log]
+    for axis, names in zip(axes, (("success", "spl"), ("reward", "entropy"))):
+        for name in names:
+            axis.plot(frames, [row[name] for row in log], label=name)
+        axis.set_xlabel("environment steps"), axis.legend(), axis.grid(True)
+    figure.savefig(out / "curves.png", dpi=100)
+    pyplot.close(figure)

@@ -1,0 +1,391 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Trains a PointNav agent from depth with DD-PPO, in random flats. Needs torch; --help explains the arguments.
+
+    train_pointnav.py --out run --steps 1e8              # train, or go on from the checkpoint in run/
+    torchrun --nproc-per-node 2 train_pointnav.py ...    # one process per GPU
+
+The same arguments give the same bits, also after a run was stopped and resumed. docs/guide/train_an_agent.md explains.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import math
+import os
+import pathlib
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # cuBLAS is deterministic with it only
+
+try:
+    import torch
+except ImportError:
+    sys.exit("train_pointnav.py needs PyTorch: pip install torch")
+import numpy as np
+import torch.distributed as dist
+from pointnav_agent import ACTIONS, METRICS, TRAIN_SEEDS, Agent, Draw, Reorder, Rows, Worlds
+from pointnav_agent import clear, device_of, goals, mixed, pieces, progress, world_arguments, write_log
+from torch import Tensor, nn
+from torch.nn.utils.rnn import PackedSequence
+
+import gsnav
+
+GAMMA, LAMBDA, CLIP, VALUE_COEF, ENTROPY_COEF, MAX_NORM = 0.99, 0.95, 0.2, 0.5, 0.01, 0.5
+# Arguments that a checkpoint keeps: with others, training would not go on as it began.
+KEPT = ("seed", "flats", "episodes_per_flat", "people", "blind", "size", "density", "rooms", "environments",
+        "rollout", "chunks", "epochs", "lr", "horizon", "every", "cut_off", "ranks")
+
+
+class Learner:
+    """Collects rollouts of T steps in N environments and updates the agent by PPO."""
+
+    def __init__(self, args: argparse.Namespace, agent: Agent, worlds: Worlds) -> None:
+        self.args, self.agent, self.worlds = args, agent, worlds
+        self.device, n, t = next(agent.parameters()).device, args.environments, args.rollout
+        self.rank, self.ranks = (dist.get_rank(), dist.get_world_size()) if dist.is_initialized() else (0, 1)
+        self.optimizer = torch.optim.Adam(agent.parameters(), args.lr, eps=1e-5, fused=self.device.type == "cuda")
+        self.update_count, self.digest = 0, b""
+        self.draw = Draw(worlds, args.seed, self.rank * n)
+        size = 0 if args.blind else args.size
+
+        def made(*shape: int, dtype: torch.dtype = torch.float32, host: bool = False) -> Tensor:
+            pinned = host and self.device.type == "cuda"
+            return torch.zeros(*shape, dtype=dtype, device="cpu" if host else self.device, pin_memory=pinned)
+
+        self.depth = made(t + 1, n, size, size, 1)
+        self.rows = Rows(self.depth)
+        self.simulator = worlds.simulator(args, n, not args.blind, self.draw, self.rows)
+        self.goal, self.start = made(t + 1, n, 3), made(t + 1, n)
+        self.action, self.log_p, self.values = made(t, n, dtype=torch.int64), made(t, n), made(t + 1, n)
+        self.last, self.hidden, self.noise = made(t + 1, n, dtype=torch.int64), made(n, 256), made(t + 1, n, ACTIONS)
+        self.first_hidden = made(args.chunks, n, 256)
+        self.result, self.advantage, self.returns = made(3, t, n), made(t, n), made(t, n)
+        self.moments, self.losses = made(3), made(3)
+        # On the host: what the simulator returns, and the actions that it takes.
+        self.host_goal, self.host_start = made(t + 1, n, 3, host=True), made(t + 1, n, host=True)
+        self.host_action = made(n, dtype=torch.int64, host=True)
+        self.host_result = made(3, t, n, host=True)  # reward, done, valid
+        self.pool = torch.cuda.graph_pool_handle() if self.device.type == "cuda" else None
+        self.graphs: dict[tuple[str, int], torch.cuda.CUDAGraph] = {}
+        self.store = dist.distributed_c10d._get_default_store() if self.ranks > 1 else None
+        self.times = dict.fromkeys(("simulate", "act", "learn"), 0.0)
+
+    def run(self, name: str, f: Callable[[int], None], at: int = 0) -> None:
+        """Runs f(at), on a GPU as a CUDA graph. A second run of f may change the hidden state only."""
+        if self.device.type != "cuda":
+            return f(at)
+        if (name, at) not in self.graphs:
+            hidden = self.hidden.clone()
+            f(at)  # lets libraries allocate what they need
+            self.hidden.copy_(hidden)
+            torch.cuda.synchronize()
+            graph = torch.cuda.CUDAGraph()
+            with torch.cuda.graph(graph, pool=self.pool):
+                f(at)
+            self.graphs[name, at] = graph
+        self.graphs[name, at].replay()
+
+    def note(self, what: str) -> None:
+        """Adds the time since the last note to a row of the table of times."""
+        now = time.perf_counter()
+        self.times[what] += now - self.clock
+        self.clock = now
+
+    def begin(self) -> None:
+        """Starts new episodes in all environments. From here on, everything follows from the checkpoint."""
+        self.draw.begin(self.update_count)
+        self.rows.at = 0
+        self.seen, self.ended = self.simulator.reset(), np.zeros(self.args.environments, np.bool_)
+        self.hidden.zero_()
+        self.last.zero_()
+        self.observe(0, np.ones_like(self.ended))
+
+    def observe(self, t: int, start: np.ndarray) -> None:
+        """Stores the observations before action t. The simulator has drawn the images in their row."""
+        self.host_goal.numpy()[t] = goals(self.seen)
+        self.host_start.numpy()[t] = self.starts = start
+
+    def act(self, t: int) -> None:
+        """Chooses action t. After the last one, only the value is of use."""
+        steps = self.args.rollout
+        self.goal[t].copy_(self.host_goal[t], non_blocking=True)
+        self.start[t].copy_(self.host_start[t], non_blocking=True)
+        if t < steps and t % (steps // self.args.chunks) == 0:
+            self.first_hidden[t * self.args.chunks // steps].copy_(self.hidden)
+        action, log_p, value, hidden = self.agent.act(self.depth[t], self.goal[t], self.last[t], self.start[t],
+                                                      self.hidden, self.noise[t])
+        self.values[t].copy_(value)
+        if t < steps:
+            self.action[t].copy_(action), self.log_p[t].copy_(log_p), self.last[t + 1].copy_(action)
+            self.host_action.copy_(action, non_blocking=True)
+            self.hidden.copy_(hidden)
+
+    def bootstrap(self, t: int) -> None:
+        """The value of the state after the last action."""
+        hidden = self.hidden.clone()
+        self.act(t)
+        self.hidden.copy_(hidden)
+
+    def straggles(self, t: int) -> bool:
+        """Whether enough other ranks have finished their rollouts, so that this one ends early."""
+        a = self.args
+        if self.ranks == 1 or a.cut_off >= 1 or t < a.rollout // 4 or t % 8:
+            return False
+        return self.store.add(f"done {self.update_count}", 0) >= a.cut_off * self.ranks
+
+    @torch.no_grad()
+    def collect(self) -> np.ndarray:
+        """Plays up to T steps. Returns the metrics of the episodes that ended."""
+        a, t, finished = self.args, 0, []
+        torch.manual_seed(mixed(a.seed, self.update_count) >> 1)
+        noise = torch.rand(a.rollout + 1, self.ranks * a.environments, ACTIONS, device=self.device)
+        mine = slice(self.rank * a.environments, (self.rank + 1) * a.environments)
+        self.noise.copy_(clear(noise[:, mine]))
+        reward, done, valid = self.host_result.numpy()
+        self.clock = time.perf_counter()
+        while t < a.rollout and not self.straggles(t):
+            self.run("act", self.act, t)
+            if self.device.type == "cuda":
+                torch.cuda.current_stream().synchronize()
+            self.note("act")
+            self.rows.at = t + 1
+            self.seen = self.simulator.step(self.host_action.numpy())
+            self.note("simulate")
+            # After the end of an episode comes a step without effect, which begins the next episode.
+            reward[t], valid[t], start = self.seen.rewards, ~self.ended, self.ended
+            self.ended = self.seen.terminated | self.seen.truncated
+            done[t] = self.ended
+            t += 1
+            self.observe(t, start)
+            finished += [self.seen.final_metrics] if len(self.seen.finished) else []
+        self.run("bootstrap", self.bootstrap, t)
+        valid[t:] = reward[t:] = self.host_start.numpy()[t + 1:] = 0
+        if self.ranks > 1 and a.cut_off < 1:
+            self.store.add(f"done {self.update_count}", 1)
+        self.used = t
+        self.metrics = np.concatenate(finished) if finished else self.seen.final_metrics
+        self.digest = hashlib.sha256(self.digest + self.metrics.tobytes()).digest()
+        return self.metrics
+
+    def estimate(self, _: int) -> None:
+        """Generalised advantages."""
+        self.result.copy_(self.host_result, non_blocking=True)
+        reward, done, valid = self.result
+        advantage = torch.zeros_like(reward[0])
+        for t in reversed(range(self.args.rollout)):
+            go = GAMMA * (1 - done[t])
+            advantage = valid[t] * (reward[t] + go * self.values[t + 1] - self.values[t] + go * LAMBDA * advantage)
+            self.advantage[t].copy_(advantage)
+        torch.add(self.advantage, self.values[:-1], out=self.returns)
+        torch.stack([valid.sum(), self.advantage.sum(), (self.advantage ** 2).sum()], out=self.moments)
+
+    def normalize(self) -> None:
+        """Gives advantages mean 0 and variance 1 over all ranks."""
+        count, total, squares = self.moments
+        mean = total / count
+        deviation = (squares / count - mean ** 2).clamp(min=1e-8).sqrt()
+        self.advantage.sub_(mean).div_(deviation)
+
+    def loss(self, chunk: int, order: Tensor, inverse: Tensor, sizes: Tensor, env: Tensor, fresh: Tensor) -> Tensor:
+        """Loss of a chunk of time steps, and its parts: policy, value, entropy."""
+        length = self.args.rollout // self.args.chunks
+        rows = slice(chunk * length, (chunk + 1) * length)
+
+        def row(values: Tensor) -> Tensor:
+            return values[rows].reshape(-1)[order]
+
+        last = torch.where(self.start[rows] > 0, ACTIONS, self.last[rows])
+        x = self.agent.features(self.depth[rows], self.goal[rows].reshape(-1, 3), last.reshape(-1))
+        hidden = self.first_hidden[chunk][env] * (1 - fresh)[:, None]
+        y = self.agent.gru(PackedSequence(Reorder.apply(x, order, inverse), sizes), hidden[None])[0].data
+        log_p, value = self.agent.heads(y)
+        weight, advantage = row(self.result[2]), row(self.advantage)
+        ratio = (log_p.gather(-1, row(self.action)[:, None])[:, 0] - row(self.log_p)).exp()
+        policy = -torch.min(ratio * advantage, ratio.clamp(1 - CLIP, 1 + CLIP) * advantage)
+        error = 0.5 * (value - row(self.returns)) ** 2
+        entropy = -(log_p.exp() * log_p).sum(-1)
+        parts = torch.stack([(weight * part).mean() for part in (policy, error, entropy)])
+        self.losses += parts.detach()
+        return parts[0] + VALUE_COEF * parts[1] - ENTROPY_COEF * parts[2]
+
+    def update(self) -> None:
+        """Epochs of PPO over chunks of time steps. Images are not copied, because a chunk of steps is contiguous."""
+        self.run("estimate", self.estimate)
+        if self.ranks > 1:
+            dist.all_reduce(self.moments)
+        self.normalize()
+        length = self.args.rollout // self.args.chunks
+        start = self.host_start.numpy() > 0
+        cut = []
+        for chunk in range(self.args.chunks):
+            order, sizes, env, fresh = pieces(start[chunk * length:(chunk + 1) * length])
+            parts = (order, np.argsort(order), env, fresh.astype(np.float32))
+            on_device = [torch.from_numpy(p).to(self.device, non_blocking=True) for p in parts]
+            cut.append((*on_device[:2], torch.from_numpy(sizes), *on_device[2:]))
+        parameters = list(self.agent.parameters())
+        frames = self.update_count * self.args.rollout * self.args.environments * self.ranks
+        self.optimizer.param_groups[0]["lr"] = self.args.lr * max(0.1, 1 - 0.9 * frames / self.args.horizon)
+        self.losses.zero_()
+        for _ in range(self.args.epochs):
+            for chunk in range(self.args.chunks):
+                self.optimizer.zero_grad()
+                self.loss(chunk, *cut[chunk]).backward()
+                if self.ranks > 1:
+                    flat = torch.cat([p.grad.view(-1) for p in parameters])
+                    dist.all_reduce(flat)
+                    for p, g in zip(parameters, flat.div_(self.ranks).split([p.numel() for p in parameters])):
+                        p.grad.copy_(g.view_as(p))
+                nn.utils.clip_grad_norm_(parameters, MAX_NORM)
+                self.optimizer.step()
+        self.last[0].copy_(self.last[self.used])
+        self.depth[0].copy_(self.depth[self.used])
+        self.observe(0, self.starts)
+        self.update_count += 1
+        self.losses /= self.args.epochs * self.args.chunks
+        self.note("learn")
+
+    def hash(self) -> str:
+        """Hash of weights, optimiser state and the metrics of all episodes."""
+        h = hashlib.sha256(self.digest)
+        for group in (self.agent.state_dict(), *self.optimizer.state_dict()["state"].values()):
+            for name in sorted(group):
+                h.update(group[name].detach().cpu().numpy().tobytes())
+        return h.hexdigest()[:16]
+
+
+def save(learner: Learner, log: list[dict[str, float]], out: pathlib.Path) -> None:
+    """Writes the checkpoint, the log and its curves. A file is complete or absent, whenever the program dies."""
+    digests: list[Any] = [learner.digest]
+    if learner.ranks > 1:
+        digests *= learner.ranks
+        dist.all_gather_object(digests, learner.digest)
+    if learner.rank:
+        return
+    kept = {name: getattr(learner.args, name) for name in KEPT}
+    torch.save({"agent": learner.agent.state_dict(), "optimizer": learner.optimizer.state_dict(), "log": log,
+                "update": learner.update_count, "digests": digests, "args": kept}, out / "checkpoint.tmp")
+    os.replace(out / "checkpoint.tmp", out / "checkpoint.pt")
+    write_log(out, log)
+
+
+def resume(learner: Learner, out: pathlib.Path) -> list[dict[str, float]]:
+    """Goes on from the checkpoint, if there is one. Returns the log so far."""
+    path = out / "checkpoint.pt"
+    if not path.exists():
+        if learner.args.begin_with is not None:
+            learner.agent.load_state_dict(torch.load(learner.args.begin_with, map_location="cpu")["agent"])
+        return []
+    kept = torch.load(path, map_location="cpu", weights_only=True)
+    for name, then in kept["args"].items():
+        if getattr(learner.args, name) != then:
+            option = name.replace("_", "-")
+            sys.exit(f"--{option} {getattr(learner.args, name)}: {path} was trained with {then}. Use that, or another "
+                     "folder for --out.")
+    learner.agent.load_state_dict(kept["agent"])
+    learner.optimizer.load_state_dict(kept["optimizer"])
+    learner.update_count, learner.digest = kept["update"], kept["digests"][learner.rank]
+    return list(kept["log"])
+
+
+def log_row(learner: Learner, frames: float, seconds: float) -> dict[str, float]:
+    """A row of the log: the last update of all ranks. `frames` is the number of environment steps before it."""
+    m, ranks = learner.metrics, learner.ranks
+    sums = torch.tensor([learner.used * learner.args.environments, len(m), *(float(m[name].sum()) for name in METRICS),
+                         float(learner.host_result[0].sum()), *learner.losses.tolist()], dtype=torch.float64)
+    if ranks > 1:
+        sums = sums.to(learner.device)
+        dist.all_reduce(sums)
+    steps, episodes, *means, reward, policy, value, entropy = sums.tolist()
+    row = {"update": learner.update_count, "frames": frames + steps, "episodes": episodes}
+    row.update({name: mean / max(episodes, 1) for name, mean in zip(METRICS, means)})
+    row.update(reward=reward / steps, policy=policy / ranks, value=value / ranks, entropy=entropy / ranks)
+    return {**row, "seconds": seconds}
+
+
+def train(args: argparse.Namespace, agent: Agent) -> None:
+    """Trains until all environments together have taken `args.steps` steps."""
+    began = time.perf_counter()
+    learner = Learner(args, agent, Worlds(TRAIN_SEEDS[:args.flats], args, args.episodes_per_flat))
+    log = resume(learner, args.out)
+    if learner.rank == 0:
+        print(f"{args.flats} flats made in {time.perf_counter() - began:.0f} s; {learner.update_count} updates done")
+    first, ready, steady = 0.0, 0.0, False
+    updates = args.every * math.ceil(args.steps / (args.every * args.rollout * args.environments * args.ranks))
+    while learner.update_count < updates:
+        at = time.perf_counter()
+        if learner.update_count % args.every == 0:
+            learner.begin()
+        learner.collect()
+        learner.update()
+        log.append(log_row(learner, log[-1]["frames"] if log else 0.0, time.perf_counter() - at))
+        if learner.rank == 0 and steady:
+            progress(log, updates, (log[-1]["frames"] - first) / (time.perf_counter() - ready))
+        if not steady:  # the first update captures graphs: it is no measure of speed
+            first, ready, steady = log[-1]["frames"], time.perf_counter(), True
+            learner.times = dict.fromkeys(learner.times, 0.0)
+        if learner.update_count % args.every == 0:
+            save(learner, log, args.out)
+            if time.perf_counter() - began > 60 * args.minutes:
+                break
+    if learner.rank == 0 and steady:
+        steps = max(1.0, log[-1]["frames"] - first) / args.environments / args.ranks
+        print("\n| part | ms per step of all environments |\n|---|---|")
+        print("\n".join(f"| {name} | {1e3 * t / steps:.3f} |" for name, t in learner.times.items()))
+        print(f"hash {learner.hash()}")
+
+
+def arguments() -> argparse.Namespace:
+    """Reads the command line."""
+    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    p.add_argument("--out", type=pathlib.Path, default="pointnav", help="folder of checkpoint, log and curves")
+    p.add_argument("--steps", type=float, default=1e8, help="environment steps, rounded up to a checkpoint")
+    p.add_argument("--begin-with", type=pathlib.Path, help="checkpoint whose weights a new run begins with")
+    p.add_argument("--minutes", type=float, default=math.inf, help="stop at the first checkpoint after this time")
+    p.add_argument("--seed", type=int, default=1, help="seed of weights, episodes and actions")
+    p.add_argument("--flats", type=int, default=64, choices=range(1, 65), metavar="1..64", help="flats to train in")
+    p.add_argument("--episodes-per-flat", type=int, default=1000, help="number of episodes to draw from")
+    p.add_argument("--environments", type=int, default=256, help="environments per rank")
+    p.add_argument("--rollout", type=int, default=128, help="steps per update")
+    p.add_argument("--chunks", type=int, default=4, help="minibatches: parts of a rollout, one after the other")
+    p.add_argument("--epochs", type=int, default=3, help="passes over a rollout")
+    p.add_argument("--lr", type=float, default=1e-3, help="learning rate of Adam at the beginning")
+    p.add_argument("--horizon", type=float, default=1e8, help="steps after which the learning rate is a tenth of that")
+    p.add_argument("--every", type=int, default=50, help="updates from one checkpoint to the next")
+    p.add_argument("--cut-off", type=float, default=1.0, help="fraction of ranks whose end ends the rollouts of the "
+                   "others. DD-PPO has 0.6; below 1, runs on several ranks are not reproducible")
+    world_arguments(p)
+    a = p.parse_args()
+    if a.rollout % a.chunks:
+        p.error(f"--rollout {a.rollout} must be a multiple of --chunks {a.chunks}")
+    if a.begin_with is not None and not a.begin_with.exists():
+        p.error(f"--begin-with {a.begin_with}: not found; name a checkpoint.pt")
+    return a
+
+
+def main() -> None:
+    """Trains or evaluates."""
+    args = arguments()
+    local = int(os.environ.get("LOCAL_RANK", -1))
+    if local >= 0 and args.device == "cuda":
+        args.device = f"cuda:{local}"
+    args.device, args.torch_device = device_of(args.device)
+    cuda = args.torch_device.type == "cuda"
+    torch.use_deterministic_algorithms(True)
+    torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = True
+    if local >= 0:
+        dist.init_process_group("nccl" if cuda else "gloo")
+    args.ranks = dist.get_world_size() if local >= 0 else 1
+    args.out.mkdir(parents=True, exist_ok=True)
+    torch.manual_seed(args.seed)
+    agent = Agent(args.size, args.blind).to(args.torch_device)
+    train(args, agent)
+    if local >= 0:
+        dist.destroy_process_group()
+
+
+if __name__ == "__main__":
+    main()
