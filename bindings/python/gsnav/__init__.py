@@ -43,8 +43,10 @@ from ._gsnav import (
     FisheyeLens,
     FollowerOptions,
     Frames,
+    FreeSensors,
     GeodesicFollower,
     GoalPath,
+    GreedyGeodesicFollower,
     LodChoice,
     MeshStats,
     MetricsSummary,
@@ -96,6 +98,7 @@ from ._gsnav import (
     save_navmesh,
     summarize,
     to_bytes,
+    try_step,
     views_around,
 )
 from ._spaces import HAVE_GYMNASIUM as _HAVE_GYMNASIUM
@@ -131,8 +134,10 @@ __all__ = [
     "FisheyeLens",
     "FollowerOptions",
     "Frames",
+    "FreeSensors",
     "GeodesicFollower",
     "GoalPath",
+    "GreedyGeodesicFollower",
     "InvalidArgument",
     "InvalidFile",
     "LodChoice",
@@ -193,6 +198,7 @@ __all__ = [
     "save_navmesh",
     "summarize",
     "to_bytes",
+    "try_step",
     "views_around",
 ]
 

@@ -18,5 +18,6 @@ void bind_settings(nb::module_& m);
 void bind_world(nb::module_& m);
 void bind_simulator(nb::module_& m);
 void bind_batch(nb::module_& m);
+void bind_habitat(nb::module_& m);
 
 }  // namespace gsnav::python

@@ -18,4 +18,5 @@ NB_MODULE(_gsnav, m) {
   bind_world(m);
   bind_simulator(m);
   bind_batch(m);
+  bind_habitat(m);
 }
