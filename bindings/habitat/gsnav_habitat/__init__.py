@@ -44,8 +44,8 @@ def claim() -> None:
     for name in _RIVALS:
         if name in _distributions():
             raise ImportError(
-                f"The distributions gsnav-habitat {version()} and {name.replace('_', '-')} {_distributions()[name]} both "
-                "provide habitat_sim or magnum. Uninstall one of them."
+                f"The distributions gsnav-habitat {version()} and {name.replace('_', '-')} {_distributions()[name]} "
+                "both provide habitat_sim or magnum. Uninstall one of them."
             )
     if os.environ.setdefault("GSNAV_HABITAT_NOTICE", str(os.getpid())) == str(os.getpid()):
         warnings.warn(

@@ -46,9 +46,7 @@ class _Matrix:
         elif len(columns) == 1 and isinstance(columns[0], _Matrix):
             m = columns[0]._c
             k = min(n, len(m))
-            columns = tuple(
-                [m[c][r] if c < k and r < k else float(c == r) for r in range(n)] for c in range(n)
-            )
+            columns = tuple([m[c][r] if c < k and r < k else float(c == r) for r in range(n)] for c in range(n))
         elif len(columns) == 1:
             rows = columns[0]
             columns = tuple([float(rows[r][c]) for r in range(len(rows))] for c in range(n))
@@ -216,7 +214,7 @@ class Matrix4(_Matrix):
 
     @classmethod
     def _rotation(cls, angle: Any, axis: Any) -> "Matrix4":
-        """On the class, makes a rotation by a Rad or Deg about an axis of length 1. On an object, returns its rotation."""
+        """On the class, makes a rotation by an angle about an axis of length 1. On an object, returns its rotation."""
         return cls.from_(Quaternion.rotation(angle, axis).to_matrix(), Vector3())
 
     @classmethod

@@ -175,11 +175,13 @@ class Quaternion:
         return Quaternion._xyzw(*values)
 
     def __mul__(self, other: Any) -> Any:
-        """The product: `other` is applied first. Also a number."""
+        """The product with a quaternion, also of numpy-quaternion, that is applied first, or with a number."""
         if _is_number(other):
             return self._with(x * float(other) for x in self._q)
         if not isinstance(other, Quaternion):
-            return NotImplemented
+            if not hasattr(other, "components"):
+                return NotImplemented
+            other = Quaternion._of(other)
         ax, ay, az, aw = self._q
         bx, by, bz, bw = other._q
         return Quaternion._xyzw(
@@ -190,7 +192,9 @@ class Quaternion:
         )
 
     def __rmul__(self, other: Any) -> Any:
-        return self * other if _is_number(other) else NotImplemented
+        if _is_number(other):
+            return self * other
+        return Quaternion._of(other) * self if hasattr(other, "components") else NotImplemented
 
     def __truediv__(self, other: Any) -> Any:
         return self._with(x / float(other) for x in self._q)
@@ -221,5 +225,3 @@ class Quaternion:
     def __repr__(self) -> str:
         x, y, z, w = self._q
         return f"Quaternion({{{x:.9g}, {y:.9g}, {z:.9g}}}, {w:.9g})"
-
-

@@ -212,8 +212,9 @@ class _Vector:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) or (not hasattr(value, "__len__") and hasattr(value, "__float__")) or (
-        getattr(value, "shape", None) == ()
+    """Whether a value is a real number of Python or numpy."""
+    return isinstance(value, (int, float)) or (
+        getattr(value, "shape", None) == () and getattr(value.dtype, "kind", "") in ("b", "i", "u", "f")
     )
 
 

@@ -47,13 +47,15 @@ def test_vector_arithmetic_is_that_of_numpy(kind, size):
         v, w = kind(*a), kind(b)
         for got, want in (
             (v + w, a + b), (v - b, a - b), (list(b) - v, b - a), (v * w, a * b), (2 * v, 2 * a),
-            (v * np.float32(3), 3 * a), (v / 2, a / 2), (v / w, a / b), (-v, -a), (v.normalized(), a / np.linalg.norm(a)),
+            (v * np.float32(3), 3 * a), (v / 2, a / 2), (v / w, a / b), (-v, -a),
+            (v.normalized(), a / np.linalg.norm(a)),
             (v.projected(w), b * (a @ b) / (b @ b)), (v.flipped(), a[::-1]), (mn.math.min(v, w), np.minimum(a, b)),
             (mn.math.clamp(v, -0.5, 0.5), np.clip(a, -0.5, 0.5)), (mn.math.lerp(v, w, 0.25), 0.75 * a + 0.25 * b),
         ):  # fmt: skip
             assert isinstance(got, kind) and np.allclose(got, want, rtol=1e-5, atol=1e-6)
         for got, want in ((v.dot(), a @ a), (mn.math.dot(v, w), a @ b), (v.length(), np.linalg.norm(a)),
-                          (v.sum(), a.sum()), (v.product(), a.prod()), (v.min(), a.min()), (v.max(), a.max())):  # fmt: skip
+                          (v.sum(), a.sum()), (v.product(), a.prod()), (v.min(), a.min()),
+                          (v.max(), a.max())):  # fmt: skip
             assert math.isclose(got, want, rel_tol=1e-5, abs_tol=1e-6)
 
 
@@ -130,7 +132,9 @@ def test_matrices_multiply_transform_and_invert_like_numpy():
         assert np.allclose(np.array(m), a, atol=1e-6) and np.array(m).dtype == np.float32
         assert np.allclose(np.array(m @ n), a @ b, atol=1e-4) and np.allclose(np.array(m.transposed()), a.T, atol=1e-6)
         assert np.allclose(m @ mn.Vector4(1, 2, 3, 4), a @ [1, 2, 3, 4], atol=1e-4)
-        assert np.allclose(m[2], a[:, 2]) and math.isclose(m[2, 1], a[1, 2], rel_tol=1e-6) and np.allclose(m.row(1), a[1])
+        assert (
+            np.allclose(m[2], a[:, 2]) and math.isclose(m[2, 1], a[1, 2], rel_tol=1e-6) and np.allclose(m.row(1), a[1])
+        )
         assert np.allclose(np.array(m.inverted()) @ a, np.eye(4), atol=1e-2)
         assert math.isclose(m.determinant(), np.linalg.det(a), rel_tol=1e-3, abs_tol=1e-4)
         p = a @ [0.1, 0.2, 0.3, 1]
@@ -148,7 +152,9 @@ def test_rigid_transformations_of_matrix4():
         assert m == mn.Matrix4.from_(m.rotation(), m.translation)
         assert np.allclose(np.array(m.inverted_rigid() @ m), np.eye(4), atol=1e-5)
         scaled = m @ mn.Matrix4.scaling(mn.Vector3(1, 2, 3))
-        assert np.allclose(scaled.scaling(), [1, 2, 3], atol=1e-5) and np.allclose(np.array(scaled.rotation()), r, atol=1e-5)
+        assert np.allclose(scaled.scaling(), [1, 2, 3], atol=1e-5) and np.allclose(
+            np.array(scaled.rotation()), r, atol=1e-5
+        )
         with pytest.raises(ValueError):
             scaled.inverted_rigid()
     m = mn.Matrix4()
@@ -166,7 +172,9 @@ def test_ranges():
     assert r.contains((0, 0, 0)) and not r.contains((3, 0, 0)) and r.contains(mn.Range3D((0, 0, 0), (1, 1, 1)))
     assert r.translated((1, 0, 0)).min == [0, -2, -3] and r.padded((1, 1, 1)).max == [4, 5, 6]
     assert mn.math.join(mn.Range2D((0, 0), (1, 1)), mn.Range2D((2, -1), (3, 0))) == mn.Range2D((0, -1), (3, 1))
-    assert mn.math.intersects(mn.Range1D(0, 2), mn.Range1D(1, 3)) and not mn.math.intersects(mn.Range1D(0, 1), mn.Range1D(1, 2))
+    assert mn.math.intersects(mn.Range1D(0, 2), mn.Range1D(1, 3)) and not mn.math.intersects(
+        mn.Range1D(0, 1), mn.Range1D(1, 2)
+    )
     assert mn.Range3D() == mn.Range3D((0, 0, 0), (0, 0, 0)) and pickle.loads(pickle.dumps(r)) == r
 
 
@@ -180,7 +188,11 @@ def test_colours():
 
 def test_names_that_are_not_served_say_so():
     mn.trade.ImporterManager()
-    for call in (mn.trade.MeshData, mn.MutableImageView2D, lambda: mn.trade.ImporterManager().load_and_instantiate("x")):
+    for call in (
+        mn.trade.MeshData,
+        mn.MutableImageView2D,
+        lambda: mn.trade.ImporterManager().load_and_instantiate("x"),
+    ):
         with pytest.raises(NotImplementedError, match="gsnav.*magnum"):
             call()
     assert not hasattr(mn, "NoSuchName")
