@@ -46,6 +46,8 @@ class GreedyGeodesicFollower:
         self.last_goal: Any = None
         self._follower: Any = None
         self._mesh: Any = None
+        # A plan that touches no wall also holds for agents that slide.
+        self._allow_sliding = False
 
     def _key(self, name: str, key: Any) -> Any:
         if key is not None:
@@ -75,7 +77,11 @@ class GreedyGeodesicFollower:
         same = self.last_goal is not None and np.allclose(goal, self.last_goal) and mesh is self._mesh
         if same and self._follower is not None:
             return
-        task = gsnav.TaskConfig(forward_step=float(self.forward_spec.amount), turn_angle=float(self.left_spec.amount))
+        task = gsnav.TaskConfig(
+            forward_step=float(self.forward_spec.amount),
+            turn_angle=float(self.left_spec.amount),
+            allow_sliding=self._allow_sliding,
+        )
         self.last_goal, self._mesh = goal, mesh
         at = self.pathfinder.snap_point(goal)
         self._follower = gsnav.GreedyGeodesicFollower(mesh, list(at), task, self.goal_radius)
@@ -127,7 +133,7 @@ class GreedyGeodesicFollower:
                 return keys
             if code == Codes.FORWARD:
                 end = [position[0] - step * math.sin(yaw), position[1], position[2] - step * math.cos(yaw)]
-                position = self.pathfinder.try_step(position, end)
+                position = self.agent.controls.move_filter_fn(position, end)
             yaw += {Codes.LEFT: turn, Codes.RIGHT: -turn}.get(code, 0.0)
         raise errors.GreedyFollowerError(f"5000 actions do not lead to {self.last_goal}")
 

@@ -9,7 +9,6 @@ import gsnav_habitat as _shared
 
 _MODULES: dict[str, tuple[str, ...]] = {
     "gfx": ("DebugLineRender", "LightInfo", "LightPositionModel", "RenderCamera", "RenderTarget", "Renderer"),
-    "metadata": ("MetadataMediator",),
     "attributes": ("ObjectAttributes", "StageAttributes", "PhysicsManagerAttributes", "ArticulatedObjectAttributes"),
     "attributes_managers": ("ObjectAttributesManager", "StageAttributesManager", "AssetAttributesManager"),
     "sim": ("SimulatorBackend",),

@@ -15,6 +15,7 @@ from . import _draw, _engine
 from ._follower import GreedyGeodesicFollower
 from .agent import Agent
 from .agent.agent import AgentState
+from .metadata import MetadataMediator, TemplateManager
 from .nav import PathFinder
 from .scene import SceneGraph
 from .sensor import Sensor, SensorFactory
@@ -64,22 +65,6 @@ class Configuration:
     enable_batch_renderer: bool = False
 
 
-class _Templates:
-    """A manager of templates that has none."""
-
-    def load_configs(self, path: str, save_as_defaults: bool = False) -> list[int]:
-        """Returns an empty list: gsnav serves no objects."""
-        return []
-
-    def get_num_templates(self) -> int:
-        """0."""
-        return 0
-
-    def get_template_handles(self, *arguments: Any) -> list[str]:
-        """Returns an empty list."""
-        return []
-
-
 def _unserved(name: str) -> Any:
     def call(self: Any, *args: Any, **kwargs: Any) -> NoReturn:
         raise NotImplementedError(_shared.message(f"habitat_sim.Simulator.{name}"))
@@ -105,6 +90,7 @@ class Simulator:
         self._graph = SceneGraph()
         self._world_time = 0.0
         self._previous_step_time = 0.0
+        self.metadata_mediator = config.metadata_mediator or MetadataMediator(config.sim_cfg)
         self._open(config)
 
     # ---- Life
@@ -185,7 +171,9 @@ class Simulator:
     def make_greedy_follower(self, agent_id: int | None = None, goal_radius: float | None = None, **keys: Any) -> Any:
         """A GreedyGeodesicFollower for an agent."""
         agent = self._default_agent if agent_id is None else self.get_agent(agent_id)
-        return GreedyGeodesicFollower(self.pathfinder, agent, goal_radius, **keys)
+        made = GreedyGeodesicFollower(self.pathfinder, agent, goal_radius, **keys)
+        made._allow_sliding = self.config.sim_cfg.allow_sliding
+        return made
 
     # ---- Steps
     def reset(self, agent_ids: Any = None) -> Any:
@@ -323,9 +311,9 @@ class Simulator:
         if self._stage is not None and self._stage.scene is not None:
             raise NotImplementedError(_shared.message("habitat_sim.Simulator.get_stage_initialization_template"))
 
-    def get_object_template_manager(self) -> _Templates:
+    def get_object_template_manager(self) -> TemplateManager:
         """A manager that has no templates."""
-        return _Templates()
+        return self.metadata_mediator.object_template_manager
 
     def recompute_navmesh(self, pathfinder: PathFinder, navmesh_settings: Any) -> bool:
         """Builds a NavMesh of the scene for an agent. Returns False if the scene has no walkable surface.

@@ -180,3 +180,18 @@ def test_the_follower_reaches_its_goal_and_uses_the_keys(room):
     assert np.linalg.norm(agent.state.position[[0, 2]] - [8, 5]) < 0.1875
     with pytest.raises(habitat_sim.errors.GreedyFollowerError):
         follower.next_action_along([80, 0, 5])
+
+
+def test_the_follower_of_an_agent_that_does_not_slide_is_not_caught_at_a_wall(stage):
+    finder = habitat_sim.PathFinder()
+    assert finder.load_nav_mesh(stage.replace(".glb", ".navmesh"))
+    agent = habitat_sim.Agent(habitat_sim.SceneGraph().get_root_node().create_child())
+    agent.controls.move_filter_fn = finder.try_step_no_sliding
+    for turn in ("turn_left", "turn_right"):
+        agent.agent_config.action_space[turn].actuation.amount = 30.0
+    agent.state = habitat_sim.AgentState([-1.05, 0.07, 2.9])  # Beside the end of an inner wall.
+    goal = [-1.26, 0.07, 7.9]
+    keys = habitat_sim.GreedyGeodesicFollower(finder, agent).find_path(goal)
+    for key in keys[:-1]:
+        agent.act(key)
+    assert len(keys) < 60 and np.linalg.norm(agent.state.position - goal) < 0.2
