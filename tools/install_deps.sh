@@ -3,10 +3,11 @@
 #
 # Installs the missing Debian or Ubuntu packages for a job.
 #
-# usage: tools/install_deps.sh demo|tests|ci
+# usage: tools/install_deps.sh demo|python|tests|ci
 #   demo   build and run the navigation loop
-#   tests  ... and the tests, benchmarks and packaging checks
-#   ci     ... and clang with its OpenMP, sanitizers, fuzzer and clang-format, and Doxygen
+#   python ... and headers and virtual environments of Debian's python3
+#   tests  demo, and the tests, benchmarks and packaging checks
+#   ci     tests, and clang with its OpenMP, sanitizers, fuzzer and clang-format, and Doxygen
 #
 # These are optional and not installed: libopenmpi-dev (nav_eval_mpi), ffmpeg (gsnav-replay --video),
 # chromium (test of the page of gsnav-viewer), libfcl-dev (comparison in bench_kernels).
@@ -17,6 +18,9 @@ set -euo pipefail
 job=${1:-demo}
 packages=(g++ cmake ninja-build libpng-dev libjpeg-dev libwebp-dev libzstd-dev zlib1g-dev nlohmann-json3-dev
           librecast-dev libcli11-dev)
+if [[ $job == python ]]; then
+  packages+=(python3-dev python3-venv)
+fi
 if [[ $job == tests || $job == ci ]]; then
   packages+=(doctest-dev libbenchmark-dev libeigen3-dev libglm-dev libdlpack-dev libembree-dev pkg-config python3)
 fi

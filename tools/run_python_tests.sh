@@ -4,9 +4,12 @@
 # Installs missing packages, makes a virtual environment, builds and installs the Python package there, and runs
 # its tests. Arguments go to pytest:
 #   tools/run_python_tests.sh [-k render ...]
-# The exit status is that of pytest. ccache is used if it is installed.
+# The exit status is not 0 if types are wrong or a test fails. ccache is used if it is installed.
 #
 # PYTHON=python3.12   interpreter of the virtual environment (default: python3), 3.10 or later
+# GSNAV_FLAGS=...     compiler flags instead of "-O3 -DNDEBUG", such as "-O1 -DNDEBUG" for a faster build
+# GSNAV_ASAN=1        use AddressSanitizer, in folders of its own. 10^5 random calls, without images of C++ tools:
+#                     GSNAV_ASAN=1 GSNAV_RANDOM_CALLS=100000 tools/run_python_tests.sh -k "random or order"
 # GSNAV_TEST_WITH=... more packages to install and test with, such as "ray jax torch stable-baselines3"
 # GSNAV_VENV=DIR      folder of the virtual environment (default: build/venv)
 # GSNAV_NO_APT=1      never call apt-get
@@ -15,25 +18,36 @@ set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 if [[ ${1:-} == --help || ${1:-} == -h ]]; then
-  sed -n '4,14s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
+  sed -n '4,17s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
   exit 0
 fi
 python=${PYTHON:-python3}
-venv=${GSNAV_VENV:-$root/build/venv}
+venv=$root/build/venv build=$root/build/python flags=${GSNAV_FLAGS:--O3 -DNDEBUG} stubs=ON run=()
+if [[ ${GSNAV_ASAN:-0} == 1 ]]; then
+  venv+=-asan build+=-asan flags="-O1 -g1 -fno-omit-frame-pointer -fsanitize=address" stubs=OFF
+  # Python is not built for the sanitizer, so its library must be loaded first. Python leaks at exit.
+  run=(env LD_PRELOAD="$(g++ -print-file-name=libasan.so) $(g++ -print-file-name=libstdc++.so)"
+       ASAN_OPTIONS=detect_leaks=0:allocator_may_return_null=1 PYTHONMALLOC=malloc)
+fi
+venv=${GSNAV_VENV:-$venv}
 
+# True if the interpreter can make virtual environments and compile modules.
+complete() {
+  "$python" -c 'import ensurepip, os, sysconfig, venv
+os.stat(sysconfig.get_path("include") + "/Python.h")' 2> /dev/null
+}
 "$root/tools/install_deps.sh" demo
+complete || "$root/tools/install_deps.sh" python
 if ! "$python" -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2> /dev/null; then
   echo "Python 3.10 or later is needed, and $python is not: set PYTHON to an interpreter." >&2
   exit 1
 fi
-if [[ ! -x $venv/bin/pip ]] && ! "$python" -m venv "$venv"; then
-  echo "$python cannot make a virtual environment. On Debian: apt-get install python3-venv python3-dev" >&2
+if ! complete; then
+  echo "$python has no headers or cannot make a virtual environment." >&2
+  echo "On Debian: apt-get install python3-dev python3-venv. Or set PYTHON to another interpreter." >&2
   exit 1
 fi
-if ! "$python" -c 'import os, sysconfig; os.stat(sysconfig.get_path("include") + "/Python.h")' 2> /dev/null; then
-  echo "The headers of $python are missing. On Debian: apt-get install python3-dev" >&2
-  exit 1
-fi
+[[ -x $venv/bin/pip ]] || "$python" -m venv "$venv"
 
 export CMAKE_BUILD_PARALLEL_LEVEL=${GSNAV_JOBS:-$("$root/tools/build_jobs.sh")}
 if command -v ccache > /dev/null; then
@@ -44,13 +58,18 @@ echo "Installing what the build and the tests need in $venv"
   "numpy>=1.26" "gymnasium>=1.1" "matplotlib>=3.8" "mypy>=1.11" "pytest>=8" \
   ${GSNAV_TEST_WITH:-}
 echo "Building the package, $CMAKE_BUILD_PARALLEL_LEVEL files at a time"
-build=$root/build/python
 # The build folder is kept, so that only changed files are compiled.
 "$venv/bin/pip" install --disable-pip-version-check --no-build-isolation --no-deps --force-reinstall \
-  --config-settings=build-dir="$build" --config-settings=cmake.define.GSNAV_TOOLS=ON "$root"
-# Programs of C++ whose images the tests compare with.
-cmake --build "$build" --target gsnav-render --target gsnav_python_reference -j "$CMAKE_BUILD_PARALLEL_LEVEL"
-export GSNAV_TOOLS_DIR=$build/gsnav/tools GSNAV_PYTHON_REFERENCE=$build/gsnav_python_reference
-echo "Testing"
+  --config-settings=build-dir="$build" --config-settings=cmake.define.GSNAV_TOOLS=ON \
+  --config-settings=cmake.define.GSNAV_STUBS=$stubs \
+  --config-settings=cmake.define.CMAKE_CXX_FLAGS_RELEASE="$flags" "$root"
 cd "$root"
-exec "$venv/bin/python" -m pytest "$@"
+if [[ $stubs == ON ]]; then
+  # Programs of C++ whose images the tests compare with.
+  cmake --build "$build" --target gsnav-render --target gsnav_python_reference -j "$CMAKE_BUILD_PARALLEL_LEVEL"
+  export GSNAV_TOOLS_DIR=$build/gsnav/tools GSNAV_PYTHON_REFERENCE=$build/gsnav_python_reference
+  echo "Checking the types of the package"
+  (cd "$build" && "$venv/bin/python" -m mypy --strict -p gsnav)
+fi
+echo "Testing"
+exec "${run[@]}" "$venv/bin/python" -m pytest "$@"

@@ -2,7 +2,9 @@
 // A batch of environments is its single simulators: the same bits.
 #include <doctest/doctest.h>
 
+#include <iterator>
 #include <limits>
+#include <list>
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/sim/basic_batch.hpp"
@@ -285,6 +287,96 @@ TEST_CASE("bodies of a moment are made once, also for who comes by there later, 
   CHECK(clearances(100, many) == clearances(2, few));
   CHECK(many == 12);  // 0 to 3 s, four intervals a second
   CHECK(few == 16);
+}
+
+namespace {
+
+/// A function that gives new memory for each image of each call, and keeps all of it.
+struct Memory {
+  ImageSource source() {
+    return [this](std::size_t sensor, std::size_t floats) -> Result<std::span<float>> {
+      sensors.push_back(sensor);
+      return std::span(blocks.emplace_back(floats, std::numeric_limits<float>::quiet_NaN()));
+    };
+  }
+  void scribble() {
+    for (auto& block : blocks) std::fill(block.begin(), block.end(), -7.0f);
+  }
+  std::list<std::vector<float>> blocks;
+  std::vector<std::size_t> sensors;
+};
+
+}  // namespace
+
+TEST_CASE("a batch draws its own bits into memory of the caller, in each mode of reset") {
+  for (const AutoReset mode : {AutoReset::next_step, AutoReset::same_step, AutoReset::disabled}) {
+    BatchConfig config = small_batch(8, 12);
+    config.sensors[1].noise.kind = NoiseKind::redwood_depth;
+    config.sensors.push_back(config.sensors[0]);  // shares the memory of the first one
+    config.sensors.back().uuid = "again";
+    config.task.max_steps = 3;
+    config.auto_reset = mode;
+    OpenMPBackend backend(2);
+    auto own = make_batch_simulator(backend, two_scenes(), config, 3, wandering).value();
+    Memory memory;
+    config.image_source = memory.source();
+    auto given = make_batch_simulator(backend, two_scenes(), config, 3, wandering).value();
+    std::size_t wrong = 0, ended = 0;
+    const auto compare = [&](const Result<BatchStep>& a, const Result<BatchStep>& b) {
+      const BatchStep x = a.value(), y = b.value();
+      REQUIRE(x.images.size() == 3);
+      for (std::size_t i = 0; i < 3; ++i) wrong += same_bits(x.images[i].data, y.images[i].data) ? 0 : 1;
+      REQUIRE(x.final_images.size() == y.final_images.size());
+      for (std::size_t i = 0; i < x.final_images.size(); ++i)
+        wrong += same_bits(x.final_images[i].data, y.final_images[i].data) ? 0 : 1;
+      CHECK(y.images[0].data.data() == std::prev(memory.blocks.end(), 2)->data());
+      CHECK(y.images[1].data.data() == memory.blocks.back().data());
+      CHECK(y.images[2].data.data() == y.images[0].data.data());
+      ended += x.finished.size();
+      memory.scribble();  // The batch may not need what it has drawn.
+    };
+    compare(own.reset(), given.reset());
+    Rng rng(8);
+    for (int i = 0; i < 8; ++i) {
+      std::vector<Action> actions;
+      for (int e = 0; e < 3; ++e) actions.push_back(wandering_action(rng));
+      compare(own.step(actions), given.step(actions));
+      const std::vector<std::uint8_t> some{0, 1, 0}, all{1, 1, 1};
+      if (mode == AutoReset::disabled && i % 3 == 2) compare(own.reset(all), given.reset(all));
+      if (i == 4) compare(own.reset(some), given.reset(some));
+    }
+    CHECK(wrong == 0);
+    CHECK(ended >= 3);
+    CHECK(memory.sensors[0] == 0);
+    CHECK(memory.sensors[1] == 1);
+    CHECK(memory.sensors.size() == memory.blocks.size());
+  }
+}
+
+TEST_CASE("memory of the caller: what is wrong with it is named before any environment moves") {
+  BatchConfig config = small_batch(8, 12);
+  OpenMPBackend backend(1);
+  std::vector<float> block(2 * 8 * 12 * 3);
+  Result<std::span<float>> next = std::span<float>(block);
+  std::size_t calls = 0;
+  config.image_source = [&](std::size_t, std::size_t) { return ++calls, next; };
+  auto sim = make_batch_simulator(backend, two_scenes(), config, 2, wandering).value();
+  sim.reset().value();
+  CHECK(calls == 2);
+  const std::vector<Action> turn(2, Action::turn_left);
+  const double yaw = sim.world(0).agent().yaw;
+  next = std::span<float>(block).first(575);
+  CHECK(sim.step(turn).message().find("575 floats for the sensor \"rgb\", which needs 576") !=
+        std::string::npos);
+  next = Status(Errc::out_of_memory, "none left");
+  CHECK(sim.step(turn).code() == Errc::out_of_memory);
+  CHECK(sim.reset().message().find("none left") != std::string::npos);
+  CHECK(sim.world(0).agent().yaw == yaw);
+  sim.set_rendering(false);  // needs no memory
+  CHECK(sim.step(turn).value().images.empty());
+  sim.set_rendering(true);
+  next = std::span<float>(block);
+  CHECK(sim.step(turn).ok());
 }
 
 TEST_CASE("what is wrong with a batch is named") {

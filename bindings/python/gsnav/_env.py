@@ -83,8 +83,12 @@ class Env(BaseEnv):
         return self._observation(seen), _task.info_dict(seen.info)
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Performs one action. Returns observation, reward, terminated, truncated and info."""
+        """Performs one action: an integer, or an array without dimensions of any library, by DLPack.
+
+        Returns observation, reward, terminated, truncated and info.
+        """
         simulator = self.simulator
+        action = _task.from_dlpack(action, "Env.step: action")
         if action not in self.action_space:
             raise InvalidArgument(f"Env.step: action {action!r}: use an integer from 0 (stop) to 3 (turn right)")
         seen = simulator.step(int(action))

@@ -98,7 +98,8 @@ if TYPE_CHECKING or not HAVE_GYMNASIUM:
             self.n = int(n)
 
         def contains(self, x: Any) -> bool:
-            return isinstance(x, (int, np.integer)) and 0 <= int(x) < self.n
+            scalar = isinstance(x, np.ndarray) and x.shape == () and x.dtype.kind in "iu"
+            return (scalar or isinstance(x, (int, np.integer))) and 0 <= int(x) < self.n
 
         def sample(self) -> np.int64:
             """A random member."""

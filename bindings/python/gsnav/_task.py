@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import enum
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -43,6 +44,16 @@ METRIC_FIELDS = ("success", "spl", "soft_spl", "stl", "distance_to_goal", "eucli
 Scene = str | OpenedScene | SimulatorScene
 Episode = PointNavEpisode | BatchEpisode
 EpisodeSource = Callable[[int, int], Episode]
+
+
+def from_dlpack(value: Any, what: str) -> Any:
+    """A numpy array that shares the memory of another library's array. Other values are returned as they are."""
+    if isinstance(value, (np.ndarray, np.generic)) or not hasattr(value, "__dlpack__"):
+        return value
+    try:
+        return np.from_dlpack(value)
+    except (BufferError, RuntimeError, TypeError, ValueError) as e:
+        raise InvalidArgument(f"{what}: an array that numpy cannot read; pass one in host memory: {e}") from e
 
 
 def scene_of(scene: Scene, config: SimulatorConfig) -> SimulatorScene:
@@ -111,6 +122,13 @@ def metrics_dict(metrics: EpisodeMetrics) -> dict[str, Any]:
 def info_dict(info: StepInfo) -> dict[str, Any]:
     """The outcome of an action as numbers by their names."""
     return {name: getattr(info, name) for name in INFO_FIELDS}
+
+
+def plain(value: Any) -> Any:
+    """A value that JSON does not know, in plain types."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return str(value) if isinstance(value, enum.Enum) else value.__getstate__()
 
 
 class Episodes:

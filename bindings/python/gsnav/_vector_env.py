@@ -70,8 +70,9 @@ class VectorEnv(BaseVectorEnv):
         episodes: episodes to draw from; a BatchEpisode names its scene. Or a function like the `next_episode`
             of BatchSimulator, which decides without seeds. Default: episodes are sampled by `rules`.
         autoreset_mode: what happens to an environment whose episode has ended, as in Gymnasium.
-        copy: False returns observations as read-only views of the simulator's memory, which the next call
-            overwrites.
+        copy: True returns observations as new arrays, which stay as they are. The simulator draws into them, so
+            nothing is copied, except with the mode DISABLED. Their memory is used again when they are dead.
+            False returns read-only views of the simulator's memory, which the next call overwrites.
         Other arguments are those of Env. `config` may be a BatchConfig.
         """
         config = SimulatorConfig() if config is None else config
@@ -86,17 +87,16 @@ class VectorEnv(BaseVectorEnv):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._rgb = _task.rgb_sensor(config, render_mode)
         self.render_mode = render_mode
-        names = list(scene) if isinstance(scene, (list, tuple)) else [scene]
+        names: list[Any] = list(scene) if isinstance(scene, (list, tuple)) else [scene]
         self.scenes = [_task.scene_of(one, config) for one in names]
         drawn = episodes if callable(episodes) else _task.Episodes(self.scenes, episodes, rules)
         self._source = Source(drawn, self.num_envs)
         self._same_step = mode == AutoresetMode.SAME_STEP
-        self._copy = copy
         self._last: Observation | None = None
         self._all = np.ones(self.num_envs, np.bool_)
         self._all.flags.writeable = False
         self._simulator: BatchSimulator | None = BatchSimulator(
-            device, self.scenes, batch_config(config, AUTO_RESETS[mode.value]), self.num_envs, self._source)
+            device, self.scenes, batch_config(config, AUTO_RESETS[mode.value]), self.num_envs, self._source, copy)
 
     @property
     def simulator(self) -> BatchSimulator:
@@ -125,7 +125,7 @@ class VectorEnv(BaseVectorEnv):
 
     def step(self, actions: Any) -> tuple[Observation, npt.NDArray[np.float64], npt.NDArray[np.bool_],
                                           npt.NDArray[np.bool_], dict[str, Any]]:
-        """Performs one action per environment, integers [N].
+        """Performs one action per environment: integers [N], also in an array of another library, by DLPack.
 
         Returns observations, rewards, terminations, truncations and infos. Wrong actions raise an exception
         before any environment moves.
@@ -162,8 +162,9 @@ class VectorEnv(BaseVectorEnv):
     def _mask(self, mask: Any) -> npt.NDArray[np.bool_] | None:
         if mask is None:
             return None
+        mask = _task.from_dlpack(mask, "options[\"reset_mask\"]")
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
-            raise TypeError("options[\"reset_mask\"]: expected a numpy array of bool")
+            raise TypeError("options[\"reset_mask\"]: expected an array of bool")
         if mask.shape != (self.num_envs,):
             raise InvalidArgument(f"options[\"reset_mask\"] has shape {mask.shape}: it must be ({self.num_envs},)")
         if not mask.any():
@@ -171,7 +172,7 @@ class VectorEnv(BaseVectorEnv):
         return mask
 
     def _checked(self, actions: Any) -> npt.NDArray[np.integer[Any]]:
-        array = np.asarray(actions)
+        array = np.asarray(_task.from_dlpack(actions, "VectorEnv.step: actions"))
         if array.dtype.kind not in "iu":
             raise TypeError(f"VectorEnv.step: actions have dtype {array.dtype}: use integers")
         if array.shape != (self.num_envs,):
@@ -184,11 +185,11 @@ class VectorEnv(BaseVectorEnv):
         return array
 
     def _observation(self, step: BatchStep) -> Observation:
-        images = step.images
-        made = {name: image.copy() for name, image in images.items()} if self._copy else dict(images)
+        made = dict(step.images)
         made[_task.POINT_GOAL] = step.point_goals.astype(np.float32)
-        self._last = made
-        return dict(made)
+        # Images that are not needed would keep the simulator from using their memory again.
+        self._last = dict(made) if self.render_mode is not None else {}
+        return made
 
     @staticmethod
     def _add(infos: dict[str, Any], key: str, values: Any, mask: npt.NDArray[np.bool_]) -> None:

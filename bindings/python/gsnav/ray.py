@@ -1,34 +1,99 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plays episodes on the machines of a Ray cluster. `pip install "gsnav[ray]"` installs Ray.
 
-Each actor owns a VectorEnv. Episodes are handed out in pieces. How a piece is played depends on the piece
-alone, so any number of actors gives the bits of a single process, and so does a run in which actors die.
+Each actor owns a VectorEnv and plays pieces of the list of episodes. How a piece is played depends on the piece
+alone. Any number of actors, even if some of them die, therefore gives the bits of a single process.
 """
 
 from __future__ import annotations
 
+import collections
 import hashlib
 import heapq
 import json
-import math
 import os
+import pathlib
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+import numpy.typing as npt
 
 from . import _task
 from ._errors import BackendFailure, ClosedEnvironment, InvalidArgument
 from ._gsnav import EpisodeMetrics, SimulatorConfig
-from ._rollout import Player, Policy, Rollout, plain
-from ._vector_env import VectorEnv
+from ._vector_env import Observation, VectorEnv
 
-__all__ = ["Policy", "Rollout", "Workers"]
-
+# Returns the actions [N] for observations and the index of each environment's episode, int64 [N].
+Policy = Callable[[Observation, npt.NDArray[np.int64]], Any]
 DEATHS = 3  # A piece whose actors die this often is an error.
+
+
+@dataclass
+class Rollout:
+    """One episode as it was played, with T actions."""
+    episode: int  # Index in the list of episodes.
+    id: str
+    actions: npt.NDArray[np.int8]  # [T]
+    rewards: npt.NDArray[np.float64]  # [T]
+    metrics: EpisodeMetrics
+    observations: Observation  # Before each action, [T][...]; those named in `keep`.
+
+    def line(self) -> str:
+        """The episode's line in a journal, with the fields of a journal of gsnav-eval. Infinity is null."""
+        metrics = {n: v if np.isfinite(v) else None for n, v in _task.metrics_dict(self.metrics).items()}
+        return json.dumps({"episode": self.episode, "id": self.id, "reward": sum(self.rewards.tolist()),
+                           "metrics": metrics, "actions": "".join(map(str, self.actions.tolist()))})
+
+
+class Player:
+    """Plays pieces in a vector environment. It is what an actor runs."""
+    def __init__(self, environments: int, scene: Any, settings: dict[str, Any]) -> None:
+        self._settings: dict[str, Any] = {**settings, "autoreset_mode": "SameStep", "episodes": self._next}
+        self._scene, self._envs = scene, cast(Any, None)
+        self._piece: list[tuple[int, _task.Episode]] = []
+        self._given, self._playing = 0, np.full(environments, -1, np.int64)
+
+    def _next(self, environment: int, count: int) -> _task.Episode:
+        spare = self._given >= len(self._piece)  # All are given out: repeat one, and ignore its results.
+        self._playing[environment] = -1 if spare else self._piece[self._given][0]
+        self._given += not spare
+        return self._piece[0 if spare else self._given - 1][1]
+
+    def ready(self) -> bool:
+        """Creates the environments. An exception of __init__ would be the death of the actor to Ray."""
+        self._envs = self._envs or VectorEnv(len(self._playing), self._scene, **self._settings)
+        return True
+
+    def play(self, piece: list[tuple[int, _task.Episode]], make_policy: Callable[[VectorEnv], Policy],
+             keep: Sequence[str]) -> list[Rollout]:
+        """Plays the episodes of a piece. Their results are in the order of the piece."""
+        self.ready()
+        envs, episodes, self._piece, self._given = self._envs, dict(piece), piece, 0
+        seen, policy = envs.reset()[0], make_policy(envs)
+        rows: list[list[tuple[int, float, dict[str, Any]]]] = [[] for _ in self._playing]
+        done: dict[int, Rollout] = {}
+        while len(done) < len(piece):
+            playing = self._playing.copy()
+            last, actions = seen, np.asarray(policy(seen, playing))
+            seen, rewards, terminated, truncated, infos = envs.step(actions)
+            for e in np.flatnonzero(playing >= 0):
+                index = int(playing[e])
+                rows[e].append((int(actions[e]), float(rewards[e]), {k: last[k][e].copy() for k in keep}))
+                if not (terminated[e] or truncated[e]):
+                    continue
+                (taken, gained, images), rows[e] = zip(*rows[e]), []
+                metrics = infos["final_info"]["metrics"]
+                episode: Any = getattr(episodes[index], "episode", episodes[index])
+                done[index] = Rollout(index, episode.id, np.array(taken, np.int8), np.array(gained),
+                                      EpisodeMetrics(**{n: metrics[n][e].item() for n in _task.METRIC_FIELDS}),
+                                      {k: np.stack([image[k] for image in images]) for k in keep})
+        return [done[index] for index in episodes]
 
 
 class Workers:
     """Actors that play episodes. Create it once: its actors keep their scenes."""
-
     def __init__(self, scene: Any = "default", *, actors: int, environments: int = 16, options: Any = None,
                  **settings: Any) -> None:
         """Creates the actors.
@@ -47,7 +112,7 @@ class Workers:
         self._actors: list[Any] = []
         if actors:
             import ray
-
+            self._ray: Any = ray
             self._class: Any = ray.remote(Player).options(**{"num_cpus": 1, **(options or {})})
             self._actors = [self._class.remote(*self._arguments) for _ in range(actors)]
 
@@ -55,21 +120,20 @@ class Workers:
                  piece: int = 64, keep: Sequence[str] = (), first: int = 0) -> Iterator[Rollout]:
         """Plays episodes and yields them in order, from index `first`.
 
-        make_policy: called with the VectorEnv at the start of each piece. It returns a function
-            `policy(observations, playing)`, which returns the actions [N]. `playing`, int64 [N], has the index
-            of each environment's episode, or -1 if its actions do not count. The actions of an episode must
-            depend on the piece only, so random numbers need seeds of the episode.
-        piece: number of episodes that an actor plays at a time. The results depend on it only where a policy
-            or the noise of a sensor depends on the environment's index.
+        make_policy: called with the VectorEnv at the start of each piece. It returns the function
+            `policy(observations, playing)`, which returns actions [N]. `playing`, int64 [N], has the index of each
+            environment's episode, or -1 if its actions do not count. The actions of an episode must depend on the
+            piece only, so random numbers need seeds of the episode.
+        piece: number of episodes that an actor plays at a time. Results depend on it only where a policy or the
+            noise of a sensor depends on the environment's index.
         keep: names of observations to return. They travel over the network.
         """
         if piece < 1:
             raise InvalidArgument(f"piece = {piece}: must be positive")
         if not self._local and not self._actors:
             raise ClosedEnvironment("Workers: the actors have ended; create new ones")
-        indexed = list(enumerate(episodes))[first:]
-        pieces = [indexed[i:i + piece] for i in range(0, len(indexed), piece)]
-        local = self._local
+        indexed, local = list(enumerate(episodes)), self._local
+        pieces = [indexed[i:i + piece] for i in range(first, len(indexed), piece)]
         here = (local.play(one, make_policy, keep) for one in pieces) if local else None
         for rollouts in here or self._remote(pieces, make_policy, keep):
             yield from rollouts
@@ -80,23 +144,19 @@ class Workers:
 
         An existing journal of the same evaluation is continued. Use the policy that it was begun with.
         """
-        content = hashlib.sha256(json.dumps([*self._identity, *episodes], default=plain).encode()).hexdigest()
-        header = json.dumps({"journal": "gsnav.ray", "format": 1, "piece": piece, "content": content}) + "\n"
-        lines: list[str] = []
-        if os.path.exists(journal):
-            with open(journal, encoding="utf-8") as f:
-                lines = f.read().split("\n")[:-1]  # Without a line that was cut off.
-            if lines and lines[0] + "\n" != header:
-                raise InvalidArgument(f"{os.fspath(journal)} is of other episodes, scenes, settings or pieces: use "
-                                      "another name, or remove it")
+        content = hashlib.sha256(json.dumps([*self._identity, *episodes], default=_task.plain).encode()).hexdigest()
+        header = json.dumps({"journal": "gsnav.ray", "format": 1, "piece": piece, "content": content})
+        path, part = pathlib.Path(journal), pathlib.Path(os.fspath(journal) + ".part")
+        lines = path.read_text().split("\n")[:-1] if path.exists() else []  # Without a line that was cut off.
+        if lines and lines[0] != header:
+            raise InvalidArgument(f"{path} is of other episodes, scenes, settings or pieces: use another, or remove it")
         whole = len(episodes) if len(lines) > len(episodes) else max(len(lines) - 1, 0) // piece * piece
-        kept = lines[1:whole + 1]
-        read: list[dict[str, Any]] = [json.loads(line)["metrics"] for line in kept]
-        metrics = [EpisodeMetrics(**{n: math.inf if v is None else v for n, v in m.items()}) for m in read]
-        with open(os.fspath(journal) + ".part", "w", encoding="utf-8") as f:
-            f.write("".join([header, *(line + "\n" for line in kept)]))
-        os.replace(f.name, journal)
-        with open(journal, "a", encoding="utf-8") as f:
+        kept = [header, *lines[1:whole + 1]]
+        read = [json.loads(line)["metrics"].items() for line in kept[1:]]
+        metrics = [EpisodeMetrics(**dict[str, Any]((n, np.inf if v is None else v) for n, v in m)) for m in read]
+        part.write_text("\n".join([*kept, ""]))
+        part.replace(path)
+        with path.open("a") as f:
             for one in self.rollouts(episodes, make_policy, piece=piece, first=whole):
                 print(one.line(), file=f, flush=True)
                 metrics.append(one.metrics)
@@ -104,22 +164,16 @@ class Workers:
 
     def close(self) -> None:
         """Ends the actors."""
-        if self._actors:
-            import ray
-
-            for actor in self._actors:
-                ray.kill(actor)
+        for actor in self._actors:
+            self._ray.kill(actor)
         self._actors, self._local = [], None
 
     def _remote(self, pieces: list[Any], make_policy: Any, keep: Any) -> Iterator[list[Rollout]]:
-        import ray
-
-        policy, window = ray.put(make_policy), 4 * len(self._actors)
-        todo, deaths = list(range(len(pieces))), [0] * len(pieces)  # `todo` is a heap.
-        done: dict[int, list[Rollout]] = {}
-        idle: list[Any] = []
+        ray, policy = self._ray, self._ray.put(make_policy)
+        todo, deaths = list(range(len(pieces))), collections.Counter[int]()  # `todo` is a heap.
+        done, idle = dict[int, list[Rollout]](), list[Any]()
         working = {actor.ready.remote(): (actor, -1) for actor in self._actors}
-        at, without_success = 0, 0  # `at` is the piece that is yielded next.
+        at, window = 0, 4 * len(self._actors)  # `at` is the piece that is yielded next.
         while at < len(pieces):
             while idle and todo and todo[0] < at + window:  # Later results would wait in memory.
                 actor, index = idle.pop(), heapq.heappop(todo)
@@ -129,20 +183,18 @@ class Workers:
             try:
                 result = ray.get(future)
             except ray.exceptions.RayActorError as e:
-                self.deaths, without_success = self.deaths + 1, without_success + 1
-                if index >= 0:
-                    deaths[index] += 1
-                    heapq.heappush(todo, index)
-                if max(deaths) >= DEATHS or without_success > DEATHS * len(self._actors):
+                self.deaths += 1
+                deaths[index] += 1
+                if deaths[index] >= DEATHS * (1 if index >= 0 else len(self._actors)):
                     raise BackendFailure(f"gsnav.ray: actors died again and again: {e}") from e
-                self._actors.remove(actor)
-                actor = self._class.remote(*self._arguments)
-                self._actors.append(actor)
+                self._actors[self._actors.index(actor)] = actor = self._class.remote(*self._arguments)
                 working[actor.ready.remote()] = (actor, -1)
+                if index >= 0:
+                    heapq.heappush(todo, index)
                 continue
             idle.append(actor)
             if index >= 0:
-                done[index], without_success = result, 0
+                done[index], deaths[-1] = result, 0
             while at in done:
                 yield done.pop(at)
                 at += 1

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "fields.hpp"
-#include "world.hpp"
 
 namespace gsnav::python {
 namespace {
@@ -64,7 +63,33 @@ void check(const VelocityCommand& c, std::size_t environment) {
                   ": VelocityCommand: linear, angular and lateral must be finite");
 }
 
+/// The integer of an array without dimensions. Null if it is anything else.
+nb::object integer_of(nb::handle value) {
+  Array array;
+  if (!nb::try_cast(value, array, false) || array.ndim() != 0) return {};
+  const auto code = static_cast<nb::dlpack::dtype_code>(array.dtype().code);
+  if (code != nb::dlpack::dtype_code::Int && code != nb::dlpack::dtype_code::UInt) return {};
+  return nb::module_::import_("numpy").attr("from_dlpack")(value).attr("item")();
+}
+
 }  // namespace
+
+Action action_from(nb::handle value, const char* what) {
+  const std::string where = what;
+  const nb::object index =
+      PyIndex_Check(value.ptr()) ? nb::steal(PyNumber_Index(value.ptr())) : integer_of(value);
+  if (!index.is_valid()) {
+    PyErr_Clear();
+    throw nb::type_error((where + ": expected an Action or an integer, got " + type_of(value)).c_str());
+  }
+  const long action = PyLong_AsLong(index.ptr());
+  if (PyErr_Occurred() || action < 0 || action > static_cast<long>(Action::look_down)) {
+    PyErr_Clear();
+    throw Error(Errc::invalid_argument, where + ": action " + text_of(index) +
+                                            " is out of range: use 0 (stop) to 5 (look_down)");
+  }
+  return static_cast<Action>(action);
+}
 
 BatchActions batch_actions(nb::handle source, std::size_t environments) {
   Array array;

@@ -13,6 +13,10 @@ namespace gsnav::python {
 /// Actions of a batch: all discrete or all velocities.
 using BatchActions = std::variant<std::vector<Action>, std::vector<VelocityCommand>>;
 
+/// Reads an action from an Action, an integer, or an integer array without dimensions. Throws if it is
+/// anything else or out of range.
+Action action_from(nb::handle value, const char* what);
+
 /// Reads one action per environment from an array of integers [N], or a sequence of actions, integers or
 /// velocities. Throws a Python exception or gsnav::Error that names the environment and the value.
 BatchActions batch_actions(nb::handle source, std::size_t environments);

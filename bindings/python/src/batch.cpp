@@ -7,6 +7,7 @@
 #include "fields.hpp"
 #include "gsnav/device/simulator.hpp"
 #include "guard.hpp"
+#include "image_pool.hpp"
 #include "structured.hpp"
 #include "world.hpp"
 
@@ -17,9 +18,18 @@ namespace {
 struct PythonBatch {
   BatchSimulator sim;
   std::shared_ptr<PythonSource> source;
-  std::size_t scenes = 0;
-  bool begun = false;  ///< Worlds exist from the first reset on.
+  std::shared_ptr<ImagePool> pool;  ///< Images are drawn there, or null.
+  bool copy = false;                ///< Images are new arrays.
+  bool begun = false;               ///< Worlds exist from the first reset on.
   Busy busy;
+
+  PythonBatch(BatchSimulator s, std::shared_ptr<PythonSource> e, std::shared_ptr<ImagePool> p, bool c)
+      : sim(std::move(s)), source(std::move(e)), pool(std::move(p)), copy(c) {}
+  PythonBatch(const PythonBatch&) = delete;
+  PythonBatch& operator=(const PythonBatch&) = delete;
+  ~PythonBatch() {
+    if (pool != nullptr) pool->close();
+  }
 };
 
 /// BatchStep whose spans are numpy arrays.
@@ -38,16 +48,28 @@ const Types& types() {
   return *made;
 }
 
-nb::dict image_arrays(std::span<const BatchObservation> images, nb::handle owner) {
+std::vector<std::size_t> shape_of(const BatchObservation& o) {
+  return {o.environments, static_cast<std::size_t>(o.height), static_cast<std::size_t>(o.width),
+          static_cast<std::size_t>(o.channels)};
+}
+
+/// Arrays by the names of their sensors. `array` makes that of one image.
+template <class F>
+nb::dict image_arrays(std::span<const BatchObservation> images, const F& array) {
   nb::dict out;
-  for (const BatchObservation& o : images) {
-    const std::vector<std::size_t> shape{o.environments, static_cast<std::size_t>(o.height),
-                                         static_cast<std::size_t>(o.width),
-                                         static_cast<std::size_t>(o.channels)};
-    out[nb::str(o.uuid.data(), o.uuid.size())] =
-        owner.is_valid() ? array_view(o.data.data(), shape, owner) : array_copy(o.data, shape);
-  }
+  for (const BatchObservation& o : images) out[nb::str(o.uuid.data(), o.uuid.size())] = array(o);
   return out;
+}
+
+nb::object copied(const BatchObservation& o) { return array_copy(o.data, shape_of(o)); }
+
+nb::dict step_images(std::span<const BatchObservation> images, const PythonBatch& b, nb::handle self) {
+  return image_arrays(images, [&](const BatchObservation& o) {
+    if (!b.copy) return array_view(o.data.data(), shape_of(o), self);
+    // Sensors may share an image, but each has an array of its own.
+    nb::object own = b.pool != nullptr ? b.pool->array(o.data.data(), shape_of(o)) : nb::object();
+    return own.is_valid() ? own : copied(o);
+  });
 }
 
 nb::object bool_view(std::span<const std::uint8_t> values, nb::handle owner) {
@@ -56,7 +78,7 @@ nb::object bool_view(std::span<const std::uint8_t> values, nb::handle owner) {
 
 /// Arrays of a step. Those with a row per environment are views; others are copies, because their sizes
 /// change from step to step.
-PythonStep step_arrays(const BatchStep& s, nb::handle self) {
+PythonStep step_arrays(const BatchStep& s, const PythonBatch& b, nb::handle self) {
   static_assert(sizeof(PointGoal) == 2 * sizeof(double));
   PythonStep out;
   const std::size_t n = s.rewards.size();
@@ -72,8 +94,8 @@ PythonStep step_arrays(const BatchStep& s, nb::handle self) {
   const auto* const goals = reinterpret_cast<const double*>(s.final_point_goals.data());
   out.final_point_goals = array_copy(std::span(goals, 2 * ended), {ended, 2});
   out.final_metrics = structured_copy(s.final_metrics, types().metrics);
-  out.images = image_arrays(s.images, self);
-  out.final_images = image_arrays(s.final_images, nb::handle());
+  out.images = step_images(s.images, b, self);
+  out.final_images = image_arrays(s.final_images, copied);
   return out;
 }
 
@@ -82,6 +104,7 @@ template <class F>
 PythonStep observe(nb::handle self, PythonBatch& b, const char* what, const F& f) {
   check_fork(b.sim.device(), what);
   b.source->error.reset();
+  if (b.pool != nullptr) b.pool->begin();
   std::optional<Result<BatchStep>> result;
   {
     nb::gil_scoped_release release;
@@ -95,11 +118,25 @@ PythonStep observe(nb::handle self, PythonBatch& b, const char* what, const F& f
     }
     result->status().throw_if_error();
   }
-  return step_arrays(**result, self);
+  return step_arrays(**result, b, self);
+}
+
+/// Memory for the images of a batch whose arrays own them. It keeps as many bytes as two steps need, for
+/// a caller that holds the arrays of one step while it takes the next. Null if a call may draw only some
+/// of the environments: the others would have to be drawn again.
+std::shared_ptr<ImagePool> image_pool(const BatchConfig& config, std::size_t environments) {
+  if (config.auto_reset == AutoReset::disabled) return nullptr;
+  double bytes = 0;
+  for (const SensorSpec& s : config.sensors) {
+    bytes += 2.0 * sizeof(float) * static_cast<double>(environments) * s.resolution[0] *
+             s.resolution[1] * channels_of(s.kind);
+  }
+  // A size that does not fit is an error of the sensor, which the simulator names.
+  return std::make_shared<ImagePool>(bytes > 0 && bytes < 0x1p62 ? static_cast<std::size_t>(bytes) : 0);
 }
 
 void make(PythonBatch* self, const DeviceArg& device, const std::vector<SceneArg>& scenes,
-          const BatchConfig& config, std::size_t environments, nb::object next_episode) {
+          BatchConfig config, std::size_t environments, nb::object next_episode, bool copy) {
   if (!PyCallable_Check(next_episode.ptr())) {
     throw nb::type_error(
         ("BatchSimulator: next_episode must be callable, got " + type_of(next_episode)).c_str());
@@ -108,21 +145,21 @@ void make(PythonBatch* self, const DeviceArg& device, const std::vector<SceneArg
   check_fork(chosen, "BatchSimulator");
   std::vector<std::shared_ptr<const SimulatorScene>> shared;
   for (const SceneArg& s : scenes) shared.push_back(s.scene);
-  const std::size_t count = shared.size();
   auto source = std::make_shared<PythonSource>(PythonSource{std::move(next_episode), {}});
   EpisodeSource episodes = episode_source(source);
+  std::shared_ptr<ImagePool> pool = copy ? image_pool(config, environments) : nullptr;
+  if (pool != nullptr) {
+    config.image_source = [pool](std::size_t, std::size_t floats) { return pool->take(floats); };
+  }
   nb::gil_scoped_release release;
-  new (self) PythonBatch{
-      BatchSimulator::create(chosen, std::move(shared), config, environments, std::move(episodes))
-          .value(),
-      std::move(source),
-      count,
-      false,
-      {}};
+  new (self) PythonBatch(BatchSimulator::create(chosen, std::move(shared), std::move(config),
+                                                environments, std::move(episodes))
+                             .value(),
+                         std::move(source), std::move(pool), copy);
 }
 
 PythonStep reset(nb::handle self, nb::handle mask) {
-  auto& b = nb::cast<PythonBatch&>(self);
+  auto& b = object_of<PythonBatch>(self);
   const Busy::Hold hold(b.busy, "BatchSimulator.reset");
   const std::vector<std::uint8_t> chosen = reset_mask(mask, b.sim.environments());
   PythonStep step =
@@ -132,7 +169,7 @@ PythonStep reset(nb::handle self, nb::handle mask) {
 }
 
 PythonStep step(nb::handle self, nb::handle actions) {
-  auto& b = nb::cast<PythonBatch&>(self);
+  auto& b = object_of<PythonBatch>(self);
   const Busy::Hold hold(b.busy, "BatchSimulator.step");
   const BatchActions chosen = batch_actions(actions, b.sim.environments());
   return std::visit(
@@ -152,7 +189,7 @@ void check_environment(const PythonBatch& b, std::size_t environment) {
 }
 
 WorldView world(nb::handle self, std::size_t environment) {
-  auto& b = nb::cast<PythonBatch&>(self);
+  auto& b = object_of<PythonBatch>(self);
   check_environment(b, environment);
   return {nb::borrow(self), &b.busy,
           [&b, environment]() -> const World& { return b.sim.world(environment); }};
@@ -180,7 +217,8 @@ void bind_step(nb::module_& m) {
   using S = PythonStep;
   nb::class_<S> c(m, "BatchStep",
                   "Result of a batch step in the form of Gymnasium's VectorEnv. Arrays with one row per "
-                  "environment are read-only views; the simulator's next call overwrites them.");
+                  "environment are read-only views; the simulator's next call overwrites them. "
+                  "With BatchSimulator(copy=True), images are new arrays.");
   const auto array = [&](const char* name, nb::object S::*member, const char* type, const char* doc) {
     const std::string signature =
         std::string("def ") + name + "(self) -> numpy.typing.NDArray[numpy." + type + "]";
@@ -234,16 +272,20 @@ void bind_batch(nb::module_& m) {
       "use it at a time; a call during another call raises an error.")
       .def(
           "__init__", make, nb::arg("device"), nb::arg("scenes"), nb::arg("config"),
-          nb::arg("environments"), nb::arg("next_episode"),
+          nb::arg("environments"), nb::arg("next_episode"), nb::arg("copy") = false,
           nb::sig("def __init__(self, device: Device | str, "
                   "scenes: collections.abc.Sequence[SimulatorScene | OpenedScene], config: BatchConfig, "
                   "environments: int, next_episode: collections.abc.Callable[[int, int], "
-                  "BatchEpisode | PointNavEpisode]) -> None"),
+                  "BatchEpisode | PointNavEpisode], copy: bool = False) -> None"),
           "Creates a simulator that shares `scenes`.\n\n"
           "`next_episode(environment, count)` is called once for each episode of each environment. It "
           "returns "
           "a BatchEpisode, or a PointNavEpisode in scene 0. Its exceptions reach the caller of reset or "
-          "step. After that, reset all environments.")
+          "step. After that, reset all environments.\n\n"
+          "`copy` False returns images as read-only views. True returns new writable arrays, aligned to "
+          "64 bytes. The simulator draws into their memory, and uses it again when they are dead. It "
+          "keeps unused memory for the images of up to two steps. With AutoReset.disabled the arrays "
+          "are copies of the simulator's images.")
       .def(
           "reset", reset, nb::arg("mask") = nb::none(),
           nb::sig("def reset(self, mask: numpy.typing.NDArray[numpy.bool_] | None = None) -> BatchStep"),
@@ -252,8 +294,9 @@ void bind_batch(nb::module_& m) {
            nb::sig("def step(self, actions: numpy.typing.NDArray[numpy.integer[typing.Any]] | "
                    "collections.abc.Sequence[Action | int] | collections.abc.Sequence[VelocityCommand]) "
                    "-> BatchStep"),
-           "Performs one action per environment and renders. `actions`: integers [N] of any dtype and "
-           "stride, or a list. Wrong actions are refused before any environment moves.")
+           "Performs one action per environment and renders. `actions`: integers [N] of any dtype, "
+           "stride "
+           "and library (DLPack), or a list. Wrong actions are refused before any environment moves.")
       .def_prop_ro(
           "environments", [](const P& p) { return p.sim.environments(); }, "Number of environments, N.")
       .def("world", world, nb::arg("environment"), nb::sig("def world(self, environment: int) -> World"),
@@ -287,6 +330,9 @@ void bind_batch(nb::module_& m) {
             p.sim.set_rendering(on);
           },
           nb::arg("on"), "Turns rendering on or off, from the next action on.")
+      .def_prop_ro(
+          "unused_bytes", [](const P& p) { return p.pool == nullptr ? 0 : p.pool->unused(); },
+          "Number of bytes that are kept for the images of later steps (`copy`).")
       .def_prop_ro(
           "device", [](const P& p) { return p.sim.device(); }, "Device that the simulator runs on.");
 }

@@ -7,8 +7,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <memory>
 #include <string>
+#include <type_traits>
 
 #include "gsnav/device/device.hpp"
 #include "gsnav/math/quat.hpp"
@@ -34,8 +36,26 @@ struct SceneArg {
   std::shared_ptr<const SimulatorScene> scene;  ///< Not null.
 };
 
+/// Reads `count` numbers from an array of float32 or float64 in host memory, by DLPack or the buffer
+/// protocol. Returns false if it is anything else.
+inline bool read_array(nb::handle source, double* out, Py_ssize_t count) noexcept {
+  nb::ndarray<nb::ro, nb::device::cpu> array;
+  if (!nb::try_cast(source, array, false) || array.ndim() != 1) return false;
+  if (array.shape(0) != static_cast<std::size_t>(count)) return false;
+  const bool wide = array.dtype() == nb::dtype<double>();
+  if (!wide && array.dtype() != nb::dtype<float>()) return false;
+  for (std::int64_t i = 0; i < count; ++i) {
+    const std::int64_t at = i * array.stride(0);
+    out[i] = wide ? static_cast<const double*>(array.data())[at]
+                  : static_cast<double>(static_cast<const float*>(array.data())[at]);
+  }
+  return true;
+}
+
 /// Reads `count` numbers from a sequence or array. Returns false if it is anything else.
 inline bool read_numbers(nb::handle source, double* out, Py_ssize_t count) noexcept {
+  if (!PyList_Check(source.ptr()) && !PyTuple_Check(source.ptr()) && read_array(source, out, count))
+    return true;
   if (PyUnicode_Check(source.ptr()) || !PySequence_Check(source.ptr())) return false;
   const Py_ssize_t size = PySequence_Size(source.ptr());
   bool good = size == count;
@@ -60,10 +80,34 @@ inline std::string text_of(nb::handle object) {
   return utf8;
 }
 
-/// A new numpy array of these numbers, shape [count].
-inline nb::object number_array(const double* numbers, std::size_t count) {
-  nb::ndarray<nb::numpy, const double, nb::ndim<1>> view(numbers, {count});
-  return nb::cast(view, nb::rv_policy::copy);
+/// A new numpy array of these numbers, shape [count]. Null, with an exception set, if it fails.
+inline nb::object number_array(const double* numbers, std::size_t count) noexcept {
+  try {
+    nb::ndarray<nb::numpy, const double, nb::ndim<1>> view(numbers, {count});
+    return nb::cast(view, nb::rv_policy::copy);
+  } catch (nb::python_error& e) {
+    e.restore();
+  } catch (const std::exception& e) {
+    PyErr_SetString(PyExc_RuntimeError, e.what());
+  }
+  return {};
+}
+
+/// The C++ object of a Python object. Throws TypeError if it is of another type, or if it was made by
+/// __new__ without __init__.
+template <class T>
+T& object_of(nb::handle self) {
+  const std::string wanted = nb::cast<std::string>(nb::type<std::remove_cv_t<T>>().attr("__name__"));
+  if (!nb::isinstance<std::remove_cv_t<T>>(self)) {
+    throw nb::type_error(
+        ("expected a " + wanted + ", got " + nb::cast<std::string>(self.type().attr("__name__")))
+            .c_str());
+  }
+  if (!nb::inst_ready(self)) {
+    throw nb::type_error(
+        (wanted + ": __init__ has not been called. Create it with " + wanted + "(...)").c_str());
+  }
+  return *nb::inst_ptr<std::remove_cv_t<T>>(self);
 }
 
 }  // namespace gsnav::python

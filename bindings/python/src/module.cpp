@@ -4,6 +4,11 @@
 
 NB_MODULE(_gsnav, m) {
   using namespace gsnav::python;
+  if (PyInterpreterState_GetID(PyInterpreterState_Get()) != 0) {
+    throw nb::import_error(
+        "gsnav does not support subinterpreters. Use processes of the start method spawn");
+  }
+  nb::module_::import_("numpy");  // Without it, this is an ImportError.
   m.doc() = "Compiled part of gsnav. Import gsnav instead.";
   bind_errors(m);
   bind_device(m);

@@ -82,7 +82,7 @@ void bind_values(nb::module_& m) {
       .def_prop_ro(
           "islands",
           [](nb::handle self) {
-            const auto& map = nb::cast<const TopDownMap&>(self);
+            const auto& map = object_of<const TopDownMap>(self);
             return array_view(map.islands.data(), {map.rows, map.columns}, self);
           },
           nb::sig("def islands(self) -> numpy.typing.NDArray[numpy.int32]"),

@@ -18,7 +18,9 @@ nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu> rows_of_three(n
                                                                                const char* kinds,
                                                                                const char* type) {
   const nb::object numpy = nb::module_::import_("numpy");
-  const nb::object array = numpy.attr("asarray")(source);
+  // Objects that are seen by DLPack only are not arrays to asarray.
+  const bool foreign = !nb::hasattr(source, "__array__") && nb::hasattr(source, "__dlpack__");
+  const nb::object array = numpy.attr(foreign ? "from_dlpack" : "asarray")(source);
   const nb::object dtype = array.attr("dtype"), shape = array.attr("shape");
   const std::string where = "NavMesh.build: " + std::string(name) + " have ";
   if (std::string(kinds).find(text_of(dtype.attr("kind"))) == std::string::npos) {

@@ -3,6 +3,7 @@
 
 #include <nanobind/stl/shared_ptr.h>
 
+#include "actions.hpp"
 #include "arrays.hpp"
 #include "bind.hpp"
 #include "fields.hpp"
@@ -41,7 +42,7 @@ nb::dict image_views(std::span<const Observation> images, nb::handle owner) {
 /// Runs f(simulator) -> Result<Observations> without the GIL.
 template <class F>
 PythonObservations observe(nb::handle self, const char* what, const F& f) {
-  auto& s = nb::cast<PythonSimulator&>(self);
+  auto& s = object_of<PythonSimulator>(self);
   const Busy::Hold hold(s.busy, what);
   check_fork(s.sim.device(), what);
   Observations seen;
@@ -217,7 +218,7 @@ void bind_simulator(nb::module_& m) {
   c.def_prop_ro(
        "world",
        [](nb::handle self) {
-         P& p = nb::cast<P&>(self);
+         P& p = object_of<P>(self);
          return WorldView{nb::borrow(self), &p.busy, [&p]() -> const World& { return p.sim.world(); }};
        },
        nb::sig("def world(self) -> World"), "The world without images: agent, task and clock.")

@@ -82,21 +82,6 @@ void bind_policies(nb::module_& m) {
 
 }  // namespace
 
-Action action_from(nb::handle value, const char* what) {
-  const std::string where = what;
-  if (!PyIndex_Check(value.ptr())) {
-    throw nb::type_error((where + ": expected an Action or an integer, got " + type_of(value)).c_str());
-  }
-  const nb::object index = nb::steal(PyNumber_Index(value.ptr()));
-  const long action = PyLong_AsLong(index.ptr());
-  if (PyErr_Occurred() || action < 0 || action > static_cast<long>(Action::look_down)) {
-    PyErr_Clear();
-    throw Error(Errc::invalid_argument, where + ": action " + text_of(index) +
-                                            " is out of range: use 0 (stop) to 5 (look_down)");
-  }
-  return static_cast<Action>(action);
-}
-
 void bind_world(nb::module_& m) {
   bind_state(m);
   using W = WorldView;

@@ -16,7 +16,4 @@ struct WorldView {
   std::function<const World&()> of;  ///< Returns the world. Throws gsnav::Error if there is none.
 };
 
-/// Reads an action from an Action or an integer. Throws if it is anything else or out of range.
-Action action_from(nb::handle value, const char* what);
-
 }  // namespace gsnav::python

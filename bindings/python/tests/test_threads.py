@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 import multiprocessing
 import os
+import subprocess
+import sys
 import threading
 import time
 
@@ -126,3 +128,25 @@ def test_spawn(opened):
     process.join()
     env = gsnav.Env(opened, config=gsnav.SimulatorConfig(sensors=gsnav.rgbd_sensors(8, 8)))
     assert total == float(env.reset(seed=1)[0]["rgb"].sum())
+
+
+SUBINTERPRETER = """
+import importlib.util
+name = next(n for n in ("_interpreters", "_xxsubinterpreters") if importlib.util.find_spec(n))
+interpreters = importlib.import_module(name)
+code = "try:\\n    import gsnav\\nexcept ImportError as e:\\n    print('refused:', e, flush=True)"
+interpreters.run_string(interpreters.create(), code)
+print("alive")
+"""
+
+
+def test_a_subinterpreter_gets_an_error():
+    run = subprocess.run([sys.executable, "-c", SUBINTERPRETER], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert "refused:" in run.stdout and "subinterpreters" in run.stdout and "alive" in run.stdout
+
+
+def test_without_numpy_the_import_is_an_error():
+    code = "import sys; sys.modules['numpy'] = None; import gsnav._gsnav"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert run.returncode == 1 and "ImportError" in run.stderr or "ModuleNotFoundError" in run.stderr

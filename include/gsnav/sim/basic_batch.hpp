@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/detail/core/thread_pool.hpp"
 #include "gsnav/detail/sim/batch_scenes.hpp"
 #include "gsnav/detail/sim/batch_world.hpp"
@@ -89,6 +90,7 @@ class BasicBatchSimulator {
   /// @return the errors of the episode source, of World::reset, or of rendering.
   Result<BatchStep> reset(std::span<const std::uint8_t> mask = {}) {
     if (environments() == 0) return moved_away();
+    if (Status s = ask_for_memory(); !s) return s;
     if (Status s = worlds_.reset(parallel(), mask); !s) return s;
     free_scenes();
     return observe(mask.empty());
@@ -211,10 +213,33 @@ class BasicBatchSimulator {
   template <class A>
   Result<BatchStep> act(std::span<const A> actions) {
     if (environments() == 0) return moved_away();
+    if (Status s = ask_for_memory(); !s) return s;
     const auto draw_final = [this] { return observe_finished(); };
     if (Status s = worlds_.step(parallel(), actions, draw_final); !s) return s;
     free_scenes();
     return observe(false);
+  }
+
+  /// Asks BatchConfig::image_source for memory for the next images.
+  Status ask_for_memory() {
+    if (!config_.image_source || !config_.rendering) return {};
+    const SensorPlan& plan = rig_.plan();
+    std::vector<float*>& given = buffers_.given;
+    given.assign(plan.buffers(), nullptr);
+    for (std::size_t i = 0; i < plan.sensors().size(); ++i) {
+      const std::size_t buffer = plan.output(i).noisy, floats = environments() * plan.size(buffer);
+      if (given[buffer] != nullptr) continue;
+      const auto memory = detail::guarded([&] { return config_.image_source(i, floats); });
+      if (!memory) return memory.status();
+      const std::size_t there = memory->data() == nullptr ? 0 : memory->size();
+      if (there < floats) {
+        return {Errc::invalid_argument, "BatchConfig.image_source: " + std::to_string(there) +
+                                            " floats for the sensor \"" + plan.sensors()[i].uuid +
+                                            "\", which needs " + std::to_string(floats)};
+      }
+      given[buffer] = memory->data();
+    }
+    return {};
   }
 
   Result<BatchStep> observe(bool all) {
@@ -226,8 +251,9 @@ class BasicBatchSimulator {
     }
     rig_.resize(buffers_, environments());
     views_.clear();
-    // If the last call did not render, environments that have not moved need an image too.
-    const bool every = all || !std::exchange(drawn_, false);
+    // Environments that have not moved need an image too if the last call did not render, or drew
+    // into memory of the caller.
+    const bool every = all || config_.image_source || !std::exchange(drawn_, false);
     for (std::size_t e = 0; e < environments(); ++e) {
       if (every || worlds_.moved(e)) add_view(e, e);
     }

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -105,6 +106,12 @@ const Image& image_named(std::span<const Image> images, std::string_view uuid) {
 
 }  // namespace detail
 
+/// Gives memory for the images of one sensor.
+/// @param sensor Index in SimulatorConfig::sensors.
+/// @param floats Size of the images of all environments, [N][height][width][channels].
+/// @return memory of at least that size; or an error, which the batch returns.
+using ImageSource = std::function<Result<std::span<float>>(std::size_t sensor, std::size_t floats)>;
+
 /// Settings of a batch of environments.
 struct BatchConfig : SimulatorConfig {
   /// When an environment that is done begins its next episode.
@@ -115,6 +122,12 @@ struct BatchConfig : SimulatorConfig {
   /// Where images are returned. ImageMemory::backend leaves them on the GPU. It supports RGB, depth and
   /// alpha of pinhole cameras without noise.
   ImageMemory images = ImageMemory::host;
+  /// Chooses where each call draws BatchStep::images. It is called for each sensor before any
+  /// environment moves. The memory is of the kind in `images`. The batch does not use it after the call,
+  /// so it may be kept, changed or freed. Therefore reset(mask) also draws the environments that it
+  /// leaves alone. Sensors of one kind on one camera share memory, asked for once. Null: the batch draws
+  /// into memory of its own, which its next call overwrites.
+  ImageSource image_source{};
 };
 
 /// Image of one sensor. Valid until the next reset(), step() or observe() of its simulator.
@@ -149,7 +162,8 @@ struct Observations : StepInfo {
 };
 
 /// Images of one sensor for all environments, shape [environments][height][width][channels]. Valid until
-/// the next call of the simulator. interop/dlpack.hpp wraps them as tensors.
+/// the next call of the simulator, unless BatchConfig::image_source gave the memory. interop/dlpack.hpp
+/// wraps them as tensors.
 struct BatchObservation {
   /// Sensor name from SensorSpec::uuid.
   std::string_view uuid;
