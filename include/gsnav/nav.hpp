@@ -15,5 +15,6 @@
 #include "gsnav/detail/nav/step.hpp"
 #include "gsnav/detail/nav/step_batch.hpp"
 #include "gsnav/detail/nav/time_planner.hpp"
+#include "gsnav/detail/nav/try_step.hpp"
 #include "gsnav/detail/nav/viewpoints.hpp"
 #include "gsnav/nav/navmesh.hpp"

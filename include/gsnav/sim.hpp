@@ -9,6 +9,7 @@
 #include "gsnav/detail/sim/body_cache.hpp"
 #include "gsnav/detail/sim/cube_map.hpp"
 #include "gsnav/detail/sim/episode.hpp"
+#include "gsnav/detail/sim/free_sensors.hpp"
 #include "gsnav/detail/sim/greedy_follower.hpp"
 #include "gsnav/detail/sim/noise.hpp"
 #include "gsnav/detail/sim/proximity.hpp"

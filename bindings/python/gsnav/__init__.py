@@ -45,8 +45,10 @@ from ._gsnav import (
     FloorPlanOptions,
     FollowerOptions,
     Frames,
+    FreeSensors,
     GeodesicFollower,
     GoalPath,
+    GreedyGeodesicFollower,
     ImageMemory,
     LodChoice,
     MeshStats,
@@ -100,6 +102,7 @@ from ._gsnav import (
     save_navmesh,
     summarize,
     to_bytes,
+    try_step,
     views_around,
 )
 from ._spaces import HAVE_GYMNASIUM as _HAVE_GYMNASIUM
@@ -137,8 +140,10 @@ __all__ = [
     "FloorPlanOptions",
     "FollowerOptions",
     "Frames",
+    "FreeSensors",
     "GeodesicFollower",
     "GoalPath",
+    "GreedyGeodesicFollower",
     "ImageMemory",
     "InvalidArgument",
     "InvalidFile",
@@ -201,6 +206,7 @@ __all__ = [
     "save_navmesh",
     "summarize",
     "to_bytes",
+    "try_step",
     "views_around",
 ]
 

@@ -24,4 +24,5 @@ NB_MODULE(_gsnav, m) {
   bind_simulator(m);
   bind_device_array(m);
   bind_batch(m);
+  bind_habitat(m);
 }

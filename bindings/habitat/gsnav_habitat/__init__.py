@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Common parts of the packages of the distribution gsnav-habitat: notice, check for others, placeholders."""
+
+import functools
+import os
+import sys
+import warnings
+from typing import Any, NoReturn
+
+# Distributions that own the names of this one. "magnum" on PyPI is a service of OpenStack.
+_RIVALS = ("habitat_sim", "magnum", "magnum_bindings")
+
+
+@functools.lru_cache(maxsize=None)
+def _distributions() -> dict[str, str]:
+    """Versions of this distribution and its rivals, where they are installed, by their names in lower case."""
+    # importlib.metadata says the same, and its import alone takes as long as this package may take.
+    found: dict[str, str] = {}
+    for folder in sys.path:
+        try:
+            entries = os.listdir(folder or ".")
+        except OSError:
+            continue
+        for entry in entries:
+            stem, dot, kind = entry.rpartition(".")
+            name, _, version = stem.partition("-")
+            name = name.lower().replace("-", "_").replace(".", "_")
+            if dot and kind in ("dist-info", "egg-info", "egg-link") and name in (*_RIVALS, "gsnav_habitat"):
+                found.setdefault(name, version.split("-")[0])
+    return found
+
+
+def version() -> str:
+    """Version of the distribution, or "unknown" where it runs from its sources."""
+    return _distributions().get("gsnav_habitat", "unknown")
+
+
+@functools.lru_cache(maxsize=None)
+def claim() -> None:
+    """Checks that no other distribution owns habitat_sim or magnum, and says once what this one is.
+
+    A child process says nothing. Raises ImportError naming both distributions if there is another.
+    """
+    for name in _RIVALS:
+        if name in _distributions():
+            raise ImportError(
+                f"The distributions gsnav-habitat {version()} and {name.replace('_', '-')} {_distributions()[name]} "
+                "both provide habitat_sim or magnum. Uninstall one of them."
+            )
+    if os.environ.setdefault("GSNAV_HABITAT_NOTICE", str(os.getpid())) == str(os.getpid()):
+        warnings.warn(
+            f"habitat_sim is provided by gsnav (gsnav-habitat {version()}): its navigation part. Not affiliated with "
+            "Meta.",
+            stacklevel=3,
+        )
+
+
+def message(name: str) -> str:
+    """Text of the error for a name that is not served."""
+    return f"gsnav serves navigation only: {name}"
+
+
+class _Unserved(type):
+    """Type of placeholders. Their attributes and calls raise NotImplementedError."""
+
+    def __call__(cls, *args: Any, **kwargs: Any) -> NoReturn:
+        raise NotImplementedError(message(f"{cls.__module__}.{cls.__qualname__}"))
+
+
+def unserved(module: str, name: str, **members: Any) -> type:
+    """A class for annotations and imports. It raises NotImplementedError when it is constructed.
+
+    `members` become attributes of the class.
+    """
+    members.setdefault("__doc__", "Not served by gsnav: construction raises NotImplementedError.")
+    return _Unserved(name, (), {"__module__": module, **members})

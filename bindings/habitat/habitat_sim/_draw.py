@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Draws the images of sensors with gsnav.FreeSensors."""
+
+from typing import Any
+
+import numpy as np
+
+import gsnav_habitat as _shared
+
+from . import _engine
+from .registry import registry
+from .sensor import (
+    CameraSensorSpec,
+    EquirectangularSensorSpec,
+    FisheyeSensorDoubleSphereSpec,
+    FisheyeSensorModelType,
+    SensorSubType,
+    SensorType,
+)
+
+_KINDS = {SensorType.COLOR: "rgb", SensorType.DEPTH: "depth", SensorType.SEMANTIC: "semantic"}
+_MODELS = {
+    SensorSubType.PINHOLE: ("pinhole", CameraSensorSpec),
+    SensorSubType.EQUIRECTANGULAR: ("equirectangular", EquirectangularSensorSpec),
+    SensorSubType.FISHEYE: ("fisheye", FisheyeSensorDoubleSphereSpec),
+}
+
+
+def check(spec: Any) -> None:
+    """Raises NotImplementedError for a sensor that gsnav does not serve, ValueError for a value out of range."""
+    what = f"sensor {spec.uuid!r}"
+    if spec.sensor_type not in _KINDS:
+        raise NotImplementedError(_shared.message(f"{what} with sensor_type {spec.sensor_type!r}"))
+    kind = _MODELS.get(spec.sensor_subtype)
+    if kind is None or not isinstance(spec, kind[1]):
+        raise NotImplementedError(
+            _shared.message(f"{what} of type {type(spec).__name__} with sensor_subtype {spec.sensor_subtype!r}")
+        )
+    if spec.noise_model and registry.get_noise_model(spec.noise_model) is None:
+        raise NotImplementedError(_shared.message(f"{what} with noise_model {spec.noise_model!r}"))
+    if spec.gpu2gpu_transfer:
+        raise NotImplementedError(_shared.message(f"{what} with gpu2gpu_transfer"))
+    if len(spec.resolution) != 2 or min(spec.resolution) < 1:
+        raise ValueError(f"{what}: resolution = {spec.resolution}: must be [height, width], each at least 1")
+
+
+def _native(spec: Any) -> Any:
+    """The gsnav.SensorSpec of a sensor that is not semantic. Its pose is given at each render."""
+    gsnav = _engine.library()
+    made = gsnav.SensorSpec(
+        uuid=spec.uuid,
+        kind=getattr(gsnav.SensorKind, _KINDS[spec.sensor_type]),
+        model=getattr(gsnav.SensorModel, _MODELS[spec.sensor_subtype][0]),
+        resolution=spec.resolution,
+        near_plane=float(spec.near),
+        far_plane=float(spec.far),
+    )
+    if hasattr(spec, "hfov"):
+        made.hfov = float(spec.hfov)
+    if spec.sensor_subtype == SensorSubType.FISHEYE:
+        if spec.sensor_model_type != FisheyeSensorModelType.DOUBLE_SPHERE:
+            raise ValueError(
+                f"sensor {spec.uuid!r}: sensor_model_type = {spec.sensor_model_type!r}: must be DOUBLE_SPHERE"
+            )
+        lens = gsnav.FisheyeLens(alpha=float(spec.alpha), xi=float(spec.xi))
+        if spec.focal_length is not None:
+            lens.focal_length = [float(f) for f in spec.focal_length]
+        if spec.principal_point_offset is not None:
+            lens.principal_point_offset = [float(f) for f in spec.principal_point_offset]
+        made.fisheye = lens
+    return made
+
+
+class Painter:
+    """Draws one stage on one device."""
+
+    def __init__(self, stage: Any, device: Any) -> None:
+        self._stage, self._device = stage, device
+        self._free: Any = None
+        self._sensors: list[Any] = []  # Those of `_free`.
+
+    def draw(self, sensors: Any, seconds: float) -> dict[str, np.ndarray]:
+        """New arrays by the names of the sensors, at a time on the scene's clock: colour uint8 [height][width][4],
+        depth float32 [height][width] in metres with 0 for no return, semantic uint32 [height][width]."""
+        drawn, images = [], {}
+        for sensor in sensors:
+            spec = sensor.specification()
+            if spec.sensor_type == SensorType.SEMANTIC:  # The scene has no labels: 0 is "none".
+                images[sensor.uuid] = np.zeros(tuple(spec.resolution), np.uint32)
+            elif self._stage.scene is None:
+                images[sensor.uuid] = _nothing(spec)
+            else:
+                drawn.append(sensor)
+        if drawn:
+            images.update(self._drawer(drawn).render([_pose(s) for s in drawn], seconds))
+        return {s.uuid: _noisy(images[s.uuid], s.specification()) for s in sensors}
+
+    def _drawer(self, sensors: Any) -> Any:
+        if self._sensors != sensors:
+            natives = [_native(s.specification()) for s in sensors]
+            if self._free is None:
+                self._free = _engine.library().FreeSensors(self._device, self._stage.scene, natives)
+            else:
+                self._free.set_sensors(natives)
+            self._sensors = list(sensors)
+        return self._free
+
+
+def _pose(sensor: Any) -> Any:
+    return list(sensor.node.absolute_translation), list(sensor.node.absolute_rotation.wxyz)
+
+
+def _nothing(spec: Any) -> np.ndarray:
+    shape = tuple(spec.resolution)
+    if spec.sensor_type == SensorType.DEPTH:
+        return np.zeros(shape, np.float32)
+    out = np.empty((*shape, 4), np.uint8)
+    out[...] = np.round(255 * np.clip(np.array(spec.clear_color), 0, 1))
+    return out
+
+
+def _noisy(image: np.ndarray, spec: Any) -> np.ndarray:
+    if spec.noise_model in ("None", ""):
+        return image
+    return registry.get_noise_model(spec.noise_model)(**dict(spec.noise_model_kwargs))(image)

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The package gsnav, imported when it is first needed, and the scenes that simulators of a process share."""
+
+import logging
+import os
+import threading
+import weakref
+from typing import Any
+
+logger = logging.getLogger("habitat_sim")
+_lock = threading.Lock()
+
+
+def library() -> Any:
+    """The package gsnav."""
+    import gsnav
+
+    return gsnav
+
+
+class Stage:
+    """A scene that was opened, with its renderers by device. Simulators of one scene share it."""
+
+    def __init__(self, opened: Any) -> None:
+        self.opened = opened
+        self.scene = None if opened is None else opened.scene
+
+    @property
+    def navmesh(self) -> Any:
+        """The NavMesh beside the scene or built for it, or None."""
+        return None if self.scene is None else self.scene.navmesh
+
+
+_stages: "weakref.WeakValueDictionary[Any, Stage]" = weakref.WeakValueDictionary()
+
+
+def _stamp(name: str) -> Any:
+    try:
+        status = os.stat(name)
+    except OSError:
+        return None
+    return status.st_mtime_ns, status.st_size
+
+
+def stage(name: str, agent_radius: float, agent_height: float) -> Stage:
+    """The scene of a name: a path, a name that gsnav.open_scene knows, or NONE for nothing.
+
+    The NavMesh is the file beside the scene, or else one that is built for the agent. Raises FileNotFoundError
+    naming the scene, and the errors of gsnav.open_scene.
+    """
+    if name in ("NONE", ""):
+        return Stage(None)
+    gsnav = library()
+    stem, extension = os.path.splitext(name)
+    beside = next((p for p in (stem + ".navmesh", name + ".navmesh") if extension and os.path.isfile(p)), None)
+    key = (os.path.abspath(name), _stamp(name), beside, beside and _stamp(beside),
+           None if beside else (agent_radius, agent_height))  # fmt: skip
+    with _lock:
+        found = _stages.get(key)
+        if found is None:
+            found = _stages[key] = Stage(_open(gsnav, name, beside, agent_radius, agent_height))
+        return found
+
+
+def _open(gsnav: Any, name: str, beside: str | None, agent_radius: float, agent_height: float) -> Any:
+    if beside is not None:
+        return gsnav.open_scene(name, gsnav.OpenOptions(navmesh=beside))
+    try:
+        return gsnav.open_scene(
+            name, gsnav.OpenOptions(navmesh="auto", agent_radius=agent_radius, agent_height=agent_height)
+        )
+    except (gsnav.NothingNavigable, gsnav.InvalidArgument) as error:
+        logger.warning("%s: no NavMesh: %s", name, error)
+        return gsnav.open_scene(name, gsnav.OpenOptions(navmesh="none"))
+
+
+def device(gpu_device_id: int) -> Any:
+    """GSNAV_DEVICE if it is set. Else the GPU of this number if the package and the machine have it, else the
+    CPU."""
+    gsnav = library()
+    chosen = os.environ.get("GSNAV_DEVICE")
+    if chosen:
+        return gsnav.Device.parse(chosen)
+    if gpu_device_id >= 0:
+        try:
+            return gsnav.Device.parse(f"cuda:{gpu_device_id}")
+        except gsnav.Error:
+            pass
+    return gsnav.Device.parse("cpu")

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Agents: a body with sensors and actions."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from magnum import Quaternion
+
+from .. import errors
+from ..scene import SceneNode
+from ..sensor import CameraSensorSpec, SensorFactory
+from ..utils.common import quat_from_coeffs, quat_from_magnum
+from .controls import ActionSpec, ActuationSpec, ObjectControls
+
+
+def _identity() -> Any:
+    import quaternion
+
+    return quaternion.quaternion(1, 0, 0, 0)
+
+
+class _Pose:
+    """A position, float32 [3] in metres, and a rotation, a quaternion of numpy-quaternion. A rotation can be assigned
+    as four numbers x, y, z, w."""
+
+    def __init__(self, position: Any = None, rotation: Any = None) -> None:
+        self.position = np.zeros(3, np.float32) if position is None else position
+        self.rotation = _identity() if rotation is None else rotation
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name == "position":
+            value = np.array(value, dtype=np.float32)
+        elif name == "rotation" and not hasattr(value, "components") and not isinstance(value, Quaternion):
+            value = quat_from_coeffs(np.asarray(value, dtype=np.float64))
+        object.__setattr__(self, name, value)
+
+    def __eq__(self, other: object) -> bool:
+        if type(self) is not type(other):
+            return NotImplemented
+        mine, theirs = self.__dict__, other.__dict__
+        return np.array_equal(mine["position"], theirs["position"]) and all(
+            mine[k] == theirs[k] for k in mine if k != "position"
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{k}={v!r}' for k, v in self.__dict__.items())})"
+
+
+class SixDOFPose(_Pose):
+    """Pose of a sensor in the world."""
+
+
+class AgentState(_Pose):
+    """Pose of an agent in the world, with those of its sensors by their names."""
+
+    def __init__(self, position: Any = None, rotation: Any = None, sensor_states: Any = None) -> None:
+        super().__init__(position, rotation)
+        self.sensor_states: dict[str, SixDOFPose] = {} if sensor_states is None else dict(sensor_states)
+
+
+def _default_actions() -> dict[Any, ActionSpec]:
+    return {
+        "move_forward": ActionSpec("move_forward", ActuationSpec(amount=0.25)),
+        "turn_left": ActionSpec("turn_left", ActuationSpec(amount=10.0)),
+        "turn_right": ActionSpec("turn_right", ActuationSpec(amount=10.0)),
+    }
+
+
+@dataclasses.dataclass
+class AgentConfiguration:
+    """Settings of an agent. Lengths in metres."""
+
+    height: float = 1.5
+    radius: float = 0.1
+    sensor_specifications: list[Any] = dataclasses.field(default_factory=lambda: [CameraSensorSpec()])
+    action_space: dict[Any, ActionSpec] = dataclasses.field(default_factory=_default_actions)
+    body_type: str = "cylinder"
+
+
+class Agent:
+    """A body on a node, with sensors on nodes below."""
+
+    def __init__(
+        self, scene_node: SceneNode, agent_config: Any = None, sensors: Any = None, controls: Any = None
+    ) -> None:
+        self.body = scene_node
+        self.controls = ObjectControls() if controls is None else controls
+        self.initial_state: Any = None
+        self.reconfigure(AgentConfiguration() if agent_config is None else agent_config)
+
+    @property
+    def scene_node(self) -> SceneNode:
+        """Node of the body."""
+        return self.body
+
+    @property
+    def sensors(self) -> dict[str, Any]:
+        """Sensors on the body and below, by their names."""
+        return self.body.subtree_sensors
+
+    _sensors = sensors
+
+    def reconfigure(self, agent_config: Any, reconfigure_sensors: bool = True) -> None:
+        """Replaces the settings and, unless told otherwise, makes the sensors anew."""
+        self.agent_config = agent_config
+        if not reconfigure_sensors:
+            return
+        for sensor in self.sensors.values():
+            SensorFactory.delete_sensor(sensor)
+        SensorFactory.create_sensors(self.body, agent_config.sensor_specifications)
+
+    def act(self, action_id: Any) -> bool:
+        """Performs an action of the action space. Returns whether the body moved less far than it tried to.
+        Raises AssertionError for an unknown action."""
+        space = self.agent_config.action_space
+        assert action_id in space, f"no action {action_id!r}; the actions are {list(space)}"
+        action = space[action_id]
+        if action.name == "stop" and action.actuation is None:
+            return False
+        if self.controls.is_body_action(action.name):
+            return self.controls.action(self.body, action.name, action.actuation, apply_filter=True)
+        for sensor in self.sensors.values():
+            self.controls.action(sensor.node, action.name, action.actuation, apply_filter=False)
+        return False
+
+    def get_state(self) -> AgentState:
+        """Pose of the body and the sensors in the world."""
+        return AgentState(
+            np.array(self.body.absolute_translation),
+            quat_from_magnum(self.body.absolute_rotation),
+            {
+                uuid: SixDOFPose(np.array(s.node.absolute_translation), quat_from_magnum(s.node.absolute_rotation))
+                for uuid, s in self.sensors.items()
+            },
+        )
+
+    def set_state(
+        self, state: AgentState, reset_sensors: bool = True, infer_sensor_states: bool = True, is_initial: bool = False
+    ) -> None:
+        """Moves the body to any pose.
+
+        The sensors keep their poses relative to the body, or take those of their specifications if `reset_sensors`
+        is set. Without `infer_sensor_states`, those named in `state.sensor_states` then take the poses given there.
+        Raises ValueError for a pose that is not finite.
+        """
+        for pose in (state, *state.sensor_states.values()):
+            rotation = Quaternion._of(pose.rotation)
+            if not (np.isfinite(pose.position).all() and np.isfinite(list(rotation.xyzw)).all()):
+                raise ValueError(f"set_state: position {pose.position} or rotation {pose.rotation} is not finite")
+        self.body._place(state.position, Quaternion._of(state.rotation).normalized())
+        for uuid, sensor in self.sensors.items():
+            if reset_sensors:
+                sensor.set_transformation_from_spec()
+            if not infer_sensor_states and uuid in state.sensor_states:
+                pose = state.sensor_states[uuid]
+                sensor.node._place(pose.position, Quaternion._of(pose.rotation).normalized())
+        if is_initial:
+            self.initial_state = self.get_state()
+
+    @property
+    def state(self) -> AgentState:
+        """Pose of the body and the sensors in the world, a copy."""
+        return self.get_state()
+
+    @state.setter
+    def state(self, value: AgentState) -> None:
+        self.set_state(value, reset_sensors=True, infer_sensor_states=True, is_initial=False)
+
+    def close(self) -> None:
+        """Does nothing: memory is freed with the agent."""
+
+
+__all__ = ["Agent", "AgentConfiguration", "AgentState", "SixDOFPose", "errors"]

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A tree of nodes with rigid poses, which carries agents and sensors. gsnav serves no objects and no labels."""
+
+from typing import Any, Iterator
+
+import numpy as np
+
+import gsnav_habitat as _shared
+from magnum import Matrix4, Quaternion, Vector3
+
+
+class SceneNode:
+    """A node with a rotation and a translation relative to its parent, metres."""
+
+    def __init__(self, parent: "SceneNode | None" = None) -> None:
+        self._translation, self._rotation = Vector3(), Quaternion()
+        self.parent = parent
+        self.children: list[SceneNode] = []
+        self.node_sensors: dict[str, Any] = {}
+        if parent is not None:
+            parent.children.append(self)
+
+    # ---- The tree
+    def create_child(self) -> "SceneNode":
+        """A new node at this one."""
+        return SceneNode(self)
+
+    def remove(self) -> None:
+        """Takes the node out of the tree."""
+        if self.parent is not None:
+            self.parent.children.remove(self)
+            self.parent = None
+
+    def _subtree(self) -> Iterator["SceneNode"]:
+        yield self
+        for child in self.children:
+            yield from child._subtree()
+
+    @property
+    def subtree_sensors(self) -> dict[str, Any]:
+        """Sensors of this node and those below, by their names."""
+        return {uuid: s for node in self._subtree() for uuid, s in node.node_sensors.items()}
+
+    # ---- Pose relative to the parent
+    @property
+    def translation(self) -> Vector3:
+        """Translation, a copy. Assign any sequence of three numbers."""
+        return Vector3(self._translation)
+
+    @translation.setter
+    def translation(self, value: Any) -> None:
+        self._translation = Vector3(*(float(x) for x in value))
+
+    @property
+    def rotation(self) -> Quaternion:
+        """Rotation, a copy. Assign a magnum.Quaternion or a quaternion of numpy-quaternion."""
+        return Quaternion(self._rotation)
+
+    @rotation.setter
+    def rotation(self, value: Any) -> None:
+        self._rotation = Quaternion._of(value).normalized()
+
+    @property
+    def transformation(self) -> Matrix4:
+        """Pose relative to the parent."""
+        return Matrix4.from_(self._rotation.to_matrix(), self._translation)
+
+    @transformation.setter
+    def transformation(self, value: Any) -> None:
+        self._rotation = Quaternion.from_matrix(value.rotation()).normalized()
+        self._translation = value.translation
+
+    def set_translation(self, value: Any) -> "SceneNode":
+        """Assigns `translation`."""
+        self.translation = value
+        return self
+
+    def set_rotation(self, value: Any) -> "SceneNode":
+        """Assigns `rotation`."""
+        self.rotation = value
+        return self
+
+    def reset_transformation(self) -> "SceneNode":
+        """Puts the node at its parent."""
+        self._translation, self._rotation = Vector3(), Quaternion()
+        return self
+
+    def translate(self, vector: Any) -> "SceneNode":
+        """Moves along the parent's axes, metres."""
+        self._translation = self._translation + vector
+        return self
+
+    def translate_local(self, vector: Any) -> "SceneNode":
+        """Moves along the node's own axes, metres."""
+        self._translation = self._translation + self._rotation.transform_vector(vector)
+        return self
+
+    def rotate(self, angle: Any, axis: Any) -> "SceneNode":
+        """Turns about an axis of the parent, with its origin."""
+        turn = Quaternion.rotation(angle, axis)
+        self._rotation = (turn * self._rotation).normalized()
+        self._translation = turn.transform_vector(self._translation)
+        return self
+
+    def rotate_local(self, angle: Any, axis: Any) -> "SceneNode":
+        """Turns about an axis of the node."""
+        self._rotation = (self._rotation * Quaternion.rotation(angle, axis)).normalized()
+        return self
+
+    def rotate_x_local(self, angle: Any) -> "SceneNode":
+        """Turns about the node's x."""
+        return self.rotate_local(angle, Vector3.x_axis())
+
+    def rotate_y_local(self, angle: Any) -> "SceneNode":
+        """Turns about the node's y."""
+        return self.rotate_local(angle, Vector3.y_axis())
+
+    def rotate_z_local(self, angle: Any) -> "SceneNode":
+        """Turns about the node's z."""
+        return self.rotate_local(angle, Vector3.z_axis())
+
+    # ---- Pose in the world
+    @property
+    def absolute_rotation(self) -> Quaternion:
+        """Rotation in the world."""
+        if self.parent is None:
+            return self.rotation
+        return (self.parent.absolute_rotation * self._rotation).normalized()
+
+    @property
+    def absolute_translation(self) -> Vector3:
+        """Position in the world, metres."""
+        if self.parent is None:
+            return self.translation
+        parent = self.parent
+        return parent.absolute_translation + parent.absolute_rotation.transform_vector(self._translation)
+
+    def absolute_transformation(self) -> Matrix4:
+        """Pose in the world."""
+        return Matrix4.from_(self.absolute_rotation.to_matrix(), self.absolute_translation)
+
+    def absolute_transformation_matrix(self) -> np.ndarray:
+        """Pose in the world, float32 [4][4]."""
+        return np.array(self.absolute_transformation())
+
+    absolute_position = absolute_translation
+
+    def _place(self, position: Any, rotation: Quaternion) -> None:
+        """Sets the pose in the world."""
+        if self.parent is None:
+            self.translation, self.rotation = position, rotation
+            return
+        back = self.parent.absolute_rotation.inverted_normalized()
+        self.translation = back.transform_vector(Vector3(position) - self.parent.absolute_translation)
+        self.rotation = back * rotation
+
+
+class SceneGraph:
+    """A tree of nodes."""
+
+    def __init__(self) -> None:
+        self._root = SceneNode()
+
+    def get_root_node(self) -> SceneNode:
+        """The node that has no parent."""
+        return self._root
+
+
+for _name in ("SemanticRegion", "SemanticObject", "SemanticCategory", "SemanticLevel", "SemanticScene",
+              "ObjectControls", "SceneNodeType"):  # fmt: skip
+    globals()[_name] = _shared.unserved("habitat_sim.scene", _name)

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Specifications of sensors, and sensors on nodes."""
+
+import copy
+import enum
+from typing import Any
+
+import gsnav_habitat as _shared
+from magnum import Color4, Quaternion, Rad, Vector3
+
+from .scene import SceneNode
+
+
+class SensorType(enum.IntEnum):
+    """Quantity that a sensor measures."""
+
+    NONE = 0
+    COLOR = 1
+    DEPTH = 2
+    NORMAL = 3
+    SEMANTIC = 4
+    PATH = 5
+    GOAL = 6
+    FORCE = 7
+    TENSOR = 8
+    TEXT = 9
+    AUDIO = 10
+    UNSPECIFIED = -2
+    UNKNOWN = -1
+
+
+class SensorSubType(enum.IntEnum):
+    """Projection of a camera."""
+
+    NONE = 0
+    PINHOLE = 1
+    ORTHOGRAPHIC = 2
+    EQUIRECTANGULAR = 3
+    FISHEYE = 4
+    IMPULSERESPONSE = 5
+
+
+class FisheyeSensorModelType(enum.IntEnum):
+    """Model of a fisheye lens."""
+
+    DOUBLE_SPHERE = 0
+
+
+class SensorSpec:
+    """Fields of all sensors. Lengths in metres, `orientation` in radians about X, then Y, then Z."""
+
+    def __init__(self) -> None:
+        self.uuid = ""
+        self.sensor_type: Any = SensorType.UNSPECIFIED
+        self.sensor_subtype: Any = SensorSubType.NONE
+        self.noise_model = "None"
+        self.noise_model_kwargs: Any = {}
+        self.gpu2gpu_transfer = False
+        self.position, self.orientation = Vector3(0, 1.5, 0), Vector3()
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in ("position", "orientation"):
+            value = Vector3(*(float(x) for x in value))
+        elif name == "resolution":
+            value = [int(x) for x in value]
+        object.__setattr__(self, name, value)
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and self.__dict__ == other.__dict__
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def is_visual_sensor_spec(self) -> bool:
+        """Whether the sensor makes images."""
+        return False
+
+
+class VisualSensorSpec(SensorSpec):
+    """Fields of all cameras. `resolution` is [height, width]; `near` and `far` are in metres."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.uuid = "rgba_camera"
+        self.sensor_type = SensorType.COLOR
+        self.resolution = [128, 128]
+        self.near, self.far = 0.01, 1000.0
+        self.channels = 4
+        self.clear_color = Color4(0, 0, 0, 1)
+
+    def is_visual_sensor_spec(self) -> bool:
+        return True
+
+
+class CameraSensorSpec(VisualSensorSpec):
+    """A pinhole or orthographic camera. `hfov` in degrees."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.sensor_subtype = SensorSubType.PINHOLE
+        self.hfov: Any = 90.0
+        self.ortho_scale = 0.1
+
+
+class CubeMapSensorBaseSpec(VisualSensorSpec):
+    """Fields of cameras of more than 180 degrees."""
+
+
+class EquirectangularSensorSpec(CubeMapSensorBaseSpec):
+    """A camera of the full sphere."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.sensor_subtype = SensorSubType.EQUIRECTANGULAR
+
+
+class FisheyeSensorSpec(CubeMapSensorBaseSpec):
+    """A fisheye camera. Lengths in pixels; `principal_point_offset` None is the middle of the image."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.sensor_subtype = SensorSubType.FISHEYE
+        self.focal_length: Any = None
+        self.principal_point_offset: Any = None
+        self.sensor_model_type = FisheyeSensorModelType.DOUBLE_SPHERE
+
+
+class FisheyeSensorDoubleSphereSpec(FisheyeSensorSpec):
+    """A fisheye camera of the double sphere model with `alpha` and `xi`."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.alpha, self.xi = 0.59, -0.18
+
+
+def _euler(angles: Any) -> Quaternion:
+    x, y, z = (
+        Quaternion.rotation(Rad(a), axis)
+        for a, axis in zip(angles, (Vector3.x_axis(), Vector3.y_axis(), Vector3.z_axis()))
+    )
+    return z * y * x
+
+
+class Sensor:
+    """A sensor on a node. A sensor of a simulator can be drawn and read."""
+
+    def __init__(self, node: SceneNode, spec: Any) -> None:
+        self.node, self._spec = node, spec
+        self._simulator: Any = None
+        self._image: Any = None
+        node.node_sensors[spec.uuid] = self
+        self.set_transformation_from_spec()
+
+    @property
+    def uuid(self) -> str:
+        """Name of the sensor."""
+        return self._spec.uuid
+
+    @property
+    def object(self) -> SceneNode:
+        """The node."""
+        return self.node
+
+    scene_node = object
+
+    def specification(self) -> Any:
+        """The specification."""
+        return self._spec
+
+    def set_transformation_from_spec(self) -> None:
+        """Puts the node where the specification says, relative to its parent."""
+        self.node.translation = self._spec.position
+        self.node.rotation = _euler(self._spec.orientation)
+
+    def draw_observation(self) -> None:
+        """Draws the image that get_observation returns."""
+        self._image = self._simulator._draw([self])[self.uuid]
+
+    def get_observation(self) -> Any:
+        """The image that was drawn last; draws it if there is none."""
+        if self._image is None:
+            self.draw_observation()
+        image, self._image = self._image, None
+        return image
+
+
+class SensorFactory:
+    """Makes and deletes sensors on nodes."""
+
+    @staticmethod
+    def create_sensors(node: SceneNode, specs: Any) -> dict[str, Sensor]:
+        """Makes a child of the node for each specification, with a sensor. Returns them by name.
+
+        Raises ValueError for an empty name or one that the node has already.
+        """
+        there, made = node.subtree_sensors, {}
+        for spec in specs:
+            if not spec.uuid:
+                raise ValueError("SensorSpec.uuid is empty: a sensor needs a name")
+            if spec.uuid in there or spec.uuid in made:
+                raise ValueError(f"SensorSpec.uuid {spec.uuid!r} is used twice")
+            made[spec.uuid] = Sensor(node.create_child(), copy.copy(spec))
+        return made
+
+    @staticmethod
+    def delete_sensor(sensor: Sensor) -> None:
+        """Takes a sensor and its node away."""
+        sensor.node.node_sensors.pop(sensor.uuid, None)
+        sensor.node.remove()
+
+    @staticmethod
+    def delete_subtree_sensor(node: SceneNode, uuid: str) -> None:
+        """Takes the sensor of a name below a node away. Raises KeyError if there is none."""
+        SensorFactory.delete_sensor(node.subtree_sensors[uuid])
+
+
+for _name in ("CameraSensor", "EquirectangularSensor", "FisheyeSensor", "VisualSensor", "CubeMapSensorBase",
+              "AudioSensor", "AudioSensorSpec", "SensorSuite", "Observation", "ObservationSpaceType"):  # fmt: skip
+    globals()[_name] = _shared.unserved("habitat_sim.sensor", _name)

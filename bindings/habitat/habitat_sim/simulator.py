@@ -1,0 +1,357 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The simulator: agents and sensors in a scene, moved on a NavMesh and drawn by gsnav."""
+
+import dataclasses
+import os
+import random as _random
+import time
+from typing import Any, NoReturn
+
+import numpy as np
+
+import gsnav_habitat as _shared
+
+from . import _draw, _engine
+from ._follower import GreedyGeodesicFollower
+from .agent import Agent
+from .agent.agent import AgentState
+from .metadata import MetadataMediator, TemplateManager
+from .nav import PathFinder
+from .scene import SceneGraph
+from .sensor import Sensor, SensorFactory
+from .utils.common import quat_from_angle_axis
+
+_STEP = 1.0 / 60.0  # Seconds.
+
+
+class SimulatorConfiguration:
+    """Settings of a simulator. `gpu_device_id` is CUDA's number of a GPU; -1 is the CPU."""
+
+    def __init__(self) -> None:
+        self.scene_id = ""
+        self.scene_dataset_config_file = "default"
+        self.random_seed = 0
+        self.default_agent_id = 0
+        self.gpu_device_id = 0
+        self.allow_sliding = True
+        self.create_renderer = True
+        self.requires_textures = True
+        self.load_semantic_mesh = False
+        self.frustum_culling = True
+        self.enable_physics = False
+        self.enable_hbao = False
+        self.physics_config_file = "./data/default.physics_config.json"
+        self.leave_context_with_background_renderer = False
+        self.enable_gfx_replay_save = False
+        self.navmesh_settings: Any = None
+        self.scene_light_setup = ""
+        self.override_scene_light_defaults = False
+        self.pbr_image_based_lighting = False
+        self.use_semantic_textures = False
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and self.__dict__ == other.__dict__
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+@dataclasses.dataclass
+class Configuration:
+    """Settings of a simulator and its agents."""
+
+    sim_cfg: Any = None
+    agents: Any = None
+    metadata_mediator: Any = None
+    enable_batch_renderer: bool = False
+
+
+def _unserved(name: str) -> Any:
+    def call(self: Any, *args: Any, **kwargs: Any) -> NoReturn:
+        raise NotImplementedError(_shared.message(f"habitat_sim.Simulator.{name}"))
+
+    call.__doc__ = "Not served by gsnav: raises NotImplementedError."
+    return call
+
+
+class Simulator:
+    """Agents in a scene. A simulator can be used in a with statement."""
+
+    def __init__(self, config: Configuration) -> None:
+        """Opens the scene, places the agents at random points of the NavMesh, and makes their sensors.
+
+        Raises FileNotFoundError naming the scene, ValueError naming the setting, and NotImplementedError naming what
+        gsnav does not serve.
+        """
+        self.config = config
+        self.pathfinder = PathFinder()
+        self.agents: list[Agent] = []
+        self._stage: Any = None
+        self._painter: Any = None
+        self._graph = SceneGraph()
+        self._world_time = 0.0
+        self._previous_step_time = 0.0
+        self.metadata_mediator = config.metadata_mediator or MetadataMediator(config.sim_cfg)
+        self._open(config)
+
+    # ---- Life
+    def _open(self, config: Configuration) -> None:
+        sim_cfg = config.sim_cfg
+        if not config.agents:
+            raise RuntimeError("Configuration.agents is empty: a simulator needs an agent")
+        for agent in config.agents:
+            for spec in agent.sensor_specifications:
+                _draw.check(spec)
+        navigator = config.agents[sim_cfg.default_agent_id]
+        settings = sim_cfg.navmesh_settings
+        radius, height = (navigator.radius, navigator.height) if settings is None else (
+            settings.agent_radius, settings.agent_height)  # fmt: skip
+        stage = _engine.stage(str(sim_cfg.scene_id), float(radius), float(height))
+        device = _engine.device(int(sim_cfg.gpu_device_id))
+        if stage is not self._stage:
+            self.pathfinder._mesh = stage.navmesh
+        self._stage, self._painter, self.config = stage, _draw.Painter(stage, device), config
+        self._graph = SceneGraph()
+        self._world_time = 0.0
+        self.seed(int(sim_cfg.random_seed))
+        self.agents = []
+        for agent in config.agents:
+            made = Agent(self._graph.get_root_node().create_child(), agent)
+            made.controls.move_filter_fn = self.step_filter
+            self.agents.append(made)
+        for agent_id in range(len(self.agents)):
+            self.initialize_agent(agent_id)
+
+    def reconfigure(self, config: Configuration) -> None:
+        """Applies other settings. The scene is opened again only if it is another one."""
+        if config != self.config or self._stage is None:
+            self._open(config)
+
+    def close(self, destroy: bool = True) -> None:
+        """Frees images and renderer. The simulator can be opened again by `reconfigure`."""
+        self._painter = None
+        self._stage = None
+        if destroy:
+            self.agents = []
+
+    def __enter__(self) -> "Simulator":
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self.close(destroy=True)
+
+    def seed(self, new_seed: int) -> None:
+        """Seeds the random points and the simulator's random numbers."""
+        self.random = _random.Random(new_seed)
+        self.pathfinder.seed(new_seed)
+
+    # ---- Agents
+    @property
+    def _default_agent(self) -> Agent:
+        return self.get_agent(self.config.sim_cfg.default_agent_id)
+
+    def get_agent(self, agent_id: int) -> Agent:
+        """An agent by its number."""
+        return self.agents[agent_id]
+
+    def initialize_agent(self, agent_id: int, initial_state: AgentState | None = None) -> Agent:
+        """Places an agent, by default at a random point of the NavMesh with a random heading."""
+        agent = self.get_agent(agent_id)
+        if initial_state is None:
+            initial_state = AgentState()
+            if self.pathfinder.is_loaded:
+                initial_state.position = np.array(self.pathfinder.get_random_navigable_point())
+                initial_state.rotation = quat_from_angle_axis(self.random.uniform(0, 2 * np.pi), [0, 1, 0])
+        agent.set_state(initial_state, is_initial=True)
+        return agent
+
+    def last_state(self, agent_id: int | None = None) -> AgentState:
+        """Pose of an agent."""
+        return (self._default_agent if agent_id is None else self.get_agent(agent_id)).get_state()
+
+    def make_greedy_follower(self, agent_id: int | None = None, goal_radius: float | None = None, **keys: Any) -> Any:
+        """A GreedyGeodesicFollower for an agent."""
+        agent = self._default_agent if agent_id is None else self.get_agent(agent_id)
+        made = GreedyGeodesicFollower(self.pathfinder, agent, goal_radius, **keys)
+        made._allow_sliding = self.config.sim_cfg.allow_sliding
+        return made
+
+    # ---- Steps
+    def reset(self, agent_ids: Any = None) -> Any:
+        """Puts agents back to their initial states. Returns the observations of the default agent, or, for a list
+        of agents, a dict of observations."""
+        for agent in self.agents:
+            if agent.initial_state is not None:
+                agent.set_state(agent.initial_state)
+        return self.get_sensor_observations(self.config.sim_cfg.default_agent_id if agent_ids is None else agent_ids)
+
+    def step(self, action: Any, dt: float = _STEP) -> Any:
+        """Performs an action of the default agent, or a dict of actions by agents, and draws.
+
+        The clock advances by `dt` seconds before it draws, or by GSNAV_ACTION_SECONDS. Returns the observations with
+        "collided": whether the agent moved less far than it tried to. Raises AssertionError for an unknown action.
+        """
+        single = not isinstance(action, dict)
+        default = self.config.sim_cfg.default_agent_id
+        actions = {default: action} if single else action
+        start = time.time()
+        collided = {agent_id: self.get_agent(agent_id).act(a) for agent_id, a in actions.items()}
+        self._world_time += _action_seconds() or dt
+        seen = self.get_sensor_observations(list(actions))
+        for agent_id, hit in collided.items():
+            seen[agent_id]["collided"] = hit
+        self._previous_step_time = time.time() - start
+        return seen[default] if single else seen
+
+    def step_filter(self, start_pos: Any, end_pos: Any) -> Any:
+        """Position that a move of an agent reaches on the NavMesh; `end_pos` without one."""
+        if not self.pathfinder.is_loaded:
+            return end_pos
+        finder = self.pathfinder
+        step = finder.try_step if self.config.sim_cfg.allow_sliding else finder.try_step_no_sliding
+        return step(start_pos, end_pos)
+
+    def step_physics(self, dt: float, scene_id: int = 0) -> None:
+        """Advances the clock by `dt` seconds. With GSNAV_ACTION_SECONDS, `step` has done so."""
+        if _action_seconds() is None:
+            self._world_time += dt
+
+    def step_world(self, dt: float = _STEP) -> float:
+        """Advances the clock by `dt` seconds and returns it."""
+        self._world_time += dt
+        return self._world_time
+
+    def get_world_time(self) -> float:
+        """Time on the scene's clock, seconds."""
+        return self._world_time
+
+    @property
+    def previous_step_time(self) -> float:
+        """Seconds that the last step took."""
+        return self._previous_step_time
+
+    # ---- Sensors
+    @property
+    def sensors(self) -> dict[str, Sensor]:
+        """All sensors by their names."""
+        return self._graph.get_root_node().subtree_sensors
+
+    @property
+    def _sensors(self) -> dict[str, Sensor]:
+        return self._default_agent.sensors
+
+    def _draw(self, sensors: Any) -> dict[str, np.ndarray]:
+        if self._painter is None:
+            raise RuntimeError("Simulator: it was closed; call reconfigure")
+        for sensor in sensors:
+            sensor._simulator = self
+        return self._painter.draw(sensors, self._world_time)
+
+    def get_sensor_observations(self, agent_ids: Any = 0) -> Any:
+        """Images of an agent's sensors by their names, or, for a list of agents, a dict of them.
+
+        Colour uint8 [height][width][4], depth float32 [height][width] in metres with 0 for no return, semantic uint32
+        [height][width]. Row 0 is the top. The arrays are new.
+        """
+        if isinstance(agent_ids, int):
+            return self._draw(list(self.get_agent(agent_ids).sensors.values()))
+        return {i: self._draw(list(self.get_agent(i).sensors.values())) for i in agent_ids}
+
+    def render_sensors(self, sensors: Any = None) -> dict[str, np.ndarray]:
+        """Images of the given sensors, or of all."""
+        return self._draw(list(self.sensors.values()) if sensors is None else list(sensors))
+
+    def create_sensor(self, spec: Any, scene_node: Any = None) -> Sensor:
+        """Makes a sensor below a node, by default that of the default agent. Raises ValueError for a used name."""
+        _draw.check(spec)
+        if spec.uuid in self.sensors:
+            raise ValueError(f"SensorSpec.uuid {spec.uuid!r} is used twice")
+        node = self._default_agent.scene_node if scene_node is None else scene_node
+        sensor = SensorFactory.create_sensors(node, [spec])[spec.uuid]
+        sensor._simulator = self
+        return sensor
+
+    def add_sensor(self, sensor_spec: Any, agent_id: int | None = None) -> Sensor:
+        """Makes a sensor of an agent."""
+        agent = self._default_agent if agent_id is None else self.get_agent(agent_id)
+        return self.create_sensor(sensor_spec, agent.scene_node)
+
+    def get_sensor(self, uuid: str) -> Sensor:
+        """A sensor by its name. Raises KeyError if there is none."""
+        sensor = self.sensors[uuid]
+        sensor._simulator = self
+        return sensor
+
+    def remove_sensor(self, uuid: str) -> None:
+        """Takes a sensor away. Raises KeyError if there is none."""
+        SensorFactory.delete_sensor(self.sensors[uuid])
+
+    # ---- The scene
+    @property
+    def semantic_scene(self) -> None:
+        """None: the scene has no labels."""
+        return None
+
+    @property
+    def curr_scene_name(self) -> str:
+        """Name of the scene."""
+        return os.path.splitext(os.path.basename(str(self.config.sim_cfg.scene_id)))[0]
+
+    @property
+    def gpu_device(self) -> int:
+        """Number of the GPU, or -1 for the CPU."""
+        chosen = _engine.device(int(self.config.sim_cfg.gpu_device_id))
+        return chosen.index if chosen.kind == _engine.library().DeviceKind.cuda else -1
+
+    def get_active_scene_graph(self) -> SceneGraph:
+        """The tree of agents and sensors."""
+        return self._graph
+
+    def get_stage_initialization_template(self) -> None:
+        """None for an empty scene. Raises NotImplementedError for others."""
+        if self._stage is not None and self._stage.scene is not None:
+            raise NotImplementedError(_shared.message("habitat_sim.Simulator.get_stage_initialization_template"))
+
+    def get_object_template_manager(self) -> TemplateManager:
+        """A manager that has no templates."""
+        return self.metadata_mediator.object_template_manager
+
+    def recompute_navmesh(self, pathfinder: PathFinder, navmesh_settings: Any) -> bool:
+        """Builds a NavMesh of the scene for an agent. Returns False if the scene has no walkable surface.
+
+        Raises NotImplementedError naming a setting that gsnav.open_scene does not take.
+        """
+        usual = type(navmesh_settings)()
+        for name in usual._DEFAULTS:
+            given = getattr(navmesh_settings, name)
+            if name not in ("agent_radius", "agent_height", "cell_size") and given != getattr(usual, name):
+                raise NotImplementedError(_shared.message(f"recompute_navmesh with {name} = {given}"))
+        gsnav = _engine.library()
+        options = gsnav.OpenOptions(
+            navmesh="auto", agent_radius=navmesh_settings.agent_radius, agent_height=navmesh_settings.agent_height,
+            cell_size=navmesh_settings.cell_size,
+        )  # fmt: skip
+        try:
+            pathfinder._mesh = gsnav.open_scene(str(self.config.sim_cfg.scene_id), options).scene.navmesh
+        except (gsnav.NothingNavigable, gsnav.InvalidArgument):
+            return False
+        return True
+
+
+for _name in ("get_rigid_object_manager", "get_articulated_object_manager", "get_asset_template_manager",
+              "get_physics_template_manager", "get_stage_template_manager", "get_lighting_template_manager",
+              "get_light_setup", "set_light_setup", "cast_ray", "contact_test", "get_gravity", "set_gravity",
+              "perform_discrete_collision_detection", "get_physics_contact_points",
+              "get_physics_num_active_contact_points",
+              "create_rigid_constraint", "update_rigid_constraint", "remove_rigid_constraint", "get_debug_line_render",
+              "add_trajectory_object", "remove_object", "load_keyframe", "save_current_scene_config"):  # fmt: skip
+    setattr(Simulator, _name, _unserved(_name))
+
+
+def _action_seconds() -> float | None:
+    text = os.environ.get("GSNAV_ACTION_SECONDS")
+    if not text:
+        return None
+    seconds = float(text)
+    if not 0 < seconds < 3600:
+        raise ValueError(f"GSNAV_ACTION_SECONDS = {text}: must be in (0, 3600) seconds")
+    return seconds

@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: Apache-2.0
+"""PathFinder, paths, steps, maps and the follower on a rectangle and on two islands, against closed forms."""
+
+import math
+
+import habitat_sim
+import numpy as np
+import pytest
+from habitat_sim.nav import GreedyFollowerCodes
+from magnum import Vector3
+
+gsnav = pytest.importorskip("gsnav")
+
+
+def floor(x0, z0, x1, z1, y, first):
+    """A walkable rectangle: four vertices and two triangles."""
+    return [[x0, y, z0], [x0, y, z1], [x1, y, z1], [x1, y, z0]], [
+        [first, first + 1, first + 2],
+        [first, first + 2, first + 3],
+    ]
+
+
+def finder_of(*floors):
+    vertices, triangles = [], []
+    for rectangle in floors:
+        v, t = floor(*rectangle, len(vertices))
+        vertices += v
+        triangles += t
+    finder = habitat_sim.PathFinder()
+    finder._mesh = gsnav.NavMesh.build(gsnav.NavMeshSettings(), np.array(vertices, float), np.array(triangles))
+    finder.seed(7)
+    return finder
+
+
+@pytest.fixture(scope="module")
+def room():
+    """10 m by 6 m at height 0, whose surface ends 0.1 m or a little more before the edge."""
+    return finder_of((0, 0, 10, 6, 0.0))
+
+
+@pytest.fixture(scope="module")
+def islands():
+    """6 m by 6 m at height 0, and 3 m by 3 m at height 2."""
+    return finder_of((0, 0, 6, 6, 0.0), (8, 0, 11, 3, 2.0))
+
+
+def test_without_a_mesh():
+    finder = habitat_sim.PathFinder()
+    assert not finder.is_loaded and finder.nav_mesh_settings is None
+    assert not finder.load_nav_mesh("no_such.navmesh") and not finder.save_nav_mesh("/tmp/never.navmesh")
+    with pytest.raises(RuntimeError, match="no NavMesh is loaded"):
+        finder.get_bounds()
+
+
+def test_a_saved_mesh_is_the_same(room, tmp_path):
+    assert room.save_nav_mesh(str(tmp_path / "a.navmesh"))
+    again = habitat_sim.PathFinder()
+    assert again.load_nav_mesh(str(tmp_path / "a.navmesh"))
+    assert again.nav_mesh_settings == room.nav_mesh_settings and again.navigable_area == pytest.approx(
+        room.navigable_area
+    )
+    assert again.get_bounds() == room.get_bounds()
+
+
+def test_points_are_vectors_of_python_floats_and_repeat_by_seed(room):
+    room.seed(3)
+    first = [room.get_random_navigable_point() for _ in range(5)]
+    room.seed(3)
+    assert first == [room.get_random_navigable_point() for _ in range(5)]
+    low, high = room.get_bounds()
+    for p in first:
+        assert isinstance(p, Vector3) and [type(x) for x in p] == [float] * 3
+        assert all(low[k] - 1e-5 <= p[k] <= high[k] + 1e-5 for k in range(3)) and room.is_navigable(p)
+        near = room.get_random_navigable_point_near(p, 1.0)
+        assert np.linalg.norm(p - near) <= 1.0001
+    assert not room.is_navigable([5, 0.8, 3]) and room.is_navigable([5, 0.8, 3], max_y_delta=1)
+    assert room.snap_point([5, 3, 3])[0] == 5 and math.isnan(room.snap_point([50, 0, 3])[0])
+
+
+def test_islands_by_index_and_by_point(islands):
+    assert islands.num_islands == 2
+    assert (
+        islands.get_island([3, 0, 3]) == 0
+        and islands.get_island([9.5, 2, 1.5]) == 1
+        and islands.get_island([90, 0, 0]) == -1
+    )
+    assert islands.island_area(0) > islands.island_area(1) > 0
+    assert islands.island_area() == pytest.approx(islands.island_area(0) + islands.island_area(1), rel=1e-5)
+    assert (
+        islands.island_radius(1) == islands.island_radius([9.5, 2, 1.5]) == pytest.approx(math.sqrt(2) * 1.4, abs=0.1)
+    )
+    for island, height in ((0, 0), (1, 2)):
+        p = islands.get_random_navigable_point(island_index=island)
+        assert p.y == pytest.approx(height, abs=0.05) and islands.get_island(p) == island
+        assert islands.snap_point(p, island_index=1 - island) != p
+        v, i = islands.build_navmesh_vertices(island), islands.build_navmesh_vertex_indices(island)
+        assert max(i) < len(v) and len(i) % 3 == 0 and all(abs(x.y - height) < 0.1 for x in v)
+    assert math.isnan(islands.get_random_navigable_point(island_index=5).x)
+
+
+def test_a_step_slides_or_stops_at_a_wall(room):
+    high = room.get_bounds()[1]
+    slid = room.try_step([5, 0, 5], np.array([6, 0, 8]))
+    cut = room.try_step_no_sliding(Vector3(5, 0, 5), [6, 0, 8])
+    assert (
+        isinstance(slid, Vector3) and slid.x == pytest.approx(6, abs=1e-4) and slid.z == pytest.approx(high.z, abs=1e-4)
+    )
+    t = (high.z - 5) / 3
+    assert cut.x == pytest.approx(5 + t, abs=1e-4) and cut.z == pytest.approx(high.z, abs=1e-4)
+    assert room.try_step([5, 0, 3], [5.25, 0, 3]) == [5.25, slid.y, 3]
+    assert room.try_step([50, 0, 3], [51, 0, 3]) == [50, 0, 3]
+
+
+def test_walls(room):
+    low = room.get_bounds()[0]
+    assert room.distance_to_closest_obstacle([1.0, 0, 3]) == pytest.approx(1 - low.x, abs=1e-4)
+    assert room.distance_to_closest_obstacle([5, 0, 3], max_search_radius=0.5) == 0.5
+    hit = room.closest_obstacle_surface_point([1.0, 0, 3])
+    assert isinstance(hit, habitat_sim.HitRecord) and hit.hit_normal == [1, 0, 0]
+    assert hit.hit_pos[0] == pytest.approx(low.x, abs=1e-4) and hit.hit_dist == pytest.approx(1 - low.x, abs=1e-4)
+
+
+def test_paths(room, islands):
+    path = habitat_sim.ShortestPath()
+    path.requested_start, path.requested_end = [1, 0, 1], np.array([4, 0, 5], np.float32)
+    assert room.find_path(path) and path.geodesic_distance == pytest.approx(5)
+    assert all(isinstance(p, Vector3) for p in path.points) and np.allclose(path.points[-1], [4, path.points[0].y, 5])
+    path.requested_end = [400, 0, 0]
+    assert not room.find_path(path) and path.geodesic_distance == math.inf and path.points == []
+    goals = habitat_sim.MultiGoalShortestPath()
+    goals.requested_start, goals.requested_ends = [1, 0, 1], [[9.5, 2, 1.5], [1, 0, 4], [2, 0, 1]]
+    for start, distance, index in (([1, 0, 1], 1, 2), ([1, 0, 3], 1, 1), ([9, 2, 1.5], 0.5, 0)):
+        goals.requested_start = start
+        assert islands.find_path(goals) and goals.geodesic_distance == pytest.approx(distance, abs=1e-5)
+        assert goals.closest_end_point_index == index
+    goals.requested_ends = np.array([[400.0, 0, 0]])
+    assert not islands.find_path(goals) and goals.closest_end_point_index == -1 and goals.geodesic_distance == math.inf
+
+
+def test_a_map_has_the_shape_of_habitats(room):
+    low, high = room.get_bounds()
+    view = room.get_topdown_view(0.1, 0.0)
+    assert (
+        view.dtype == bool and view.shape == (int((high.z - low.z) / 0.1), int((high.x - low.x) / 0.1)) and view.all()
+    )
+    assert not room.get_topdown_view(0.1, 1.0).any() and room.get_topdown_view(0.1, 1.0, eps=1.2).all()
+
+
+def test_settings(tmp_path):
+    settings, other = habitat_sim.NavMeshSettings(), habitat_sim.NavMeshSettings()
+    assert settings == other
+    settings.agent_radius, settings.include_static_objects = 0.3, True
+    assert settings != other
+    settings.write_to_json(str(tmp_path / "s.json"))
+    other.read_from_json(str(tmp_path / "s.json"))
+    assert settings == other
+    with pytest.raises(AttributeError, match="agent_width"):
+        settings.agent_width = 1
+    (tmp_path / "bad.json").write_text('{"agent_width": 1}')
+    with pytest.raises(ValueError, match="bad.json.*agent_width"):
+        other.read_from_json(str(tmp_path / "bad.json"))
+
+
+def test_the_follower_reaches_its_goal_and_uses_the_keys(room):
+    agent = habitat_sim.Agent(habitat_sim.SceneGraph().get_root_node().create_child())
+    agent.controls.move_filter_fn = room.try_step
+    state = agent.state
+    state.position = [2, 0, 2]
+    agent.set_state(state)
+    follower = habitat_sim.GreedyGeodesicFollower(room, agent)
+    assert (
+        follower.goal_radius == pytest.approx(0.1875)
+        and follower.action_mapping[GreedyFollowerCodes.LEFT] == "turn_left"
+    )
+    keys = follower.find_path([8, 0, 5])
+    assert keys[-1] is None and set(keys) <= {None, "move_forward", "turn_left", "turn_right"}
+    for key in keys[:-1]:
+        assert follower.next_action_along([8, 0, 5]) == key
+        agent.act(key)
+    assert np.linalg.norm(agent.state.position[[0, 2]] - [8, 5]) < 0.1875
+    with pytest.raises(habitat_sim.errors.GreedyFollowerError):
+        follower.next_action_along([80, 0, 5])
+
+
+def test_the_follower_of_an_agent_that_does_not_slide_is_not_caught_at_a_wall(stage):
+    finder = habitat_sim.PathFinder()
+    assert finder.load_nav_mesh(stage.replace(".glb", ".navmesh"))
+    agent = habitat_sim.Agent(habitat_sim.SceneGraph().get_root_node().create_child())
+    agent.controls.move_filter_fn = finder.try_step_no_sliding
+    for turn in ("turn_left", "turn_right"):
+        agent.agent_config.action_space[turn].actuation.amount = 30.0
+    agent.state = habitat_sim.AgentState([-1.05, 0.07, 2.9])  # Beside the end of an inner wall.
+    goal = [-1.26, 0.07, 7.9]
+    keys = habitat_sim.GreedyGeodesicFollower(finder, agent).find_path(goal)
+    for key in keys[:-1]:
+        agent.act(key)
+    assert len(keys) < 60 and np.linalg.norm(agent.state.position - goal) < 0.2

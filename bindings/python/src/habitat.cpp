@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+// Calls for the distribution gsnav-habitat: steps from any point, the greedy follower, and sensors at
+// any pose.
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/shared_ptr.h>
+
+#include <memory>
+
+#include "arrays.hpp"
+#include "bind.hpp"
+#include "fields.hpp"
+#include "gsnav/nav.hpp"
+#include "gsnav/sim.hpp"
+#include "guard.hpp"
+
+namespace gsnav::python {
+namespace {
+
+/// A follower with the mesh that it refers to.
+struct PythonGreedy {
+  std::shared_ptr<const NavMesh> mesh;
+  GreedyGeodesicFollower follower;
+};
+
+void make(PythonGreedy* self, std::shared_ptr<const NavMesh> mesh, const Vec3d& goal,
+          const TaskConfig& task, double goal_radius) {
+  nb::gil_scoped_release release;
+  auto follower = GreedyGeodesicFollower::make(*mesh, goal, task, {goal_radius}).value();
+  new (self) PythonGreedy{std::move(mesh), std::move(follower)};
+}
+
+/// Sensors at any poses, with the renderer that draws them.
+struct PythonFreeSensors {
+  FreeSensors sensors;
+  Renderer renderer;
+  Busy busy;
+};
+
+void make_sensors(PythonFreeSensors* self, const DeviceArg& device, const SceneArg& scene,
+                  std::vector<SensorSpec> specs, RenderOptions options) {
+  const Device chosen = device.value();
+  check_fork(chosen, "FreeSensors");
+  nb::gil_scoped_release release;
+  options.render.outputs = kRgb | kAlpha | kMedianDepth;
+  FreeSensors sensors = FreeSensors::create(std::move(specs)).value();
+  Renderer renderer = Renderer::create(chosen, scene.scene, options).value();
+  new (self) PythonFreeSensors{std::move(sensors), std::move(renderer), {}};
+}
+
+/// Colours as bytes with alpha 255, other images as they are.
+nb::object image_of(const FreeSensors& sensors, std::size_t i) {
+  const SensorSpec& spec = sensors.sensors()[i];
+  const std::span<const float> image = sensors.image(i);
+  const auto rows = static_cast<std::size_t>(spec.resolution[0]);
+  const auto columns = static_cast<std::size_t>(spec.resolution[1]);
+  if (spec.kind != SensorKind::rgb) {
+    return array_from(std::vector<float>(image.begin(), image.end()), {rows, columns});
+  }
+  std::vector<std::uint8_t> bytes(image.size()), out(4 * rows * columns, 255);
+  to_bytes(image, bytes);
+  for (std::size_t p = 0; p < rows * columns; ++p) {
+    for (std::size_t c = 0; c < 3; ++c) out[4 * p + c] = bytes[3 * p + c];
+  }
+  return array_from(std::move(out), {rows, columns, 4});
+}
+
+void set_sensors(PythonFreeSensors& self, std::vector<SensorSpec> specs) {
+  const Busy::Hold hold(self.busy, "FreeSensors.set_sensors");
+  nb::gil_scoped_release release;
+  self.sensors = FreeSensors::create(std::move(specs)).value();
+}
+
+nb::dict draw(PythonFreeSensors& self, const std::vector<std::pair<Vec3d, Quatd>>& poses, double time) {
+  const Busy::Hold hold(self.busy, "FreeSensors.render");
+  check_fork(self.renderer.device(), "FreeSensors.render");
+  std::vector<SensorPose> places;
+  for (const auto& [position, rotation] : poses) places.push_back({position, rotation});
+  {
+    nb::gil_scoped_release release;
+    self.sensors
+        .render(places, [&](std::span<const Camera> cameras,
+                            Frames<float>& out) { return self.renderer.render(cameras, out, time); })
+        .throw_if_error();
+  }
+  nb::dict out;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    out[nb::str(self.sensors.sensors()[i].uuid.c_str())] = image_of(self.sensors, i);
+  }
+  return out;
+}
+
+void bind_free_sensors(nb::module_& m) {
+  nb::class_<PythonFreeSensors>(
+      m, "FreeSensors", "Sensors that are anywhere at each call, and a renderer that draws them.")
+      .def("__init__", make_sensors, nb::arg("device"), nb::arg("scene"), nb::arg("sensors"),
+           nb::arg("options") = RenderOptions{},
+           "Prepares sensors of colour, depth or alpha without noise. Their fields `position` and "
+           "`orientation` are ignored. Raises InvalidArgument or Unsupported naming the sensor.")
+      .def("set_sensors", set_sensors, nb::arg("sensors"),
+           "Replaces the sensors and keeps the renderer. Raises what the constructor raises.")
+      .def(
+          "render", draw, nb::arg("poses"), nb::arg("time") = 0.0,
+          nb::sig(
+              "def render(self, poses: collections.abc.Sequence[tuple[collections.abc.Sequence[float], "
+              "collections.abc.Sequence[float]]], time: float = 0.0) -> "
+              "dict[str, numpy.typing.NDArray[typing.Any]]"),
+          "Renders all sensors at a time in seconds on the scene's clock.\n\n"
+          "`poses` has a position in metres and a rotation (w, x, y, z) for each sensor, which looks "
+          "along -z "
+          "with y up. Returns new arrays by name: colour uint8 [H][W][4] with alpha 255, depth float32 "
+          "[H][W] "
+          "in metres with 0 for no return, alpha float32 [H][W]. Raises InvalidArgument for a pose that "
+          "is not "
+          "finite or not of unit length.");
+}
+
+}  // namespace
+
+void bind_habitat(nb::module_& m) {
+  m.def(
+      "try_step",
+      [](const NavMesh& mesh, const Vec3d& start, const Vec3d& end, bool slide,
+         const SnapOptions& options) { return gsnav::try_step(mesh, start, end, slide, options); },
+      nb::arg("mesh"), nb::arg("start"), nb::arg("end"), nb::arg("slide"),
+      nb::arg("options") = SnapOptions{}, nb::call_guard<nb::gil_scoped_release>(),
+      "Moves from any point towards another along the surface. The start is snapped first. Returns None "
+      "if it "
+      "cannot be snapped or a coordinate is not finite. `slide`: slide along walls, or stop at the "
+      "first.");
+  nb::class_<PythonGreedy>(
+      m, "GreedyGeodesicFollower",
+      "Baseline policy modelled on that of Habitat. It avoids walls and ignores people.")
+      .def("__init__", make, nb::arg("mesh"), nb::arg("goal"), nb::arg("task") = TaskConfig{},
+           nb::arg("goal_radius") = 0.0,
+           "Creates a follower for one goal. `goal_radius` in metres; 0 is three quarters of a step. "
+           "Raises "
+           "NothingNavigable if the goal is off the mesh.")
+      .def(
+          "next",
+          [](PythonGreedy& g, const Vec3d& position, double yaw) {
+            AgentPose pose;
+            pose.position = position;
+            pose.yaw = yaw;
+            return g.follower.next(pose).value();
+          },
+          nb::arg("position"), nb::arg("yaw"), nb::call_guard<nb::gil_scoped_release>(),
+          "Next action from a position in metres and a heading in radians, or Action.stop within the "
+          "goal "
+          "radius. Raises NothingNavigable if the agent is off the mesh or on another island.")
+      .def(
+          "reset", [](PythonGreedy& g) { g.follower.reset(); }, "Forgets the previous actions.");
+  bind_free_sensors(m);
+}
+
+}  // namespace gsnav::python
