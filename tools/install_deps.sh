@@ -16,9 +16,9 @@
 set -euo pipefail
 
 job=${1:-demo}
-usage() { sed -n '4,13s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"; }
+usage() { sed -n '4,14s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"; }
 case $job in
-  demo | tests | ci) ;;
+  demo | python | tests | ci) ;;
   --help | -h) usage; exit 0 ;;
   *) usage >&2; exit 2 ;;
 esac

@@ -223,7 +223,8 @@ def test_sensors_that_are_not_served_say_so(stage, fields):
 
 def test_names_that_are_not_served_say_so(sim):
     for call in (habitat_sim.physics.RigidObjectManager, habitat_sim.ReplayRenderer, habitat_sim.gfx.DebugLineRender,
-                 habitat_sim._ext.habitat_sim_bindings.Configuration, sim.get_rigid_object_manager, sim.cast_ray):  # fmt: skip
+                 habitat_sim._ext.habitat_sim_bindings.Configuration, sim.get_rigid_object_manager,
+                 sim.cast_ray):  # fmt: skip
         with pytest.raises(NotImplementedError, match="gsnav serves navigation only: habitat_sim"):
             call()
     assert habitat_sim.__gsnav__ is True and not hasattr(habitat_sim, "no_such_name")
