@@ -2,6 +2,7 @@
 #include <optional>
 
 #include "actions.hpp"
+#include "batch_step.hpp"
 #include "bind.hpp"
 #include "device_array.hpp"
 #include "episode_source.hpp"
@@ -40,13 +41,6 @@ struct PythonBatch {
   ~PythonBatch() {
     if (pool != nullptr) pool->close();
   }
-};
-
-/// BatchStep whose spans are numpy arrays.
-struct PythonStep {
-  nb::object rewards, terminated, truncated, infos, point_goals, times, finished, final_metrics,
-      final_point_goals;
-  nb::dict images, final_images, on_backend, final_on_backend;
 };
 
 /// dtypes of structured arrays. They live as long as the process.
@@ -251,66 +245,6 @@ int clear(PyObject* self) {
 PyType_Slot slots[] = {{Py_tp_traverse, reinterpret_cast<void*>(traverse)},
                        {Py_tp_clear, reinterpret_cast<void*>(clear)},
                        {0, nullptr}};
-
-void bind_step(nb::module_& m) {
-  using S = PythonStep;
-  nb::class_<S> c(m, "BatchStep",
-                  "Result of a batch step in the form of Gymnasium's VectorEnv. Arrays with one row per "
-                  "environment are read-only views; the simulator's next call overwrites them. "
-                  "With BatchSimulator(copy=True), images are new arrays.");
-  const auto array = [&](const char* name, nb::object S::*member, const char* type, const char* doc) {
-    const std::string signature =
-        std::string("def ") + name + "(self) -> numpy.typing.NDArray[numpy." + type + "]";
-    c.def_prop_ro(
-        name, [member](const S& s) { return s.*member; }, nb::sig(signature.c_str()), doc);
-  };
-  array("rewards", &S::rewards, "float64", "Reward of the action, [N].");
-  array("terminated", &S::terminated, "bool_", "True if `stop` ended the episode, [N].");
-  array("truncated", &S::truncated, "bool_", "True if the episode reached its limit of actions, [N].");
-  array("infos", &S::infos, "void",
-        "Outcome of the action, structured [N] with the fields of StepInfo.");
-  array("point_goals", &S::point_goals, "float64", "Distance (metres) and angle (radians), [N][2].");
-  array("times", &S::times, "float64", "Time on the clock of the environment's scene, seconds, [N].");
-  array("finished", &S::finished, "int64", "Environments whose episode ended in this step. A copy.");
-  array("final_metrics", &S::final_metrics, "void",
-        "Metrics of those episodes, structured with the fields of EpisodeMetrics. A copy.");
-  array("final_point_goals", &S::final_point_goals, "float64",
-        "Goals at the end of those episodes: distance (metres) and angle (radians), [finished][2]. A "
-        "copy.");
-  const char* const images = "-> dict[str, numpy.typing.NDArray[numpy.float32]]";
-  c.def_prop_ro(
-       "images", [](const S& s) { return s.images; },
-       nb::sig((std::string("def images(self) ") + images).c_str()),
-       "Images by the names of their sensors, float32 [N][H][W][C]. Empty if nothing was rendered.")
-      .def_prop_ro(
-          "final_images", [](const S& s) { return s.final_images; },
-          nb::sig((std::string("def final_images(self) ") + images).c_str()),
-          "Last images of the episodes in `finished`, with AutoReset.same_step only. A copy.")
-      .def_prop_ro(
-          "on_backend", [](const S& s) { return s.on_backend; },
-          nb::sig("def on_backend(self) -> dict[str, DeviceArray]"),
-          "Images in the memory of a GPU, with ImageMemory.backend. `images` is then empty.")
-      .def_prop_ro(
-          "final_on_backend", [](const S& s) { return s.final_on_backend; },
-          nb::sig("def final_on_backend(self) -> dict[str, DeviceArray]"),
-          "`final_images` in the memory of a GPU. Valid until the next call.")
-      .def(
-          "__getitem__",
-          [](const S& s, const std::string& uuid) -> nb::object {
-            const nb::str key(uuid.data(), uuid.size());
-            if (s.images.contains(key)) return s.images[key];
-            if (s.on_backend.contains(key)) {
-              throw nb::key_error(("the images of \"" + uuid +
-                                   "\" are in the memory of the GPU: use on_backend[\"" + uuid + "\"]")
-                                      .c_str());
-            }
-            const std::string known = text_of(nb::list(s.images.keys()));
-            throw nb::key_error(("no sensor \"" + uuid + "\"; the sensors are " + known).c_str());
-          },
-          nb::arg("uuid"),
-          nb::sig("def __getitem__(self, uuid: str) -> numpy.typing.NDArray[numpy.float32]"),
-          "The images of a sensor, float32 [N][H][W][C].");
-}
 
 }  // namespace
 
