@@ -19,6 +19,7 @@ except ImportError:
     sys.exit("play_pointnav.py needs PyTorch: pip install torch")
 from pointnav_agent import ACTIONS, HELD_OUT_SEEDS, METRICS, Agent, Worlds
 from pointnav_agent import clear, device_of, goals, mixed, world_arguments
+from torch.utils.dlpack import from_dlpack
 
 import gsnav
 
@@ -34,7 +35,7 @@ def evaluate(args: argparse.Namespace, worlds: Worlds, policy: str, agent: Agent
     def next_episode(environment: int, count: int) -> gsnav.BatchEpisode:
         playing[environment] = environment + n * given[environment]
         given[environment] += 1
-        return worlds.episodes[playing[environment] % args.episodes]
+        return worlds.episodes[playing[environment] % int(args.episodes)]
 
     simulator = worlds.simulator(args, n, agent is not None and not args.blind, next_episode)
     follower, rng = gsnav.GeodesicFollower(), np.random.default_rng(args.seed)
@@ -46,7 +47,7 @@ def evaluate(args: argparse.Namespace, worlds: Worlds, policy: str, agent: Agent
         if agent is not None:
             goal = torch.tensor(goals(seen), dtype=torch.float32)
             image = seen.on_backend.get("depth", None)
-            depth = (torch.from_dlpack(image) if image is not None else
+            depth = (from_dlpack(image) if image is not None else
                      torch.from_numpy(seen.images["depth"].copy()) if "depth" in seen.images else hidden)
             with torch.no_grad():
                 noise = clear(torch.rand(n, ACTIONS, device=device))

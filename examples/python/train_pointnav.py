@@ -71,7 +71,8 @@ class Learner:
         self.host_result = made(3, t, n, host=True)  # reward, done, valid
         self.pool = torch.cuda.graph_pool_handle() if self.device.type == "cuda" else None
         self.graphs: dict[tuple[str, int], torch.cuda.CUDAGraph] = {}
-        self.store = dist.distributed_c10d._get_default_store() if self.ranks > 1 else None
+        self.clock = 0.0
+        self.store: Any = dist.distributed_c10d._get_default_store() if self.ranks > 1 else None
         self.times = dict.fromkeys(("simulate", "act", "learn"), 0.0)
 
     def run(self, name: str, f: Callable[[int], None], at: int = 0) -> None:
@@ -135,7 +136,7 @@ class Learner:
         a = self.args
         if self.ranks == 1 or a.cut_off >= 1 or t < a.rollout // 4 or t % 8:
             return False
-        return self.store.add(f"done {self.update_count}", 0) >= a.cut_off * self.ranks
+        return bool(self.store.add(f"done {self.update_count}", 0) >= a.cut_off * self.ranks)
 
     @torch.no_grad()
     def collect(self) -> np.ndarray:
@@ -233,12 +234,14 @@ class Learner:
         for _ in range(self.args.epochs):
             for chunk in range(self.args.chunks):
                 self.optimizer.zero_grad()
-                self.loss(chunk, *cut[chunk]).backward()
+                torch.autograd.backward(self.loss(chunk, *cut[chunk]))
                 if self.ranks > 1:
-                    flat = torch.cat([p.grad.view(-1) for p in parameters])
+                    gradients = [p.grad for p in parameters if p.grad is not None]
+                    flat = torch.cat([g.view(-1) for g in gradients])
                     dist.all_reduce(flat)
-                    for p, g in zip(parameters, flat.div_(self.ranks).split([p.numel() for p in parameters])):
-                        p.grad.copy_(g.view_as(p))
+                    flat /= self.ranks
+                    for g, mean in zip(gradients, torch.split(flat, [g.numel() for g in gradients])):
+                        g.copy_(mean.view_as(g))
                 nn.utils.clip_grad_norm_(parameters, MAX_NORM)
                 self.optimizer.step()
         self.last[0].copy_(self.last[self.used])

@@ -250,7 +250,7 @@ PyType_Slot slots[] = {{Py_tp_traverse, reinterpret_cast<void*>(traverse)},
 
 void bind_batch(nb::module_& m) {
   types();
-  bind_batch_step(m);
+  bind_step(m);
   using P = PythonBatch;
   nb::class_<P>(
       m, "BatchSimulator", nb::type_slots(slots),

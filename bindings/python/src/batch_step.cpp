@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "batch_step.hpp"
 
+#include <nanobind/stl/string.h>
+
 #include <string>
 
 namespace gsnav::python {
 
-void bind_batch_step(nb::module_& m) {
+void bind_step(nb::module_& m) {
   using S = PythonStep;
   nb::class_<S> c(m, "BatchStep",
                   "Result of a batch step in the form of Gymnasium's VectorEnv. Arrays with one row per "

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "bind.hpp"
+#include "casters.hpp"
 
 namespace gsnav::python {
 
@@ -13,6 +13,6 @@ struct PythonStep {
 };
 
 /// Binds PythonStep as BatchStep.
-void bind_batch_step(nb::module_& m);
+void bind_step(nb::module_& m);
 
 }  // namespace gsnav::python
