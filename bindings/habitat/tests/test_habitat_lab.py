@@ -19,9 +19,7 @@ POINTNAV = "benchmark/nav/pointnav/pointnav_habitat_test.yaml"
 def overrides_of(pack):
     data = pack / "data"
     return [
-        f"habitat.dataset.data_path={data}/datasets/pointnav/habitat-test-scenes/v1/{{split}}/{{split}}.json.gz".replace(
-            "{split}", "val"
-        ),
+        f"habitat.dataset.data_path={data}/datasets/pointnav/habitat-test-scenes/v1/val/val.json.gz",
         f"habitat.dataset.scenes_dir={data}/scene_datasets",
         "habitat.dataset.split=val",
     ]
