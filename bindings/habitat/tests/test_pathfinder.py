@@ -10,6 +10,7 @@ from habitat_sim.nav import GreedyFollowerCodes
 from magnum import Vector3
 
 gsnav = pytest.importorskip("gsnav")
+pytest.importorskip("quaternion")
 
 
 def floor(x0, z0, x1, z1, y, first):

@@ -3,6 +3,8 @@
 
 import math
 import os
+import pathlib
+import re
 import subprocess
 import sys
 
@@ -10,11 +12,11 @@ import habitat_sim
 import magnum as mn
 import numpy as np
 import pytest
-import quaternion
 from habitat_sim.utils.common import quat_from_angle_axis
 from habitat_sim.utils.settings import make_cfg
 
 pytest.importorskip("gsnav")
+quaternion = pytest.importorskip("quaternion")
 NORTH_WALL = -4.4  # z of its inner face, metres.
 
 
@@ -272,3 +274,11 @@ def test_import_refuses_beside_another_distribution(tmp_path, name):
     result = run_python(f"import sys; sys.path.append({str(tmp_path)!r}); import habitat_sim")
     assert "ImportError" in result.stderr and "gsnav-habitat" in result.stderr
     assert name.split("-")[0].replace("_", "-") in result.stderr
+
+
+def test_the_distribution_has_the_version_of_the_library():
+    root = pathlib.Path(__file__).resolve().parents[3]
+    header = (root / "include/gsnav/version.hpp").read_text()
+    numbers = re.findall(r"VERSION_(?:MAJOR|MINOR|PATCH) (\d+)", header)
+    text = (root / "bindings/habitat/pyproject.toml").read_text()
+    assert f'version = "{".".join(numbers)}"' in text
