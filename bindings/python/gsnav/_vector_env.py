@@ -226,7 +226,7 @@ class VectorEnv(BaseVectorEnv):
         observations = np.full(self.num_envs, None, object)
         goals = step.final_point_goals.astype(np.float32)
         for i, e in enumerate(step.finished):
-            images = {**step.final_images, **step.final_on_backend}
+            images: dict[str, Any] = {**step.final_images, **step.final_on_backend}
             observations[e] = {name: image[i] for name, image in images.items()}
             observations[e][_task.POINT_GOAL] = goals[i]
             fresh = self.simulator.world(int(e)).last_step  # of the episode that has begun
