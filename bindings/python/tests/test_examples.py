@@ -30,7 +30,8 @@ def test_example(name, tmp_path):
 
 def test_types_of_the_examples(tmp_path):
     pytest.importorskip("mypy")
-    run = subprocess.run([sys.executable, "-m", "mypy", "--strict", "--cache-dir", tmp_path, *SHORT],
-                         capture_output=True, text=True, cwd=tmp_path)
+    settings = EXAMPLES.parents[1] / "pyproject.toml"
+    run = subprocess.run([sys.executable, "-m", "mypy", "--strict", "--config-file", settings, "--cache-dir", tmp_path,
+                          *SHORT], capture_output=True, text=True, cwd=tmp_path)
     assert run.returncode == 0, run.stdout
     assert len(LONG[-1].read_text().splitlines()) <= 400
