@@ -17,14 +17,13 @@ using Influence = std::pair<double, std::size_t>;  // weight, joint
 /// Position of x under the influences, whose weights are divided by their sum.
 Vec3d blended_place(const std::vector<Affine3<double>>& joints, const Influence* begin,
                     const Influence* end, const Vec3d& x) {
+  Vec3d sum{};
   double all = 0.0;
-  for (const Influence* p = begin; p != end; ++p) all += p->first;
-  return (blend_influences(
-              static_cast<int>(end - begin),
-              [&](int k) -> const Affine3<double>& { return joints[begin[k].second]; },
-              [&](int k) { return begin[k].first; }) *
-          x) *
-         (1.0 / all);
+  for (const Influence* p = begin; p != end; ++p) {
+    sum += (joints[p->second] * x) * p->first;
+    all += p->first;
+  }
+  return sum * (1.0 / all);
 }
 
 /// Fills the position errors of `report` for the present weights of the asset. `poses` are joint

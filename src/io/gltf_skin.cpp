@@ -33,16 +33,13 @@ class RigidError final : public PoseObserver {
     }
     const std::size_t k = mesh_.influences;
     for (std::size_t v = 0; v < raw_.size(); ++v) {
-      const auto place = [&](const std::vector<Affine3<double>>& by, const Vec3d& x) {
-        const auto joint = [&](int i) -> const Affine3<double>& {
-          return by[mesh_.joint_indices[v * k + static_cast<std::size_t>(i)]];
-        };
-        const auto weight = [&](int i) {
-          return static_cast<double>(mesh_.weights[v * k + static_cast<std::size_t>(i)]);
-        };
-        return blend_influences(static_cast<int>(k), joint, weight) * x;
-      };
-      worst = std::max(worst, norm(place(full, raw_[v]) - place(rigid, mesh_.positions[v])));
+      Vec3d a{}, b{};
+      for (std::size_t i = v * k; i < (v + 1) * k; ++i) {
+        const double w = static_cast<double>(mesh_.weights[i]);
+        a += (full[mesh_.joint_indices[i]] * raw_[v]) * w;
+        b += (rigid[mesh_.joint_indices[i]] * mesh_.positions[v]) * w;
+      }
+      worst = std::max(worst, norm(a - b));
     }
   }
   double worst = 0.0;

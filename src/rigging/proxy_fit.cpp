@@ -21,12 +21,21 @@ std::vector<Vec3d> skinned_centers(const AvatarAsset& asset, std::vector<Affine3
   args.influences = asset.influences;
   args.joint_indices = view_of(asset.joint_indices);
   args.weights = view_of(asset.skinning_weights);
-  args.joints = view_of(std::as_const(globals));
   args.dual_joints = view_of(std::as_const(duals));
+  const std::size_t row = static_cast<std::size_t>(asset.influences);
   std::vector<Vec3d> out(asset.size());
   for (std::size_t i = 0; i < out.size(); ++i) {
     const Vec3d p = asset.cloud.mean(i);
-    out[i] = duals.empty() ? blended_joint(args, i) * p : skin(blended_dual(args, i), p, Quatd{}).mean;
+    if (!duals.empty()) {
+      out[i] = skin(blended_dual(args, i), p, Quatd{}).mean;
+      continue;
+    }
+    // Sums points, not joints as the kernels do: capsules of people that were made before keep their
+    // bits.
+    for (std::size_t k = i * row; k < (i + 1) * row; ++k) {
+      if (asset.skinning_weights[k] > 0)
+        out[i] += (globals[asset.joint_indices[k]] * p) * weight_of_parts(asset.skinning_weights[k]);
+    }
   }
   return out;
 }
