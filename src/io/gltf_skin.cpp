@@ -7,7 +7,6 @@
 #include <string>
 
 #include "file.hpp"
-#include "gsnav/skin/lbs.hpp"
 
 namespace gsnav::io {
 namespace detail {

@@ -137,9 +137,9 @@ PythonStep observe(nb::handle self, PythonBatch& b, const char* what, const F& f
   return step_arrays(**result, b, self);
 }
 
-/// Memory for the images of a batch whose arrays own them. It keeps as many bytes as two steps need, for
-/// a caller that holds the arrays of one step while it takes the next. Null if a call may draw only some
-/// of the environments: the others would have to be drawn again. Null if images stay on a GPU.
+/// Memory for images that numpy arrays own. The pool keeps the bytes of two steps, because a caller may
+/// hold the arrays of one step while it takes the next. Null if images stay on a GPU, or with
+/// AutoReset::disabled: a call then draws only some environments, and new memory lacks the others.
 std::shared_ptr<ImagePool> image_pool(const Device& device, const BatchConfig& config,
                                       std::size_t environments) {
   if (config.auto_reset == AutoReset::disabled) return nullptr;
