@@ -33,7 +33,7 @@ HEAD = """# Command lines
 <!-- Made by tools/make_command_lines.py; do not edit. -->
 
 For people who use gsnav's programs. After reading you know every option of every program. Each program
-prints the same for `--help`, in longer lines.
+prints the same for `--help`.
 
 | program | what it does |
 |---|---|
@@ -48,23 +48,11 @@ def helped(path, name, arguments):
     if done.returncode != 0:
         sys.exit(f"make_command_lines.py: {path} {' '.join(arguments)} --help ended with {done.returncode}: "
                  f"{(done.stderr or done.stdout).strip()[-300:]}")
-    return "\n".join(line.rstrip() for line in done.stdout.strip().split("\n"))
-
-
-def wrapped(text):
-    """Lines of more than WIDTH columns go on under the column in which their description begins."""
-    out = []
-    for line in text.split("\n"):
-        start = re.match(r" *\S.*?  +(?=\S)|  +", line)
-        indent = len(start.group(0)) if start and len(start.group(0)) < WIDTH // 2 else 6
-        while len(line) > WIDTH:
-            cut = line.rfind(" ", indent + 1, WIDTH + 1)
-            if cut <= indent:
-                break
-            out.append(line[:cut])
-            line = " " * indent + line[cut + 1:]
-        out.append(line)
-    return "\n".join(out)
+    lines = [line.rstrip() for line in done.stdout.strip().split("\n")]
+    for line in lines:
+        if len(line) > WIDTH:
+            sys.exit(f"make_command_lines.py: {name}: over {WIDTH} columns of help: {line.strip()[:60]}...")
+    return "\n".join(lines)
 
 
 def commands_of(text):
@@ -75,9 +63,9 @@ def commands_of(text):
 
 def section(name, path):
     text = helped(path, name, [])
-    out = f"## {name}\n\n```\n{wrapped(text)}\n```\n"
+    out = f"## {name}\n\n```\n{text}\n```\n"
     for command in commands_of(text):
-        out += f"\n### {name} {command}\n\n```\n{wrapped(helped(path, name, [command]))}\n```\n"
+        out += f"\n### {name} {command}\n\n```\n{helped(path, name, [command])}\n```\n"
     return out
 
 

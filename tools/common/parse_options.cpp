@@ -13,6 +13,8 @@
 namespace gsnav_tools {
 namespace {
 
+constexpr std::size_t kHelpColumns = 100;
+
 std::string version() {
   return std::to_string(GSNAV_VERSION_MAJOR) + "." + std::to_string(GSNAV_VERSION_MINOR) + "." +
          std::to_string(GSNAV_VERSION_PATCH);
@@ -31,6 +33,32 @@ std::string unknown_option(const CLI::App& app) {
     return "there is no option " + option;
   }
   return {};
+}
+
+/// Column at which the lines that continue `line` begin: that of its description, or of its text.
+std::size_t description_column(const std::string& line) {
+  const std::size_t text = line.find_first_not_of(' ');
+  if (text == std::string::npos) return 0;
+  const std::size_t gap = line.find("  ", text);
+  const std::size_t column = gap == std::string::npos ? text : line.find_first_not_of(' ', gap);
+  return column < kHelpColumns / 2 ? column : text;
+}
+
+/// `help` with the words of each line beyond `kHelpColumns` on lines of their own, under its
+/// description.
+std::string wrapped(const std::string& help) {
+  std::istringstream lines(help);
+  std::string out;
+  for (std::string line; std::getline(lines, line); out += line + "\n") {
+    const std::size_t column = description_column(line);
+    while (line.size() > kHelpColumns) {
+      const std::size_t space = line.rfind(' ', kHelpColumns);
+      if (space == std::string::npos || space <= column) break;
+      out += line.substr(0, space) + "\n";
+      line = std::string(column, ' ') + line.substr(space + 1);
+    }
+  }
+  return out;
 }
 
 }  // namespace
@@ -54,7 +82,7 @@ std::optional<int> parse_options(CLI::App& app, int argc, const char* const* arg
     }
     std::ostringstream out, err;
     const int status = app.exit(error, out, err);
-    std::fputs(gsnav::printable(out.str()).c_str(), stdout);
+    std::fputs(gsnav::printable(wrapped(out.str())).c_str(), stdout);
     std::fputs(gsnav::printable(err.str()).c_str(), stderr);
     return status == 0 ? 0 : kUsage;
   }
