@@ -7,6 +7,7 @@
 # The exit status is not 0 if types are wrong or a test fails. ccache is used if it is installed.
 #
 # PYTHON=python3.12   interpreter of the virtual environment (default: python3), 3.10 or later
+# GSNAV_WERROR=ON     treat warnings of the library as errors
 # GSNAV_FLAGS=...     compiler flags instead of "-O3 -DNDEBUG", such as "-O1 -DNDEBUG" for a faster build
 # GSNAV_ASAN=1        use AddressSanitizer, in folders of its own. 10^5 random calls, without images of C++ tools:
 #                     GSNAV_ASAN=1 GSNAV_RANDOM_CALLS=100000 tools/run_python_tests.sh -k "random or order"
@@ -18,10 +19,12 @@ set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 if [[ ${1:-} == --help || ${1:-} == -h ]]; then
-  sed -n '4,17s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
+  sed -n '4,18s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
   exit 0
 fi
 python=${PYTHON:-python3}
+# As CMake names the compiler by itself. ccache keeps objects by this name.
+export CC=${CC:-cc} CXX=${CXX:-c++}
 venv=$root/build/venv build=$root/build/python flags=${GSNAV_FLAGS:--O3 -DNDEBUG} stubs=ON run=()
 if [[ ${GSNAV_ASAN:-0} == 1 ]]; then
   venv+=-asan build+=-asan flags="-O1 -g1 -fno-omit-frame-pointer -fsanitize=address" stubs=OFF
@@ -61,13 +64,13 @@ echo "Building the package, $CMAKE_BUILD_PARALLEL_LEVEL files at a time"
 # The build folder is kept, so that only changed files are compiled.
 "$venv/bin/pip" install --disable-pip-version-check --no-build-isolation --no-deps --force-reinstall \
   --config-settings=build-dir="$build" --config-settings=cmake.define.GSNAV_TOOLS=ON \
-  --config-settings=cmake.define.GSNAV_STUBS=$stubs \
+  --config-settings=cmake.define.GSNAV_STUBS=$stubs --config-settings=cmake.define.GSNAV_WERROR="${GSNAV_WERROR:-OFF}" \
   --config-settings=cmake.define.CMAKE_CXX_FLAGS_RELEASE="$flags" "$root"
 cd "$root"
 if [[ $stubs == ON ]]; then
   # Programs of C++ whose images the tests compare with.
   cmake --build "$build" --target gsnav-render --target gsnav_python_reference -j "$CMAKE_BUILD_PARALLEL_LEVEL"
-  export GSNAV_TOOLS_DIR=$build/gsnav/tools GSNAV_PYTHON_REFERENCE=$build/gsnav_python_reference
+  export GSNAV_TOOLS_DIR=$build/tools GSNAV_PYTHON_REFERENCE=$build/bindings/python/gsnav_python_reference
   echo "Checking the types of the package"
   (cd "$build" && "$venv/bin/python" -m mypy --strict -p gsnav)
 fi
