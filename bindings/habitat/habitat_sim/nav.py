@@ -6,7 +6,6 @@ Distances are the shortest on the surface, where Detour's are somewhat longer.
 """
 
 import enum
-import json
 import math
 from typing import Any, Iterable
 
@@ -68,11 +67,15 @@ class NavMeshSettings:
 
     def write_to_json(self, path: str) -> None:
         """Writes the fields to a file."""
+        import json  # Here and below: worker processes import this module anew and seldom need it.
+
         with open(path, "w", encoding="utf-8") as file:
             json.dump(self.__dict__, file, indent=2)
 
     def read_from_json(self, path: str) -> None:
         """Reads the fields of a file. Raises ValueError naming the file and a field that is unknown."""
+        import json
+
         with open(path, encoding="utf-8") as file:
             values = json.load(file)
         for name, value in values.items():

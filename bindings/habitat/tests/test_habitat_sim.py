@@ -267,6 +267,23 @@ def test_import_starts_no_thread_loads_no_library_and_says_once_what_it_is():
     assert result.stderr.count("Not affiliated with Meta") == 1
 
 
+# What the import may load besides numpy: small modules of Python's own library, and what dataclasses needs of it.
+LIGHT = {"array", "colorsys", "copy", "dataclasses", "enum", "functools", "logging", "random", "threading", "typing",
+         "warnings", "weakref", "inspect", "ast", "dis", "opcode", "tokenize", "token", "linecache", "importlib",
+         "string", "textwrap", "traceback", "atexit", "time", "keyword"}  # fmt: skip
+
+
+def test_import_is_light():
+    """Worker processes import habitat_sim anew, so its import must not load what only some calls need."""
+    code = (
+        "import numpy, numpy.random, random, sys; before = set(sys.modules); import habitat_sim, magnum, corrade; "
+        "print(*{name.partition('.')[0] for name in set(sys.modules) - before})"
+    )
+    result = run_python(code, GSNAV_HABITAT_NOTICE="0")
+    heavy = {name for name in result.stdout.split() if not name.startswith("_")} - LIGHT
+    assert heavy == {"habitat_sim", "magnum", "corrade", "gsnav_habitat"}, result.stderr
+
+
 @pytest.mark.parametrize("name", ["habitat_sim-0.3.4", "magnum-20.0.0", "magnum_bindings-1.0"])
 def test_import_refuses_beside_another_distribution(tmp_path, name):
     (tmp_path / f"{name}.dist-info").mkdir()
