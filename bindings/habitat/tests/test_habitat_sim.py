@@ -267,7 +267,7 @@ def test_import_starts_no_thread_loads_no_library_and_says_once_what_it_is():
     assert result.stderr.count("Not affiliated with Meta") == 1
 
 
-# What the import may load besides numpy: small modules of Python's own library, and what dataclasses needs of it.
+# The import may load these besides numpy: modules of the standard library, most of them for dataclasses.
 LIGHT = {"array", "colorsys", "copy", "dataclasses", "enum", "functools", "logging", "random", "threading", "typing",
          "warnings", "weakref", "inspect", "ast", "dis", "opcode", "tokenize", "token", "linecache", "importlib",
          "string", "textwrap", "traceback", "atexit", "time", "keyword"}  # fmt: skip
