@@ -116,8 +116,8 @@ using ImageSource = std::function<Result<std::span<float>>(std::size_t sensor, s
 struct BatchConfig : SimulatorConfig {
   /// When an environment that is done begins its next episode.
   AutoReset auto_reset = AutoReset::next_step;
-  /// Number of poses of a scene's avatars that are held at once, >= 1. If environments in one scene need
-  /// more distinct times, they are rendered in several passes. Memory grows with it.
+  /// Number of poses of each scene's avatars that are held at once, >= 1. If environments in one scene
+  /// need more distinct times, they are rendered in several passes. Memory grows with it.
   std::size_t pose_slots = 8;
   /// Where images are returned. ImageMemory::backend leaves them on the GPU. It supports RGB, depth and
   /// alpha of pinhole cameras without noise.

@@ -60,7 +60,7 @@ class BatchScenes {
   }
 
   /// Poses the scenes for `views` and calls draw(span of SensorView), once for as many views as fit the
-  /// pose slots. Reorders `views`.
+  /// pose slots of their scenes. Reorders `views`.
   /// @param run run(n, f) calls f(i) for i in [0, n) on several threads.
   /// @return the errors of `scene_of`, of skinning or of `draw`.
   template <class Run, class Draw>
@@ -80,7 +80,7 @@ class BatchScenes {
       while (last < views.size() && key(views[last]) == key(views[first])) ++last;
       const std::size_t scene = views[first].scene;
       posed_.push_back({views.subspan(first, last - first), used_[scene]++, {}, {}});
-      if (posed_.size() < pose_slots_ && last < views.size()) continue;
+      if (last < views.size() && used_[views[last].scene] < pose_slots_) continue;
       if (Status s = pose(plan, run); !s) return s;
       if (Status s = draw(std::span<const SensorView>(ready_)); !s) return s;
       posed_.clear();
