@@ -368,6 +368,9 @@ TEST_CASE("memory of the caller: what is wrong with it is named before any envir
   next = std::span<float>(block).first(575);
   CHECK(sim.step(turn).message().find("575 floats for the sensor \"rgb\", which needs 576") !=
         std::string::npos);
+  std::vector<char> bytes((block.size() + 1) * sizeof(float));
+  next = std::span(reinterpret_cast<float*>(bytes.data() + 1), block.size());
+  CHECK(sim.step(turn).message().find("sensor \"rgb\" is not aligned to 4 bytes") != std::string::npos);
   next = Status(Errc::out_of_memory, "none left");
   CHECK(sim.step(turn).code() == Errc::out_of_memory);
   CHECK(sim.reset().message().find("none left") != std::string::npos);

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <limits>
+#include <list>
 
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/detail/core/host_array.hpp"
@@ -369,6 +370,55 @@ TEST_CASE("one simulator there has the serial one's bits too, with sensors that 
     CAPTURE(i);
     CHECK(std::equal(got.images[i].data.begin(), got.images[i].data.end(), want.images[i].data.begin()));
   }
+}
+
+TEST_CASE("a batch draws its own bits into memory of the caller on a backend") {
+  for (const std::size_t cameras : {~std::size_t{0}, std::size_t{0}}) {  // in batches, one by one
+    most_cameras = cameras;
+    BatchConfig config;
+    config.sensors = rgbd_sensors(12, 18);
+    config.task.max_steps = 3;
+    config.auto_reset = AutoReset::same_step;
+    SerialBackend serial;
+    BatchingBackend batching;
+    auto expected = make_batch_simulator(serial, two_scenes(), config, 4, spread).value();
+    config.images = ImageMemory::backend;
+    std::list<Buffer<float, BatchingBackend>> blocks;
+    config.image_source = [&](std::size_t, std::size_t floats) -> Result<std::span<float>> {
+      auto& block = blocks.emplace_back(batching);
+      block.resize_discard(floats + 1);
+      std::fill_n(block.data(), floats + 1, std::numeric_limits<float>::quiet_NaN());
+      return std::span(block.data() + 1, floats);  // aligned as a float is, and no better
+    };
+    auto sim = make_batch_simulator(batching, two_scenes(), config, 4, spread).value();
+    std::vector<std::vector<float>> all;
+    std::size_t ended = 0;
+    const auto same = [&](const BatchStep& got, const BatchStep& want) {
+      const auto images = images_of(want.images);
+      CHECK(images_of(got.images) == images);
+      CHECK(images_of(got.final_images) == images_of(want.final_images));
+      CHECK(got.images[0].data.empty());
+      CHECK(got.images[0].on_backend == std::prev(blocks.end(), 2)->data() + 1);
+      CHECK(got.images[1].on_backend == blocks.back().data() + 1);
+      all.insert(all.end(), images.begin(), images.end());
+      ended += got.finished.size();
+    };
+    same(sim.reset().value(), expected.reset().value());
+    for (const Action action : {Action::move_forward, Action::turn_left, Action::turn_right}) {
+      const std::vector<Action> actions(4, action);
+      same(sim.step(actions).value(), expected.step(actions).value());
+    }
+    const std::vector<std::uint8_t> some{0, 1, 0, 0};
+    same(sim.reset(some).value(), expected.reset(some).value());
+    CHECK(ended > 0);
+    REQUIRE(all.size() == blocks.size());
+    std::size_t i = 0;  // Later calls have left the memory of earlier ones alone.
+    for (const auto& block : blocks) {
+      CHECK(std::equal(all[i].begin(), all[i].end(), block.data() + 1));
+      ++i;
+    }
+  }
+  most_cameras = ~std::size_t{0};
 }
 
 TEST_CASE("images that cannot stay in a backend's memory are named") {

@@ -237,6 +237,11 @@ class BasicBatchSimulator {
                                             " floats for the sensor \"" + plan.sensors()[i].uuid +
                                             "\", which needs " + std::to_string(floats)};
       }
+      if (reinterpret_cast<std::uintptr_t>(memory->data()) % alignof(float) != 0) {
+        return {Errc::invalid_argument, "BatchConfig.image_source: the memory for the sensor \"" +
+                                            plan.sensors()[i].uuid + "\" is not aligned to " +
+                                            std::to_string(alignof(float)) + " bytes"};
+      }
       given[buffer] = memory->data();
     }
     return {};

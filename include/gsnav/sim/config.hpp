@@ -109,7 +109,7 @@ const Image& image_named(std::span<const Image> images, std::string_view uuid) {
 /// Gives memory for the images of one sensor.
 /// @param sensor Index in SimulatorConfig::sensors.
 /// @param floats Size of the images of all environments, [N][height][width][channels].
-/// @return memory of at least that size; or an error, which the batch returns.
+/// @return memory of at least that size, aligned as a float is; or an error, which the batch returns.
 using ImageSource = std::function<Result<std::span<float>>(std::size_t sensor, std::size_t floats)>;
 
 /// Settings of a batch of environments.
