@@ -18,6 +18,7 @@ from ._gsnav import (
     PointNavEpisode,
     Simulator,
     SimulatorConfig,
+    copy_image,
     to_bytes,
 )
 from ._spaces import BaseEnv
@@ -29,7 +30,8 @@ class Env(BaseEnv):
     """PointNav environment with one agent: a `gymnasium.Env`, or the same shape without Gymnasium.
 
     An observation is a dict. It has an image per sensor, float32 [H][W][C], and "point_goal", float32 [2]: the
-    distance (metres, on the ground plane) and the angle (radians to the left). Observations are new arrays.
+    distance (metres, on the ground plane) and the angle (radians to the left). Observations are new arrays,
+    whose images are aligned to 64 bytes.
 
     Actions are 0 (stop), 1 (forward), 2 (turn left) and 3 (turn right). An episode is terminated by `stop`, and
     truncated after `config.task.max_steps` actions. The info of the last step has "metrics".
@@ -42,7 +44,7 @@ class Env(BaseEnv):
                  rules: EpisodeRules | None = None, render_mode: str | None = None) -> None:
         """Creates an environment.
 
-        scene: a name for open_scene, an OpenedScene or a SimulatorScene. It needs a NavMesh; one is built for a
+        scene: a name or path for open_scene, an OpenedScene or a SimulatorScene. It needs a NavMesh; one is built for a
             name that has none.
         device: device that simulates and renders, or its name.
         config: agent, task and sensors. Default: RGB and depth of 256 x 256 pixels.
@@ -115,7 +117,7 @@ class Env(BaseEnv):
         self._last = None
 
     def _observation(self, seen: Observations) -> Observation:
-        made = {name: image.copy() for name, image in seen.images.items()}
+        made = {name: copy_image(image) for name, image in seen.images.items()}
         goal = seen.point_goal
         made[_task.POINT_GOAL] = np.array([goal.distance, goal.angle], np.float32)
         self._last = made

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import enum
 import math
+import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -41,7 +42,7 @@ METRIC_FIELDS = ("success", "spl", "soft_spl", "stl", "distance_to_goal", "eucli
                  "collision_rate", "psi", "psc", "human_collision", "human_blocked", "collisions",
                  "collision_steps", "steps", "start_distance", "path_length", "min_clearance", "stop_called")
 
-Scene = str | OpenedScene | SimulatorScene
+Scene = str | os.PathLike[str] | OpenedScene | SimulatorScene
 Episode = PointNavEpisode | BatchEpisode
 EpisodeSource = Callable[[int, int], Episode]
 
@@ -58,14 +59,14 @@ def from_dlpack(value: Any, what: str) -> Any:
 
 def scene_of(scene: Scene, config: SimulatorConfig) -> SimulatorScene:
     """The scene with a NavMesh. A name is opened, and a NavMesh is built for the agent if none is there."""
-    if isinstance(scene, str):
+    if isinstance(scene, (str, os.PathLike)):
         options = OpenOptions(navmesh="auto", agent_radius=config.task.agent_radius,
                               agent_height=config.task.agent_height)
         scene = open_scene(scene, options)
     if isinstance(scene, OpenedScene):
         scene = scene.scene
     if not isinstance(scene, SimulatorScene):
-        raise TypeError(f"scene: expected a name, an OpenedScene or a SimulatorScene, got {type(scene).__name__}")
+        raise TypeError(f"scene: expected a name, path, OpenedScene or a SimulatorScene, got {type(scene).__name__}")
     if scene.navmesh is None:
         raise InvalidArgument("scene: it has no NavMesh. Open it with OpenOptions(navmesh=\"auto\").")
     return scene

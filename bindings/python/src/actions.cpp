@@ -23,12 +23,6 @@ using Array = nb::ndarray<nb::ro, nb::device::cpu>;
                             .c_str());
 }
 
-/// Element i of a one-dimensional array, with its stride.
-template <class T>
-T element(const Array& array, std::size_t i) noexcept {
-  return static_cast<const T*>(array.data())[static_cast<std::int64_t>(i) * array.stride(0)];
-}
-
 template <class T>
 std::vector<Action> read(const Array& array) {
   std::vector<Action> actions(array.shape(0));
@@ -98,8 +92,10 @@ BatchActions batch_actions(nb::handle source, std::size_t environments) {
     if (nb::try_cast(source, array, false)) return from_array(array, environments);
     const nb::object copy = array_from_device(source);
     if (copy.is_valid() && nb::try_cast(copy, array, false)) return from_array(array, environments);
-    throw nb::type_error(
-        ("actions: expected an array of integers or a list, got " + type_of(source)).c_str());
+    const bool typed = nb::hasattr(source, "dtype");
+    throw nb::type_error(("actions: expected an array of integers or a list, got " + type_of(source) +
+                          (typed ? " of dtype " + text_of(source.attr("dtype")) : std::string()))
+                             .c_str());
   }
   const std::size_t count = nb::len(source);
   if (count != environments) {

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <new>
+#include <optional>
 #include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -21,10 +26,36 @@ nb::object array_from(std::vector<T>&& values, const std::vector<std::size_t>& s
   return nb::cast(nb::ndarray<nb::numpy, T>(data, shape.size(), shape.data(), owner));
 }
 
-/// A writable numpy array with a copy of `values`.
+/// Bytes to which new images are aligned. JAX takes no others without a copy.
+inline constexpr std::align_val_t kAlignment{64};
+
+/// Frees memory that was allocated with kAlignment.
+struct FreeAligned {
+  void operator()(void* p) const noexcept { ::operator delete(p, kAlignment); }
+};
+
+/// A writable numpy array with a copy of `values`, aligned to kAlignment. A long copy is made without
+/// the GIL, so no other thread may change `values`.
 template <class T>
 nb::object array_copy(std::span<const T> values, const std::vector<std::size_t>& shape) {
-  return array_from(std::vector<T>(values.begin(), values.end()), shape);
+  static_assert(std::is_trivially_copyable_v<T>);
+  std::unique_ptr<T, FreeAligned> held(
+      static_cast<T*>(::operator new(values.size_bytes() + sizeof(T), kAlignment)));
+  T* const data = held.get();
+  {
+    std::optional<ReleaseGil> release;
+    if (values.size_bytes() > 1u << 17) release.emplace();
+    std::copy(values.begin(), values.end(), data);
+  }
+  nb::capsule owner(data, [](void* p) noexcept { FreeAligned()(p); });
+  held.release();
+  return nb::cast(nb::ndarray<nb::numpy, T>(data, shape.size(), shape.data(), owner));
+}
+
+/// Whether numbers of type T may be read at this address.
+template <class T>
+bool is_aligned(const void* data) noexcept {
+  return reinterpret_cast<std::uintptr_t>(data) % alignof(T) == 0;
 }
 
 /// A read-only numpy array of memory that belongs to `owner`, which it keeps alive.

@@ -2,46 +2,17 @@
 #include <optional>
 
 #include "actions.hpp"
+#include "batch_core.hpp"
 #include "batch_step.hpp"
 #include "bind.hpp"
-#include "device_array.hpp"
 #include "episode_source.hpp"
 #include "fields.hpp"
-#include "gsnav/device/simulator.hpp"
-#include "guard.hpp"
-#include "image_pool.hpp"
 #include "image_source.hpp"
 #include "structured.hpp"
 #include "world.hpp"
 
 namespace gsnav::python {
 namespace {
-
-/// A BatchSimulator that one thread may use at a time.
-struct PythonBatch {
-  BatchSimulator sim;
-  std::shared_ptr<PythonSource> source;
-  std::shared_ptr<ImagePool> pool;  ///< Images are drawn there, or null.
-  std::shared_ptr<PythonImageSource> images;
-  std::shared_ptr<Consumers> consumers;
-  bool copy = false;   ///< Images are new arrays.
-  bool begun = false;  ///< Worlds exist from the first reset on.
-  Busy busy;
-
-  PythonBatch(BatchSimulator s, std::shared_ptr<PythonSource> e, std::shared_ptr<ImagePool> p,
-              std::shared_ptr<PythonImageSource> i, bool c)
-      : sim(std::move(s)),
-        source(std::move(e)),
-        pool(std::move(p)),
-        images(std::move(i)),
-        consumers(std::make_shared<Consumers>(sim.device().index())),
-        copy(c) {}
-  PythonBatch(const PythonBatch&) = delete;
-  PythonBatch& operator=(const PythonBatch&) = delete;
-  ~PythonBatch() {
-    if (pool != nullptr) pool->close();
-  }
-};
 
 /// dtypes of structured arrays. They live as long as the process.
 struct Types {
@@ -69,7 +40,7 @@ nb::dict image_arrays(std::span<const BatchObservation> images, const F& array) 
 
 nb::object copied(const BatchObservation& o) { return array_copy(o.data, shape_of(o)); }
 
-nb::dict step_images(std::span<const BatchObservation> images, const PythonBatch& b, nb::handle self) {
+nb::dict step_images(std::span<const BatchObservation> images, const BatchCore& b, nb::handle self) {
   return image_arrays(images, [&](const BatchObservation& o) {
     if (!b.copy) return array_view(o.data.data(), shape_of(o), self);
     // Sensors may share an image, but each has an array of its own.
@@ -84,7 +55,7 @@ nb::object bool_view(std::span<const std::uint8_t> values, nb::handle owner) {
 
 /// Arrays of a step. Those with a row per environment are views; others are copies, because their sizes
 /// change from step to step.
-PythonStep step_arrays(const BatchStep& s, const PythonBatch& b, nb::handle self) {
+PythonStep step_arrays(const BatchStep& s, const BatchCore& b, nb::handle self) {
   static_assert(sizeof(PointGoal) == 2 * sizeof(double));
   PythonStep out;
   const std::size_t n = s.rewards.size();
@@ -113,7 +84,8 @@ PythonStep step_arrays(const BatchStep& s, const PythonBatch& b, nb::handle self
 
 /// Runs f(simulator) -> Result<BatchStep> without the GIL. An exception of the episode source goes on.
 template <class F>
-PythonStep observe(nb::handle self, PythonBatch& b, const char* what, const F& f) {
+PythonStep observe(PythonBatch& batch, const char* what, const F& f) {
+  BatchCore& b = *batch.core;
   check_fork(b.sim.device(), what);
   b.source->error.reset();
   b.images->error.reset();
@@ -121,7 +93,7 @@ PythonStep observe(nb::handle self, PythonBatch& b, const char* what, const F& f
   if (b.pool != nullptr) b.pool->begin();
   std::optional<Result<BatchStep>> result;
   {
-    nb::gil_scoped_release release;
+    const ReleaseGil release;
     b.consumers->wait();
     result.emplace(f(b.sim));
   }
@@ -134,7 +106,7 @@ PythonStep observe(nb::handle self, PythonBatch& b, const char* what, const F& f
     }
     result->status().throw_if_error();
   }
-  return step_arrays(**result, b, self);
+  return step_arrays(**result, b, batch.owner);
 }
 
 /// Memory for images that numpy arrays own. The pool keeps the bytes of two steps, because a caller may
@@ -180,35 +152,38 @@ void make(PythonBatch* self, const DeviceArg& device, const std::vector<SceneArg
   }
   auto held = std::make_shared<PythonImageSource>(PythonImageSource{std::move(images), {}, {}});
   if (!held->function.is_none()) config.image_source = image_source(held, chosen, config);
-  nb::gil_scoped_release release;
-  new (self) PythonBatch(BatchSimulator::create(chosen, std::move(shared), std::move(config),
-                                                environments, std::move(episodes))
-                             .value(),
-                         std::move(source), std::move(pool), std::move(held), copy);
+  const ReleaseGil release;
+  auto core =
+      std::make_shared<BatchCore>(BatchSimulator::create(chosen, std::move(shared), std::move(config),
+                                                         environments, std::move(episodes))
+                                      .value(),
+                                  std::move(source), std::move(pool), std::move(held), copy);
+  const HoldGil gil;
+  new (self) PythonBatch(std::move(core));
 }
 
 PythonStep reset(nb::handle self, nb::handle mask) {
   auto& b = object_of<PythonBatch>(self);
-  const Busy::Hold hold(b.busy, "BatchSimulator.reset");
-  const std::vector<std::uint8_t> chosen = reset_mask(mask, b.sim.environments());
+  const Busy::Hold hold(b.core->busy, "BatchSimulator.reset");
+  const std::vector<std::uint8_t> chosen = reset_mask(mask, b.core->sim.environments());
   PythonStep step =
-      observe(self, b, "BatchSimulator.reset", [&](BatchSimulator& sim) { return sim.reset(chosen); });
-  b.begun = true;
+      observe(b, "BatchSimulator.reset", [&](BatchSimulator& sim) { return sim.reset(chosen); });
+  b.core->begun = true;
   return step;
 }
 
 PythonStep step(nb::handle self, nb::handle actions) {
   auto& b = object_of<PythonBatch>(self);
-  const Busy::Hold hold(b.busy, "BatchSimulator.step");
-  const BatchActions chosen = batch_actions(actions, b.sim.environments());
+  const Busy::Hold hold(b.core->busy, "BatchSimulator.step");
+  const BatchActions chosen = batch_actions(actions, b.core->sim.environments());
   return std::visit(
       [&](const auto& a) {
-        return observe(self, b, "BatchSimulator.step", [&](BatchSimulator& sim) { return sim.step(a); });
+        return observe(b, "BatchSimulator.step", [&](BatchSimulator& sim) { return sim.step(a); });
       },
       chosen);
 }
 
-void check_environment(const PythonBatch& b, std::size_t environment) {
+void check_environment(const BatchCore& b, std::size_t environment) {
   if (environment >= b.sim.environments()) {
     throw nb::index_error(
         ("environment " + std::to_string(environment) + " of " + std::to_string(b.sim.environments()))
@@ -218,33 +193,60 @@ void check_environment(const PythonBatch& b, std::size_t environment) {
 }
 
 WorldView world(nb::handle self, std::size_t environment) {
-  auto& b = object_of<PythonBatch>(self);
+  auto& batch = object_of<PythonBatch>(self);
+  BatchCore& b = *batch.core;
   check_environment(b, environment);
-  return {nb::borrow(self), &b.busy,
+  return {batch.owner, &b.busy,
           [&b, environment]() -> const World& { return b.sim.world(environment); }};
 }
 
-// The episode source may refer to the simulator, for example through an environment that owns both.
-// These functions let Python's collector find such cycles.
+// These functions let Python's collector find cycles through the episode source (BatchCore).
 int traverse(PyObject* self, visitproc visit, void* arg) {
   Py_VISIT(Py_TYPE(self));
   if (!nb::inst_ready(self)) return 0;
-  const PythonBatch* const b = nb::inst_ptr<PythonBatch>(self);
-  const nb::handle function = b->source->function;
-  Py_VISIT(function.ptr());
-  const nb::handle images = b->images->function;
-  Py_VISIT(images.ptr());
+  const BatchCore& b = *nb::inst_ptr<PythonBatch>(self)->core;
+  for (const nb::handle seen : {nb::handle(b.source->function), nb::handle(b.images->function)}) {
+    Py_VISIT(seen.ptr());
+  }
   return 0;
 }
 int clear(PyObject* self) {
   if (!nb::inst_ready(self)) return 0;
-  nb::inst_ptr<PythonBatch>(self)->source->function = nb::none();
-  nb::inst_ptr<PythonBatch>(self)->images->function = nb::none();
+  nb::inst_ptr<PythonBatch>(self)->forget();
   return 0;
 }
 PyType_Slot slots[] = {{Py_tp_traverse, reinterpret_cast<void*>(traverse)},
                        {Py_tp_clear, reinterpret_cast<void*>(clear)},
                        {0, nullptr}};
+
+void bind_counts(nb::class_<PythonBatch>& c) {
+  using P = PythonBatch;
+  c.def_prop_ro(
+       "render_count",
+       [](P& p) {
+         const Busy::Hold hold(p.core->busy, "BatchSimulator.render_count");
+         return p.core->sim.render_count();
+       },
+       "Number of renders so far.")
+      .def_prop_ro(
+          "pose_count",
+          [](P& p) {
+            const Busy::Hold hold(p.core->busy, "BatchSimulator.pose_count");
+            return p.core->sim.pose_count();
+          },
+          "Number of times that an avatar was skinned for rendering.")
+      .def(
+          "set_rendering",
+          [](P& p, bool on) {
+            const Busy::Hold hold(p.core->busy, "BatchSimulator.set_rendering");
+            p.core->sim.set_rendering(on);
+          },
+          nb::arg("on"), "Turns rendering on or off, from the next action on.")
+      .def_prop_ro(
+          "unused_bytes",
+          [](const P& p) { return p.core->pool == nullptr ? 0 : p.core->pool->unused(); },
+          "Number of bytes that are kept for the images of later steps (`copy`).");
+}
 
 }  // namespace
 
@@ -252,32 +254,31 @@ void bind_batch(nb::module_& m) {
   types();
   bind_step(m);
   using P = PythonBatch;
-  nb::class_<P>(
+  nb::class_<P> c(
       m, "BatchSimulator", nb::type_slots(slots),
       "Navigation simulator for N environments over M scenes, stepped by one call. One thread may "
-      "use it at a time; a call during another call raises an error.")
-      .def(
-          "__init__", make, nb::arg("device"), nb::arg("scenes"), nb::arg("config"),
-          nb::arg("environments"), nb::arg("next_episode"), nb::arg("copy") = false,
-          nb::arg("image_source") = nb::none(),
-          nb::sig("def __init__(self, device: Device | str, "
-                  "scenes: collections.abc.Sequence[SimulatorScene | OpenedScene], config: BatchConfig, "
-                  "environments: int, next_episode: collections.abc.Callable[[int, int], "
-                  "BatchEpisode | PointNavEpisode], copy: bool = False, image_source: "
-                  "collections.abc.Callable[[int, int], typing.Any] | None = None) -> None"),
-          "Creates a simulator that shares `scenes`.\n\n"
-          "`next_episode(environment, count)` is called once for each episode of each environment. It "
-          "returns "
-          "a BatchEpisode, or a PointNavEpisode in scene 0. Its exceptions reach the caller of reset or "
-          "step. After that, reset all environments.\n\n"
-          "`copy` False returns images as read-only views. True returns new writable arrays, aligned to "
-          "64 bytes. The simulator draws into their memory, and uses it again when they are dead. It "
-          "keeps unused memory for the images of up to two steps. With AutoReset.disabled the arrays "
-          "are copies of the simulator's images. Images on a GPU are always views.\n\n"
-          "`image_source(sensor, floats)` is called at each step for each sensor, by its index. It "
-          "returns an array of at least that many float32 (DLPack) where `config.images` leaves images. "
-          "The step draws into it, so a learner can keep images without a copy. Other libraries must "
-          "have finished their work on this memory.")
+      "use it at a time; a call during another call raises an error.");
+  c.def("__init__", make, nb::arg("device"), nb::arg("scenes"), nb::arg("config"),
+        nb::arg("environments"), nb::arg("next_episode"), nb::arg("copy") = false,
+        nb::arg("image_source") = nb::none(),
+        nb::sig("def __init__(self, device: Device | str, "
+                "scenes: collections.abc.Sequence[SimulatorScene | OpenedScene], config: BatchConfig, "
+                "environments: int, next_episode: collections.abc.Callable[[int, int], "
+                "BatchEpisode | PointNavEpisode], copy: bool = False, image_source: "
+                "collections.abc.Callable[[int, int], typing.Any] | None = None) -> None"),
+        "Creates a simulator that shares `scenes`.\n\n"
+        "`next_episode(environment, count)` is called once for each episode of each environment. It "
+        "returns "
+        "a BatchEpisode, or a PointNavEpisode in scene 0. Its exceptions reach the caller of reset or "
+        "step. After that, reset all environments.\n\n"
+        "`copy` False returns images as read-only views. True returns new writable arrays, aligned to "
+        "64 bytes. The simulator draws into their memory, and uses it again when they are dead. It "
+        "keeps unused memory for the images of up to two steps. With AutoReset.disabled the arrays "
+        "are copies of the simulator's images. Images on a GPU are always views.\n\n"
+        "`image_source(sensor, floats)` is called at each step for each sensor, by its index. It "
+        "returns an array of at least that many float32 (DLPack) where `config.images` leaves images. "
+        "The step draws into it, so a learner can keep images without a copy. Other libraries must "
+        "have finished their work on this memory.")
       .def(
           "reset", reset, nb::arg("mask") = nb::none(),
           nb::sig("def reset(self, mask: numpy.typing.NDArray[numpy.bool_] | None = None) -> BatchStep"),
@@ -290,43 +291,22 @@ void bind_batch(nb::module_& m) {
            "stride "
            "and library (DLPack), or a list. Wrong actions are refused before any environment moves.")
       .def_prop_ro(
-          "environments", [](const P& p) { return p.sim.environments(); }, "Number of environments, N.")
+          "environments", [](const P& p) { return p.core->sim.environments(); },
+          "Number of environments, N.")
       .def("world", world, nb::arg("environment"), nb::sig("def world(self, environment: int) -> World"),
            "World of an environment, without images. After the first reset only.")
       .def(
           "scene_of",
           [](P& p, std::size_t environment) {
-            const Busy::Hold hold(p.busy, "BatchSimulator.scene_of");
-            check_environment(p, environment);
-            return p.sim.scene_of(environment);
+            const Busy::Hold hold(p.core->busy, "BatchSimulator.scene_of");
+            check_environment(*p.core, environment);
+            return p.core->sim.scene_of(environment);
           },
           nb::arg("environment"), "Index of the scene that an environment is in.")
       .def_prop_ro(
-          "render_count",
-          [](P& p) {
-            const Busy::Hold hold(p.busy, "BatchSimulator.render_count");
-            return p.sim.render_count();
-          },
-          "Number of renders so far.")
-      .def_prop_ro(
-          "pose_count",
-          [](P& p) {
-            const Busy::Hold hold(p.busy, "BatchSimulator.pose_count");
-            return p.sim.pose_count();
-          },
-          "Number of times that an avatar was skinned for rendering.")
-      .def(
-          "set_rendering",
-          [](P& p, bool on) {
-            const Busy::Hold hold(p.busy, "BatchSimulator.set_rendering");
-            p.sim.set_rendering(on);
-          },
-          nb::arg("on"), "Turns rendering on or off, from the next action on.")
-      .def_prop_ro(
-          "unused_bytes", [](const P& p) { return p.pool == nullptr ? 0 : p.pool->unused(); },
-          "Number of bytes that are kept for the images of later steps (`copy`).")
-      .def_prop_ro(
-          "device", [](const P& p) { return p.sim.device(); }, "Device that the simulator runs on.");
+          "device", [](const P& p) { return p.core->sim.device(); },
+          "Device that the simulator runs on.");
+  bind_counts(c);
 }
 
 }  // namespace gsnav::python

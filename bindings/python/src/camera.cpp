@@ -82,7 +82,7 @@ void bind_camera(nb::module_& m) {
   m.def(
       "load_cameras",
       [](const std::filesystem::path& path, int width, int height) {
-        nb::gil_scoped_release release;
+        const ReleaseGil release;
         return io::load_cameras(path, width, height).value();
       },
       nb::arg("path"), nb::arg("width") = 0, nb::arg("height") = 0,
@@ -92,7 +92,7 @@ void bind_camera(nb::module_& m) {
   m.def(
       "save_cameras",
       [](const std::filesystem::path& path, const std::vector<Camera>& cameras) {
-        nb::gil_scoped_release release;
+        const ReleaseGil release;
         io::save_cameras(path, cameras).throw_if_error();
       },
       nb::arg("path"), nb::arg("cameras"),

@@ -7,11 +7,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <exception>
 #include <memory>
 #include <string>
 #include <type_traits>
 
+#include "gil.hpp"
 #include "gsnav/device/device.hpp"
 #include "gsnav/math/quat.hpp"
 #include "gsnav/math/vec.hpp"
@@ -36,6 +38,18 @@ struct SceneArg {
   std::shared_ptr<const SimulatorScene> scene;  ///< Not null.
 };
 
+/// Element i of a one-dimensional array of type T, with its stride. It need not be aligned.
+template <class T, class Array>
+T element(const Array& array, std::size_t i) noexcept {
+  constexpr auto kSize = static_cast<std::int64_t>(sizeof(T));
+  T value;
+  std::memcpy(
+      &value,
+      static_cast<const char*>(array.data()) + static_cast<std::int64_t>(i) * array.stride(0) * kSize,
+      sizeof(T));
+  return value;
+}
+
 /// Reads `count` numbers from an array of float32 or float64 in host memory, by DLPack or the buffer
 /// protocol. Returns false if it is anything else.
 inline bool read_array(nb::handle source, double* out, Py_ssize_t count) noexcept {
@@ -44,10 +58,8 @@ inline bool read_array(nb::handle source, double* out, Py_ssize_t count) noexcep
   if (array.shape(0) != static_cast<std::size_t>(count)) return false;
   const bool wide = array.dtype() == nb::dtype<double>();
   if (!wide && array.dtype() != nb::dtype<float>()) return false;
-  for (std::int64_t i = 0; i < count; ++i) {
-    const std::int64_t at = i * array.stride(0);
-    out[i] = wide ? static_cast<const double*>(array.data())[at]
-                  : static_cast<double>(static_cast<const float*>(array.data())[at]);
+  for (std::size_t i = 0; i < array.shape(0); ++i) {
+    out[i] = wide ? element<double>(array, i) : static_cast<double>(element<float>(array, i));
   }
   return true;
 }

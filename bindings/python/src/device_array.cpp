@@ -157,7 +157,7 @@ nb::object array_from_device([[maybe_unused]] nb::handle source) {
   auto* const data = new std::uint8_t[bytes + 1];
   const nb::capsule owner(data, [](void* p) noexcept { delete[] static_cast<std::uint8_t*>(p); });
   {
-    nb::gil_scoped_release release;
+    const ReleaseGil release;
     const OnDevice current(array.device_id());
     check(cudaMemcpy(data, array.data(), bytes, cudaMemcpyDeviceToHost), "actions on a GPU");
   }

@@ -27,8 +27,8 @@ class Consumers {
   std::vector<std::intptr_t> streams_;
 };
 
-/// Images in the memory of a GPU as a dict of DeviceArray by sensor. `owner` is the simulator, which the
-/// arrays keep alive.
+/// Images in the memory of a GPU as a dict of DeviceArray by sensor. The arrays keep `owner` alive,
+/// and it the memory.
 nb::dict device_images(std::span<const BatchObservation> images, const Device& device,
                        const std::shared_ptr<Consumers>& consumers, nb::handle owner);
 

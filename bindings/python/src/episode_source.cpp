@@ -11,7 +11,7 @@ namespace gsnav::python {
 EpisodeSource episode_source(std::shared_ptr<PythonSource> source) {
   return
       [source = std::move(source)](std::size_t environment, std::size_t count) -> Result<BatchEpisode> {
-        const nb::gil_scoped_acquire gil;
+        const HoldGil gil;
         const std::string call =
             "next_episode(" + std::to_string(environment) + ", " + std::to_string(count) + ")";
         try {

@@ -13,7 +13,7 @@
 namespace gsnav::python {
 namespace {
 
-using Release = nb::call_guard<nb::gil_scoped_release>;
+using Release = nb::call_guard<ReleaseGil>;
 
 void bind_metrics(nb::module_& m) {
   using E = EpisodeMetrics;
@@ -88,7 +88,7 @@ void bind_generation(nb::module_& m) {
         Rng own = rng;  // Other threads may use `rng` while the GIL is released.
         PointNavEpisode episode;
         {
-          nb::gil_scoped_release release;
+          const ReleaseGil release;
           episode = generate_episode(mesh, own, rules).value();
         }
         rng = own;

@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "frames.hpp"
 
-#include <utility>
+#include <span>
 
 #include "arrays.hpp"
 #include "fields.hpp"
 
 namespace gsnav::python {
 
-PythonFrames python_frames(Frames<float> frames, bool single) {
+PythonFrames python_frames(const Frames<float>& frames, bool single) {
   PythonFrames out;
   out.cameras = frames.cameras;
   out.height = frames.height;
   out.width = frames.width;
-  const auto image = [&](std::vector<float>& values, std::size_t channels) -> nb::object {
+  const auto image = [&](const std::vector<float>& values, std::size_t channels) -> nb::object {
     if (values.empty()) return nb::none();
     std::vector<std::size_t> shape;
     if (!single) shape.push_back(frames.cameras);
     shape.insert(shape.end(), {frames.height, frames.width});
     if (channels > 1) shape.push_back(channels);
-    return array_from(std::move(values), shape);
+    return array_copy(std::span(values), shape);
   };
   out.rgb = image(frames.rgb, 3);
   out.alpha = image(frames.alpha, 1);
@@ -27,7 +27,7 @@ PythonFrames python_frames(Frames<float> frames, bool single) {
   out.expected_depth = image(frames.expected_depth, 1);
   out.accumulated_depth = image(frames.accumulated_depth, 1);
   out.first_hit_depth = image(frames.first_hit_depth, 1);
-  out.stats = std::move(frames.stats);
+  out.stats = frames.stats;
   return out;
 }
 
@@ -50,8 +50,9 @@ void bind_frames(nb::module_& m) {
   };
   nb::class_<F> c(
       m, "Frames",
-      "Images of one render call, float32 arrays that own their memory. An image that was not "
-      "requested is None. Shapes have a first axis of cameras if a list of cameras was rendered.");
+      "Images of one render call, float32 arrays that own their memory, aligned to 64 bytes. An image "
+      "that was not requested is None. Shapes have a first axis of cameras if a list of cameras was "
+      "rendered.");
   c.def_ro("cameras", &F::cameras, "Number of cameras, C.");
   c.def_ro("height", &F::height, "Rows of an image, H.");
   c.def_ro("width", &F::width, "Columns of an image, W.");

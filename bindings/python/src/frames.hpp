@@ -15,8 +15,8 @@ struct PythonFrames {
   std::vector<RenderStats> stats;
 };
 
-/// Moves the images into arrays. `single` leaves the axis of cameras out.
-PythonFrames python_frames(Frames<float> frames, bool single);
+/// Copies the images into new arrays. `single` leaves the axis of cameras out.
+PythonFrames python_frames(const Frames<float>& frames, bool single);
 void bind_frames(nb::module_& m);
 
 }  // namespace gsnav::python

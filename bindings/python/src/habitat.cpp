@@ -24,7 +24,7 @@ struct PythonGreedy {
 
 void make(PythonGreedy* self, std::shared_ptr<const NavMesh> mesh, const Vec3d& goal,
           const TaskConfig& task, double goal_radius) {
-  nb::gil_scoped_release release;
+  const ReleaseGil release;
   auto follower = GreedyGeodesicFollower::make(*mesh, goal, task, {goal_radius}).value();
   new (self) PythonGreedy{std::move(mesh), std::move(follower)};
 }
@@ -40,7 +40,7 @@ void make_sensors(PythonFreeSensors* self, const DeviceArg& device, const SceneA
                   std::vector<SensorSpec> specs, RenderOptions options) {
   const Device chosen = device.value();
   check_fork(chosen, "FreeSensors");
-  nb::gil_scoped_release release;
+  const ReleaseGil release;
   options.render.outputs = kRgb | kAlpha | kMedianDepth;
   FreeSensors sensors = FreeSensors::create(std::move(specs)).value();
   Renderer renderer = Renderer::create(chosen, scene.scene, options).value();
@@ -54,7 +54,7 @@ nb::object image_of(const FreeSensors& sensors, std::size_t i) {
   const auto rows = static_cast<std::size_t>(spec.resolution[0]);
   const auto columns = static_cast<std::size_t>(spec.resolution[1]);
   if (spec.kind != SensorKind::rgb) {
-    return array_from(std::vector<float>(image.begin(), image.end()), {rows, columns});
+    return array_copy(image, {rows, columns});
   }
   std::vector<std::uint8_t> bytes(image.size()), out(4 * rows * columns, 255);
   to_bytes(image, bytes);
@@ -66,7 +66,7 @@ nb::object image_of(const FreeSensors& sensors, std::size_t i) {
 
 void set_sensors(PythonFreeSensors& self, std::vector<SensorSpec> specs) {
   const Busy::Hold hold(self.busy, "FreeSensors.set_sensors");
-  nb::gil_scoped_release release;
+  const ReleaseGil release;
   self.sensors = FreeSensors::create(std::move(specs)).value();
 }
 
@@ -76,7 +76,7 @@ nb::dict draw(PythonFreeSensors& self, const std::vector<std::pair<Vec3d, Quatd>
   std::vector<SensorPose> places;
   for (const auto& [position, rotation] : poses) places.push_back({position, rotation});
   {
-    nb::gil_scoped_release release;
+    const ReleaseGil release;
     self.sensors
         .render(places, [&](std::span<const Camera> cameras,
                             Frames<float>& out) { return self.renderer.render(cameras, out, time); })
@@ -122,7 +122,7 @@ void bind_habitat(nb::module_& m) {
       [](const NavMesh& mesh, const Vec3d& start, const Vec3d& end, bool slide,
          const SnapOptions& options) { return gsnav::try_step(mesh, start, end, slide, options); },
       nb::arg("mesh"), nb::arg("start"), nb::arg("end"), nb::arg("slide"),
-      nb::arg("options") = SnapOptions{}, nb::call_guard<nb::gil_scoped_release>(),
+      nb::arg("options") = SnapOptions{}, nb::call_guard<ReleaseGil>(),
       "Moves from any point towards another along the surface. The start is snapped first. Returns None "
       "if it "
       "cannot be snapped or a coordinate is not finite. `slide`: slide along walls, or stop at the "
@@ -143,7 +143,7 @@ void bind_habitat(nb::module_& m) {
             pose.yaw = yaw;
             return g.follower.next(pose).value();
           },
-          nb::arg("position"), nb::arg("yaw"), nb::call_guard<nb::gil_scoped_release>(),
+          nb::arg("position"), nb::arg("yaw"), nb::call_guard<ReleaseGil>(),
           "Next action from a position in metres and a heading in radians, or Action.stop within the "
           "goal "
           "radius. Raises NothingNavigable if the agent is off the mesh or on another island.")

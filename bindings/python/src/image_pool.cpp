@@ -8,10 +8,6 @@
 
 namespace gsnav::python {
 
-void ImagePool::Free::operator()(float* p) const noexcept {
-  ::operator delete (p, std::align_val_t{kAlignment});
-}
-
 void ImagePool::put_back(Block block) noexcept {
   const std::lock_guard lock(mutex_);
   const std::size_t bytes = block.floats * sizeof(float);
@@ -44,8 +40,8 @@ Result<std::span<float>> ImagePool::take(std::size_t floats) {
     bytes_ -= floats * sizeof(float);
   } else {
     block.floats = floats;
-    block.data.reset(static_cast<float*>(
-        ::operator new (floats * sizeof(float), std::align_val_t{kAlignment}, std::nothrow)));
+    block.data.reset(
+        static_cast<float*>(::operator new(floats * sizeof(float), kAlignment, std::nothrow)));
     if (block.data == nullptr) {
       return {Errc::out_of_memory,
               "cannot allocate " + std::to_string(floats * sizeof(float)) + " bytes for images"};

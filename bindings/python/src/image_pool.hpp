@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "casters.hpp"
+#include "arrays.hpp"
 #include "gsnav/core/status.hpp"
 
 namespace gsnav::python {
@@ -16,9 +16,6 @@ namespace gsnav::python {
 /// again, because new memory costs a page fault for each of its pages. All functions are thread-safe.
 class ImagePool : public std::enable_shared_from_this<ImagePool> {
  public:
-  /// Bytes to which blocks are aligned. JAX takes no others without a copy.
-  static constexpr std::size_t kAlignment = 64;
-
   /// @param most Number of bytes of unused blocks that are kept.
   explicit ImagePool(std::size_t most) : most_(most) {}
   ImagePool(const ImagePool&) = delete;
@@ -38,11 +35,8 @@ class ImagePool : public std::enable_shared_from_this<ImagePool> {
   std::size_t unused() const;
 
  private:
-  struct Free {
-    void operator()(float* p) const noexcept;
-  };
   struct Block {
-    std::unique_ptr<float, Free> data;
+    std::unique_ptr<float, FreeAligned> data;
     std::size_t floats = 0;
   };
   void put_back(Block block) noexcept;

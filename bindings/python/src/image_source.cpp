@@ -14,7 +14,7 @@ ImageSource image_source(std::shared_ptr<PythonImageSource> source, const Device
   const int index = on_gpu ? device.index() : 0;
   return [source = std::move(source), on_gpu, index](std::size_t sensor,
                                                      std::size_t floats) -> Result<std::span<float>> {
-    const nb::gil_scoped_acquire gil;
+    const HoldGil gil;
     const std::string call =
         "image_source(" + std::to_string(sensor) + ", " + std::to_string(floats) + ")";
     try {

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The compiled module gsnav._gsnav. Types are bound before the functions that use them.
+#include <cstdlib>
+
 #include "bind.hpp"
 
 NB_MODULE(_gsnav, m) {
@@ -8,6 +10,8 @@ NB_MODULE(_gsnav, m) {
     throw nb::import_error(
         "gsnav does not support subinterpreters. Use processes of the start method spawn");
   }
+  // Objects that a daemon thread or a caller's own circle holds at exit are no error of this module.
+  nb::set_leak_warnings(std::getenv("GSNAV_LEAK_WARNINGS") != nullptr);
   nb::module_::import_("numpy");  // Without it, this is an ImportError.
   m.doc() = "Compiled part of gsnav. Import gsnav instead.";
   bind_errors(m);

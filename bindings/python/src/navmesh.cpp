@@ -14,7 +14,7 @@
 namespace gsnav::python {
 namespace {
 
-using Release = nb::call_guard<nb::gil_scoped_release>;
+using Release = nb::call_guard<ReleaseGil>;
 using Triangles = std::vector<NavMesh::Triangle>;
 
 void bind_values(nb::module_& m) {

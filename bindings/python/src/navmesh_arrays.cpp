@@ -11,7 +11,8 @@
 namespace gsnav::python {
 namespace {
 
-/// The argument as a C-contiguous array of T with shape [rows][3]. Copies only if it has another type.
+/// The argument as a C-contiguous array of T with shape [rows][3]. Copies if it has another
+/// type or order, or is not aligned.
 template <class T>
 nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu> rows_of_three(nb::handle source,
                                                                                const char* name,
@@ -38,7 +39,7 @@ nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu> rows_of_three(n
     }
   }
   return nb::cast<nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu>>(
-      numpy.attr("ascontiguousarray")(array, type));
+      numpy.attr("require")(array, type, "CA"));
 }
 
 }  // namespace
@@ -51,14 +52,14 @@ std::shared_ptr<NavMesh> build_navmesh(const NavMeshSettings& settings, nb::hand
   for (std::size_t i = 0; i < points.size(); ++i) points[i] = {v(i, 0), v(i, 1), v(i, 2)};
   std::vector<NavMesh::Triangle> faces(t.shape(0));
   for (std::size_t i = 0; i < faces.size(); ++i) faces[i] = {t(i, 0), t(i, 1), t(i, 2)};
-  nb::gil_scoped_release release;
+  const ReleaseGil release;
   return std::make_shared<NavMesh>(NavMesh::build(settings, points, faces, threads).value());
 }
 
 nb::tuple navmesh_surface(const NavMesh& mesh, std::optional<std::size_t> island) {
   NavMeshTriangles surface;
   {
-    nb::gil_scoped_release release;
+    const ReleaseGil release;
     surface = mesh.surface(island);
   }
   std::vector<std::uint32_t> indices;

@@ -22,7 +22,7 @@ void bind_planned_scene(nb::module_& m) {
             planned_simulator_scene(plan, people, seed, density, task).value());
       },
       nb::arg("plan") = O{}, nb::arg("people") = 0, nb::arg("seed") = 1, nb::arg("density") = 1.0,
-      nb::arg("task") = TaskConfig{}, nb::call_guard<nb::gil_scoped_release>(),
+      nb::arg("task") = TaskConfig{}, nb::call_guard<ReleaseGil>(),
       "A random furnished flat with its NavMesh for the body of `task`, and people who walk in it. The "
       "same arguments give the same scene. `density` is the factor on the number of Gaussians of the "
       "flat and of the people, in [0.05, 20].");

@@ -13,6 +13,7 @@ namespace {
 /// A Renderer that one thread may use at a time.
 struct PythonRenderer {
   Renderer renderer;
+  Frames<float> frames;  ///< Images of the last call. Their memory is used again.
   Busy busy;
 };
 
@@ -20,19 +21,18 @@ void make(PythonRenderer* self, const DeviceArg& device, const SceneArg& scene,
           const RenderOptions& options) {
   const Device chosen = device.value();
   check_fork(chosen, "Renderer");
-  nb::gil_scoped_release release;
-  new (self) PythonRenderer{Renderer::create(chosen, scene.scene, options).value(), {}};
+  const ReleaseGil release;
+  new (self) PythonRenderer{Renderer::create(chosen, scene.scene, options).value(), {}, {}};
 }
 
 PythonFrames render(PythonRenderer& self, const std::vector<Camera>& cameras, double time, bool single) {
   const Busy::Hold hold(self.busy, "Renderer.render");
   check_fork(self.renderer.device(), "Renderer.render");
-  Frames<float> frames;
   {
-    nb::gil_scoped_release release;
-    frames = self.renderer.render(std::span<const Camera>(cameras), time).value();
+    const ReleaseGil release;
+    self.renderer.render(std::span<const Camera>(cameras), self.frames, time).throw_if_error();
   }
-  return python_frames(std::move(frames), single);
+  return python_frames(self.frames, single);
 }
 
 }  // namespace

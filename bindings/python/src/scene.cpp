@@ -50,10 +50,22 @@ void bind_options(nb::module_& m) {
       .done();
 }
 
-OpenedScene open(const std::string& name, OpenOptions options, const nb::object& progress) {
+/// A name or path as text. Throws TypeError for anything else.
+std::string name_from(nb::handle name) {
+  const nb::object text = nb::steal(PyOS_FSPath(name.ptr()));
+  if (!text.is_valid()) PyErr_Clear();
+  if (!text.is_valid() || !PyUnicode_Check(text.ptr())) {
+    throw nb::type_error(
+        ("open_scene: name must be a str or an os.PathLike, got " + type_of(name)).c_str());
+  }
+  return text_of(text);
+}
+
+OpenedScene open(nb::handle named, OpenOptions options, const nb::object& progress) {
+  const std::string name = name_from(named);
   if (!progress.is_none()) {
     options.progress = [&progress](const std::string& task, double share) {
-      nb::gil_scoped_acquire gil;
+      HoldGil gil;
       try {
         progress(task, share);
       } catch (nb::python_error& e) {
@@ -61,7 +73,7 @@ OpenedScene open(const std::string& name, OpenOptions options, const nb::object&
       }
     };
   }
-  nb::gil_scoped_release release;
+  const ReleaseGil release;
   return open_scene(name, options).value();
 }
 
@@ -118,9 +130,9 @@ void bind_scene(nb::module_& m) {
       .def_ro("navmesh_seconds", &OpenedScene::navmesh_seconds, "Seconds that the NavMesh took.");
 
   m.def(
-      "open_scene", open, nb::arg("name"), nb::arg("options") = OpenOptions{},
+      "open_scene", open, nb::arg("name").none(), nb::arg("options") = OpenOptions{},
       nb::arg("progress") = nb::none(),
-      nb::sig("def open_scene(name: str, options: OpenOptions = ..., "
+      nb::sig("def open_scene(name: str | os.PathLike[str], options: OpenOptions = ..., "
               "progress: collections.abc.Callable[[str, float], object] | None = None) -> OpenedScene"),
       "Opens a scene by its name: \"default\" (the flat that gsnav makes without data), a file (PLY, "
       "SOG, "
@@ -133,7 +145,7 @@ void bind_scene(nb::module_& m) {
         return views_around(scene, count, width, height, hfov).value();
       },
       nb::arg("scene"), nb::arg("count"), nb::arg("width"), nb::arg("height"), nb::arg("hfov") = 60.0,
-      nb::call_guard<nb::gil_scoped_release>(),
+      nb::call_guard<ReleaseGil>(),
       "`count` cameras on a circle around a scene, looking at its middle. `hfov` in degrees.");
   m.def(
       "framing_camera",
@@ -141,7 +153,7 @@ void bind_scene(nb::module_& m) {
         return framing_camera(scene, width, height, hfov).value();
       },
       nb::arg("scene"), nb::arg("width"), nb::arg("height"), nb::arg("hfov") = 75.0,
-      nb::call_guard<nb::gil_scoped_release>(),
+      nb::call_guard<ReleaseGil>(),
       "A camera that shows a scene. With a NavMesh it stands at eye height on the largest island.");
 }
 

@@ -47,7 +47,7 @@ PythonObservations observe(nb::handle self, const char* what, const F& f) {
   check_fork(s.sim.device(), what);
   Observations seen;
   {
-    nb::gil_scoped_release release;
+    const ReleaseGil release;
     seen = f(s.sim).value();
   }
   return {seen, seen.point_goal, seen.time, image_views(seen.images, self)};
@@ -64,19 +64,19 @@ void make(PythonSimulator* self, const DeviceArg& device, const SceneArg& scene,
           const SimulatorConfig& config) {
   const Device chosen = device.value();
   check_fork(chosen, "Simulator");
-  nb::gil_scoped_release release;
+  const ReleaseGil release;
   new (self) PythonSimulator{Simulator::create(chosen, scene.scene, config).value(), {}};
 }
 
 PythonFrames render(PythonSimulator& s, const Camera& camera, unsigned outputs) {
   const Busy::Hold hold(s.busy, "Simulator.render");
   check_fork(s.sim.device(), "Simulator.render");
-  Frames<float> frames;
+  const Frames<float>* frames = nullptr;
   {
-    nb::gil_scoped_release release;
-    frames = *s.sim.render(camera, outputs).value();
+    const ReleaseGil release;
+    frames = s.sim.render(camera, outputs).value();
   }
-  return python_frames(std::move(frames), true);
+  return python_frames(*frames, true);
 }
 
 void bind_observations(nb::module_& m) {

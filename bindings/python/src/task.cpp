@@ -59,15 +59,30 @@ void bind_actions(nb::module_& m) {
                   "PointNav among people, with penalties for coming near them.");
 }
 
-nb::object colors_to_bytes(nb::ndarray<const float, nb::c_contig, nb::device::cpu> rgb) {
+using Image = nb::ndarray<const float, nb::c_contig, nb::device::cpu>;
+
+std::vector<std::size_t> shape_of(const Image& image) {
   std::vector<std::size_t> shape;
-  for (std::size_t i = 0; i < rgb.ndim(); ++i) shape.push_back(rgb.shape(i));
+  for (std::size_t i = 0; i < image.ndim(); ++i) shape.push_back(image.shape(i));
+  return shape;
+}
+
+/// The numbers of an image. Throws ValueError if they are not aligned.
+std::span<const float> numbers(const Image& image, const char* what) {
+  if (!is_aligned<float>(image.data())) {
+    throw nb::value_error((std::string(what) + ": the array is not aligned; pass a copy of it").c_str());
+  }
+  return {image.data(), image.size()};
+}
+
+nb::object colors_to_bytes(const Image& rgb) {
+  const std::span<const float> colors = numbers(rgb, "to_bytes");
   std::vector<std::uint8_t> bytes(rgb.size());
   {
-    nb::gil_scoped_release release;
-    to_bytes(std::span(rgb.data(), rgb.size()), bytes);
+    const ReleaseGil release;
+    to_bytes(colors, bytes);
   }
-  return array_from(std::move(bytes), shape);
+  return array_from(std::move(bytes), shape_of(rgb));
 }
 
 void bind_sensors(nb::module_& m) {
@@ -111,6 +126,13 @@ void bind_sensors(nb::module_& m) {
   m.def("rgbd_sensors", &rgbd_sensors, nb::arg("height") = 256, nb::arg("width") = 256,
         nb::arg("hfov") = 90.0, nb::arg("position") = Vec3d{0.0, 1.5, 0.0},
         "An RGB and a depth sensor (\"rgb\", \"depth\") at the same position. They share one render.");
+  m.def(
+      "copy_image", [](const Image& i) { return array_copy(numbers(i, "copy_image"), shape_of(i)); },
+      nb::arg("image"),
+      nb::sig("def copy_image(image: numpy.typing.NDArray[numpy.float32]) -> "
+              "numpy.typing.NDArray[numpy.float32]"),
+      "A writable copy of an image, float32 of any shape, aligned to 64 bytes: JAX takes it without a "
+      "copy.");
   m.def(
       "to_bytes", colors_to_bytes, nb::arg("rgb"),
       nb::sig(

@@ -65,7 +65,7 @@ void bind_policies(nb::module_& m) {
           "next",
           [](const GeodesicFollower& f, const WorldView& w) {
             return with(w, "GeodesicFollower.next", [&](const World& world) {
-              nb::gil_scoped_release release;
+              const ReleaseGil release;
               return f.next(world);
             });
           },

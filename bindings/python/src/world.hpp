@@ -11,7 +11,7 @@ namespace gsnav::python {
 
 /// A World of a simulator, which it keeps alive. Each use holds the simulator's flag.
 struct WorldView {
-  nb::object owner;                  ///< The Python object of the simulator.
+  nb::object owner;                  ///< Keeps the simulator alive.
   Busy* busy = nullptr;              ///< Flag of the simulator.
   std::function<const World&()> of;  ///< Returns the world. Throws gsnav::Error if there is none.
 };

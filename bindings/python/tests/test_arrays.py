@@ -89,6 +89,71 @@ def test_observations_are_aligned_and_may_be_changed(envs, people, small):
     assert np.array_equal(ours["rgb"], theirs["rgb"])
 
 
+def test_images_are_aligned(opened, people, small):
+    camera = gsnav.framing_camera(opened, 30, 22)
+    episode = gsnav.generate_episodes(people.navmesh, 1, 1)[0]
+    renderer, simulator, env = gsnav.Renderer("cpu", opened), gsnav.Simulator("cpu", people, small), gsnav.Env(people)
+    outputs = int(gsnav.Output.kRgb | gsnav.Output.kAlpha | gsnav.Output.kMedianDepth)
+    renderer.set_config(gsnav.RenderConfig(outputs=outputs))
+    simulator.reset(episode)
+    frames = [renderer.render(camera), renderer.render([camera, camera]), simulator.render(camera, outputs)]
+    kept = [f.rgb.copy() for f in frames]
+    images = [getattr(f, name) for f in frames for name in ("rgb", "alpha", "median_depth")]
+    images += [image for name, image in env.reset(seed=1)[0].items() if name != "point_goal"]
+    assert all(address(image) % 64 == 0 and image.flags.writeable for image in images)
+    images[0][...] = -1
+    assert np.array_equal(renderer.render(camera).rgb, kept[0])
+    assert np.array_equal(frames[1].rgb, kept[1]) and np.array_equal(frames[2].rgb, kept[2])
+
+
+def test_images_of_a_renderer_share_their_memory_with_jax(opened):
+    library("jax")
+    import jax
+
+    rgb = gsnav.Renderer("cpu", opened).render(gsnav.framing_camera(opened, 30, 22)).rgb
+    assert jax.dlpack.from_dlpack(rgb).unsafe_buffer_pointer() == address(rgb)
+
+
+def unaligned(values):
+    """A copy at an odd address."""
+    values = np.asarray(values)
+    made = np.zeros(values.nbytes + 1, np.uint8)[1:].view(values.dtype).reshape(values.shape)
+    made[...] = values
+    assert not made.flags.aligned
+    return made
+
+
+@pytest.mark.parametrize("kind", [np.int16, np.int32, np.int64, np.uint64])
+def test_unaligned_actions(people, small, envs, kind):
+    own = gsnav.VectorEnv(3, people, config=small)
+    own.reset(seed=1), envs.reset(seed=1)
+    actions = np.array([1, 2, 3], kind)
+    assert np.array_equal(envs.step(unaligned(actions))[0]["rgb"], own.step(actions)[0]["rgb"])
+    ours, theirs = (e.simulator.step(a)["rgb"] for e, a in ((envs, unaligned(actions)), (own, actions)))
+    assert np.array_equal(ours, theirs)
+
+
+def test_actions_in_the_order_of_another_machine_are_named(envs):
+    envs.reset(seed=1)
+    for call in (envs.step, envs.simulator.step):
+        with pytest.raises(TypeError, match="got ndarray of dtype >i4"):
+            call(np.array([1, 2, 3], ">i4"))
+
+
+def test_unaligned_positions_and_images(square):
+    for kind in (np.float32, np.float64):
+        ends = [unaligned(np.array(p, kind)) for p in ([1, 0, 1], [2, 0, 1])]
+        assert square.find_path(*ends).length == 1
+        vertices = np.array([[0, 0, 0], [9, 0, 0], [9, 0, 9]], kind)
+        for index in (np.int32, np.uint32):
+            triangles = np.array([[0, 2, 1]], index)
+            meshes = [gsnav.NavMesh.build(gsnav.NavMeshSettings(), wrap(vertices), wrap(triangles))
+                      for wrap in (np.asarray, unaligned)]
+            assert meshes[0].island_area(0) == meshes[1].island_area(0)
+    with pytest.raises(ValueError, match="to_bytes: the array is not aligned"):
+        gsnav.to_bytes(unaligned(np.zeros((2, 2, 3), np.float32)))
+
+
 def test_memory_of_dead_observations_is_used_again_within_a_bound(envs):
     step = [1, 2, 3]
     one = sum(envs.reset(seed=1)[0][name].nbytes for name in ("rgb", "depth"))

@@ -61,11 +61,16 @@ def read_only(floats):
     return array
 
 
+def unaligned(floats):
+    return np.zeros(4 * floats + 1, np.uint8)[1:].view(np.float32)
+
+
 @pytest.mark.parametrize("wrong, error, message", [
     (lambda f: np.zeros(f), gsnav.InvalidArgument, "float32"),
     (lambda f: np.zeros(2 * f, np.float32)[::2], gsnav.InvalidArgument, "contiguous"),
     (read_only, gsnav.InvalidArgument, "writable"),
     (lambda f: np.zeros(f - 1, np.float32), gsnav.InvalidArgument, r'floats for the sensor "rgb", which needs'),
+    (unaligned, gsnav.InvalidArgument, r'the sensor "rgb" is not aligned to 4 bytes'),
     (lambda f: None, gsnav.InvalidArgument, "returned NoneType"),
     (lambda f: 1 // 0, ZeroDivisionError, "division"),
 ])

@@ -80,3 +80,13 @@ def test_wrong_cameras_leave_the_renderer_usable(opened):
     with pytest.raises(TypeError):
         renderer.render("camera")
     assert renderer.render(camera).rgb.shape == (16, 16, 3)
+
+
+def test_paths_are_names(tmp_path):
+    missing = tmp_path / "none.ply"
+    for call in (gsnav.open_scene, gsnav.Env, lambda path: gsnav.VectorEnv(2, path)):
+        with pytest.raises(FileNotFoundError, match="none.ply: no such file"):
+            call(missing)
+    for wrong in (b"x.ply", 7, None):
+        with pytest.raises(TypeError, match="name must be a str or an os.PathLike"):
+            gsnav.open_scene(wrong)

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <unistd.h>
+
+namespace gsnav::python {
+
+/// Calls f, which takes the GIL. Python before 3.14 ends a thread that asks for the GIL at exit, by
+/// unwinding its stack. That would abort the process where it meets a noexcept function, so the thread
+/// sleeps until the process ends, as it does in later versions.
+template <class F>
+void take_gil(const F& f) noexcept {
+  try {
+    f();
+  } catch (...) {
+    for (;;) pause();
+  }
+}
+
+/// Releases the GIL while it lives.
+class ReleaseGil {
+ public:
+  ReleaseGil() noexcept : state_(PyEval_SaveThread()) {}
+  ReleaseGil(const ReleaseGil&) = delete;
+  ReleaseGil& operator=(const ReleaseGil&) = delete;
+  ~ReleaseGil() {
+    take_gil([this] { PyEval_RestoreThread(state_); });
+  }
+
+ private:
+  PyThreadState* state_;
+};
+
+/// Holds the GIL while it lives.
+class HoldGil {
+ public:
+  HoldGil() noexcept {
+    take_gil([this] { state_ = PyGILState_Ensure(); });
+  }
+  HoldGil(const HoldGil&) = delete;
+  HoldGil& operator=(const HoldGil&) = delete;
+  ~HoldGil() { PyGILState_Release(state_); }
+
+ private:
+  PyGILState_STATE state_{};
+};
+
+}  // namespace gsnav::python
