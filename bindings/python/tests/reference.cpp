@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Steps a BatchSimulator without Python, as the truth for the bits and the speed of the Python package.
-// usage: gsnav_python_reference ENVIRONMENTS SIDE STEPS DENSITY; prints a hash of all images and ms per
-// step
+// usage: gsnav_python_reference ENVIRONMENTS SIDE STEPS DENSITY [rgbd|depth [DEVICE]]
+// It prints a hash of the images of the last step, and ms per step. On a GPU, images stay there, and the
+// hash is 0.
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <string_view>
 #include <vector>
 
 #include "gsnav/demo.hpp"
@@ -27,7 +29,10 @@ std::uint64_t hash(std::uint64_t h, std::span<const float> values) {
 }  // namespace
 
 int main(int argc, char** argv) try {
-  if (argc != 5) return std::fprintf(stderr, "usage: %s ENVIRONMENTS SIDE STEPS DENSITY\n", argv[0]), 2;
+  if (argc < 5 || argc > 7) {
+    std::fprintf(stderr, "usage: %s ENVIRONMENTS SIDE STEPS DENSITY [rgbd|depth [DEVICE]]\n", argv[0]);
+    return 2;
+  }
   const auto environments = static_cast<std::size_t>(std::atoi(argv[1]));
   const int side = std::atoi(argv[2]), steps = std::atoi(argv[3]);
   auto scene = std::make_shared<const gsnav::SimulatorScene>(
@@ -35,8 +40,12 @@ int main(int argc, char** argv) try {
   const auto episodes = gsnav::generate_episodes(*scene->navmesh, 1, 1).value();
   gsnav::BatchConfig config;
   config.sensors = gsnav::rgbd_sensors(side, side);
+  if (argc > 5 && std::string_view(argv[5]) == "depth") config.sensors.erase(config.sensors.begin());
+  const auto device = gsnav::Device::parse(argc > 6 ? argv[6] : "cpu").value();
+  const bool on_gpu = device.kind() == gsnav::DeviceKind::cuda;
+  if (on_gpu) config.images = gsnav::ImageMemory::backend;
   auto sim =
-      gsnav::BatchSimulator::create(gsnav::Device::parse("cpu").value(), {scene}, config, environments,
+      gsnav::BatchSimulator::create(device, {scene}, config, environments,
                                     [&](std::size_t, std::size_t) -> gsnav::Result<gsnav::BatchEpisode> {
                                       return gsnav::BatchEpisode{0, episodes[0]};
                                     })
@@ -52,8 +61,8 @@ int main(int argc, char** argv) try {
     const auto start = std::chrono::steady_clock::now();
     out = sim.step(actions).value();
     seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    if (i + 1 == steps) h = hash(hash(h, out["rgb"].data), out["depth"].data);
   }
+  for (const gsnav::BatchObservation& image : out.images) h = on_gpu ? 0 : hash(h, image.data);
   std::printf("%016llx %.4f\n", static_cast<unsigned long long>(h), 1000 * seconds / steps);
 } catch (const std::exception& e) {
   return std::fprintf(stderr, "%s\n", e.what()), 1;
