@@ -54,7 +54,7 @@ def stage(name: str, agent_radius: float, agent_height: float) -> Stage:
     stem, extension = os.path.splitext(name)
     beside = next((p for p in (stem + ".navmesh", name + ".navmesh") if extension and os.path.isfile(p)), None)
     key = (os.path.abspath(name), _stamp(name), beside, beside and _stamp(beside),
-           None if beside else (agent_radius, agent_height))  # fmt: skip
+           None if beside else (agent_radius, agent_height), _people())  # fmt: skip
     with _lock:
         found = _stages.get(key)
         if found is None:
@@ -62,12 +62,23 @@ def stage(name: str, agent_radius: float, agent_height: float) -> Stage:
         return found
 
 
+def _people() -> int:
+    """GSNAV_PEOPLE: how many procedural people walk in each scene. 0: those that belong to it."""
+    text = os.environ.get("GSNAV_PEOPLE", "0")
+    if not text.isdecimal():
+        raise ValueError(f"GSNAV_PEOPLE = {text}: must be a number of people")
+    return int(text)
+
+
 def _open(gsnav: Any, name: str, beside: str | None, agent_radius: float, agent_height: float) -> Any:
     if beside is not None:
-        return gsnav.open_scene(name, gsnav.OpenOptions(navmesh=beside))
+        return gsnav.open_scene(name, gsnav.OpenOptions(navmesh=beside, people=_people()))
     try:
         return gsnav.open_scene(
-            name, gsnav.OpenOptions(navmesh="auto", agent_radius=agent_radius, agent_height=agent_height)
+            name,
+            gsnav.OpenOptions(
+                navmesh="auto", agent_radius=agent_radius, agent_height=agent_height, people=_people()
+            ),
         )
     except (gsnav.NothingNavigable, gsnav.InvalidArgument) as error:
         logger.warning("%s: no NavMesh: %s", name, error)

@@ -2,17 +2,20 @@
 """The simulator: agents and sensors in a scene, moved on a NavMesh and drawn by gsnav."""
 
 import dataclasses
+import functools
 import os
 import random as _random
 import time
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
 import gsnav_habitat as _shared
+from magnum import Vector3
 
 from . import _draw, _engine
 from ._follower import GreedyGeodesicFollower
+from ._people import TIME_SETTINGS, PeoplePart, _unserved
 from .agent import Agent
 from .agent.agent import AgentState
 from .metadata import MetadataMediator, TemplateManager
@@ -48,6 +51,7 @@ class SimulatorConfiguration:
         self.override_scene_light_defaults = False
         self.pbr_image_based_lighting = False
         self.use_semantic_textures = False
+        self.__dict__.update(TIME_SETTINGS)
 
     def __eq__(self, other: object) -> bool:
         return type(self) is type(other) and self.__dict__ == other.__dict__
@@ -65,15 +69,7 @@ class Configuration:
     enable_batch_renderer: bool = False
 
 
-def _unserved(name: str) -> Any:
-    def call(self: Any, *args: Any, **kwargs: Any) -> NoReturn:
-        raise NotImplementedError(_shared.message(f"habitat_sim.Simulator.{name}"))
-
-    call.__doc__ = "Not served by gsnav: raises NotImplementedError."
-    return call
-
-
-class Simulator:
+class Simulator(PeoplePart):
     """Agents in a scene. A simulator can be used in a with statement."""
 
     def __init__(self, config: Configuration) -> None:
@@ -90,6 +86,7 @@ class Simulator:
         self._graph = SceneGraph()
         self._world_time = 0.0
         self._previous_step_time = 0.0
+        self._step_seconds, self._moved = _STEP, False
         self.metadata_mediator = config.metadata_mediator or MetadataMediator(config.sim_cfg)
         self._open(config)
 
@@ -112,11 +109,12 @@ class Simulator:
         self._stage, self._painter, self.config = stage, _draw.Painter(stage, device), config
         self._graph = SceneGraph()
         self._world_time = 0.0
+        self._open_people()
         self.seed(int(sim_cfg.random_seed))
         self.agents = []
         for agent in config.agents:
             made = Agent(self._graph.get_root_node().create_child(), agent)
-            made.controls.move_filter_fn = self.step_filter
+            made.controls.move_filter_fn = functools.partial(self._filter, len(self.agents))
             self.agents.append(made)
         for agent_id in range(len(self.agents)):
             self.initialize_agent(agent_id)
@@ -177,11 +175,13 @@ class Simulator:
 
     # ---- Steps
     def reset(self, agent_ids: Any = None) -> Any:
-        """Puts agents back to their initial states. Returns the observations of the default agent, or, for a list
-        of agents, a dict of observations."""
+        """Puts agents back to their initial states and clocks to 0. Returns the observations of the default
+        agent, or, for a list of agents, a dict of observations."""
         for agent in self.agents:
             if agent.initial_state is not None:
                 agent.set_state(agent.initial_state)
+        self._world_time = 0.0
+        self._reset_people()
         return self.get_sensor_observations(self.config.sim_cfg.default_agent_id if agent_ids is None else agent_ids)
 
     def step(self, action: Any, dt: float = _STEP) -> Any:
@@ -194,8 +194,15 @@ class Simulator:
         default = self.config.sim_cfg.default_agent_id
         actions = {default: action} if single else action
         start = time.time()
-        collided = {agent_id: self.get_agent(agent_id).act(a) for agent_id, a in actions.items()}
-        self._world_time += _action_seconds() or dt
+        self._step_seconds = _action_seconds() or dt
+        collided = {}
+        for agent_id, a in actions.items():
+            self._begin_people(agent_id)
+            self._moved = False
+            collided[agent_id] = self.get_agent(agent_id).act(a)
+            if not self._moved:
+                self._stand_people(self._step_seconds, [agent_id])
+        self._advance(self._step_seconds)
         seen = self.get_sensor_observations(list(actions))
         for agent_id, hit in collided.items():
             seen[agent_id]["collided"] = hit
@@ -210,14 +217,24 @@ class Simulator:
         step = finder.try_step if self.config.sim_cfg.allow_sliding else finder.try_step_no_sliding
         return step(start_pos, end_pos)
 
+    def _filter(self, agent_id: int, start_pos: Any, end_pos: Any) -> Any:
+        self._moved = True
+        reached = self._move_people(agent_id, start_pos, end_pos, self._step_seconds)
+        return self.step_filter(start_pos, end_pos) if reached is None else Vector3(*reached)
+
+    def _advance(self, seconds: float) -> None:
+        self._world_time += seconds
+        self._clock.advance(seconds)
+
     def step_physics(self, dt: float, scene_id: int = 0) -> None:
         """Advances the clock by `dt` seconds. With GSNAV_ACTION_SECONDS, `step` has done so."""
         if _action_seconds() is None:
-            self._world_time += dt
+            self._stand_people(dt, range(len(self.agents)))
+            self._advance(dt)
 
     def step_world(self, dt: float = _STEP) -> float:
         """Advances the clock by `dt` seconds and returns it."""
-        self._world_time += dt
+        self._advance(dt)
         return self._world_time
 
     def get_world_time(self) -> float:
@@ -244,7 +261,7 @@ class Simulator:
             raise RuntimeError("Simulator: it was closed; call reconfigure")
         for sensor in sensors:
             sensor._simulator = self
-        return self._painter.draw(sensors, self._world_time)
+        return self._painter.draw(sensors, self._clock.gaussian_time)
 
     def get_sensor_observations(self, agent_ids: Any = 0) -> Any:
         """Images of an agent's sensors by their names, or, for a list of agents, a dict of them.

@@ -20,6 +20,7 @@ void bind_world(nb::module_& m);
 void bind_simulator(nb::module_& m);
 void bind_device_array(nb::module_& m);
 void bind_batch(nb::module_& m);
+void bind_avatar_tracker(nb::module_& m);
 void bind_habitat(nb::module_& m);
 
 }  // namespace gsnav::python

@@ -29,4 +29,5 @@ NB_MODULE(_gsnav, m) {
   bind_device_array(m);
   bind_batch(m);
   bind_habitat(m);
+  bind_avatar_tracker(m);
 }

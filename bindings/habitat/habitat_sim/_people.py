@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: Apache-2.0
+"""People of a scene: the part of a simulator that has the names of Habitat-GS, and metrics of agents among people."""
+
+import math
+from typing import Any, NoReturn
+
+import gsnav_habitat as _shared
+
+from . import _engine
+
+# Settings of the scene's clock with their defaults. Times in seconds.
+TIME_SETTINGS = {
+    "gaussian_time": 0.0,
+    "gaussian_auto_play": True,
+    "gaussian_time_min": 0.0,
+    "gaussian_time_max": 0.0,
+    "gaussian_time_step": 0.0,
+    "gaussian_time_loop": True,
+}
+
+
+def _triple(point: Any) -> list[float]:
+    return [float(x) for x in point]
+
+
+class Clock:
+    """Time of moving Gaussians in seconds: from `gaussian_time_min` to `gaussian_time_max`, if that is larger.
+
+    At the end it starts again if `gaussian_time_loop` is set, and else it stays there.
+    """
+
+    def __init__(self, settings: Any) -> None:
+        for name, default in TIME_SETTINGS.items():
+            value = type(default)(getattr(settings, name, default))
+            if not math.isfinite(value):
+                raise ValueError(f"SimulatorConfiguration.{name} = {value}: must be finite")
+            setattr(self, name, value)
+        self.gaussian_time = self.within(self.gaussian_time)
+
+    def within(self, time: float) -> float:
+        """A time as the clock shows it."""
+        low, high = self.gaussian_time_min, self.gaussian_time_max
+        if high <= low:
+            return time
+        if self.gaussian_time_loop:
+            return low + (time - low) % (high - low)
+        return min(max(time, low), high)
+
+    def advance(self, seconds: float) -> None:
+        """Lets time pass if `gaussian_auto_play` is set."""
+        if self.gaussian_auto_play:
+            self.gaussian_time = self.within(self.gaussian_time + seconds)
+
+
+class PeoplePart:
+    """Base of the simulator: clock, queries and metrics of agents among people. Lengths in metres."""
+
+    _clock: Clock
+    _trackers: dict[int, Any]
+    config: Any
+    pathfinder: Any
+    agents: Any
+    _stage: Any
+
+    def _open_people(self) -> None:
+        self._clock = Clock(self.config.sim_cfg)
+        self._trackers = {}
+
+    def _tracker(self, agent_id: int) -> Any:
+        """The agent's tracker on the present NavMesh, or None in a scene without people or NavMesh."""
+        scene, mesh = (None, None) if self._stage is None else (self._stage.scene, self.pathfinder._mesh)
+        if scene is None or mesh is None or scene.avatar_count == 0:
+            return None
+        found = self._trackers.get(agent_id)
+        if found is None or found[0] is not mesh:
+            gsnav, body = _engine.library(), self.agents[agent_id].agent_config
+            made = gsnav.AvatarTracker(gsnav.SimulatorScene(scene, mesh), float(body.radius), float(body.height))
+            found = self._trackers[agent_id] = (mesh, made)
+        return found[1]
+
+    def _begin_people(self, agent_id: int) -> None:
+        tracker = self._tracker(agent_id)
+        if tracker is not None:
+            tracker.begin_action()
+
+    def _move_people(self, agent_id: int, start: Any, end: Any, seconds: float) -> Any:
+        """Position that a move among people reaches while `seconds` pass; None in a scene without people."""
+        tracker = self._tracker(agent_id)
+        if tracker is None:
+            return None
+        now = self._clock.gaussian_time
+        later = now + (seconds if self._clock.gaussian_auto_play else 0.0)
+        return tracker.move(_triple(start), _triple(end), now, later, bool(self.config.sim_cfg.allow_sliding))
+
+    def _stand_people(self, seconds: float, agent_ids: Any) -> None:
+        for agent_id in agent_ids:
+            if self._tracker(agent_id) is not None:
+                at = self.agents[agent_id].state.position
+                self._move_people(agent_id, at, at, seconds)
+
+    def _reset_people(self) -> None:
+        self._clock.gaussian_time = self._clock.within(0.0)
+        for _, tracker in self._trackers.values():
+            tracker.reset()
+
+    # ---- What measures of habitat-lab read
+    def avatar_metrics(self, agent_id: int = 0) -> Any:
+        """gsnav.EpisodeMetrics of an agent since the last reset; those of a goal are 0. None without people."""
+        tracker = self._tracker(agent_id)
+        return None if tracker is None else tracker.metrics()
+
+    def avatar_step(self, agent_id: int = 0) -> tuple[float, bool]:
+        """Smallest distance to a person in the last action, and whether a person was touched or stopped it."""
+        tracker = self._tracker(agent_id)
+        return (math.inf, False) if tracker is None else (tracker.action_clearance, tracker.action_collided)
+
+    # ---- Names of Habitat-GS
+    def distance_to_avatar_proxy_capsules(
+        self, agent_base_pos: Any, agent_radius: float = -1.0, agent_height: float = -1.0
+    ) -> float:
+        """Distance from the surface of an agent at a position to the nearest person, negative in overlap, infinite
+        without people. A size that is not positive is that of the default agent."""
+        tracker = self._tracker(self.config.sim_cfg.default_agent_id)
+        if tracker is None:
+            return math.inf
+        return tracker.distance(_triple(agent_base_pos), self._clock.gaussian_time, agent_radius, agent_height)
+
+    def is_step_blocked_by_avatar_proxy_capsules(
+        self, start: Any, end: Any, allow_sliding: bool = True, agent_radius: float = -1.0,
+        agent_height: float = -1.0, block_eps: float = 1e-5,
+    ) -> bool:  # fmt: skip
+        """Whether a person, standing as now, would stop or deflect a move. The contact is exact: `block_eps` has no
+        effect."""
+        tracker = self._tracker(self.config.sim_cfg.default_agent_id)
+        if tracker is None:
+            return False
+        return tracker.blocked(
+            _triple(start), _triple(end), self._clock.gaussian_time, allow_sliding, agent_radius, agent_height
+        )
+
+    def get_gaussian_avatar_ids(self) -> list[int]:
+        """Numbers of the people."""
+        scene = None if self._stage is None else self._stage.scene
+        return [] if scene is None else list(range(scene.avatar_count))
+
+    @property
+    def gaussian_duration(self) -> float:
+        """Seconds from gaussian_time_min to gaussian_time_max."""
+        return max(0.0, self._clock.gaussian_time_max - self._clock.gaussian_time_min)
+
+    @property
+    def gaussian_interval(self) -> tuple[float, float]:
+        """gaussian_time_min and gaussian_time_max, seconds."""
+        return self._clock.gaussian_time_min, self._clock.gaussian_time_max
+
+
+def _setting(name: str) -> property:
+    def read(self: Any) -> Any:
+        return getattr(self._clock, name)
+
+    def write(self: Any, value: Any) -> None:
+        value = type(TIME_SETTINGS[name])(value)
+        if not math.isfinite(value):
+            raise ValueError(f"Simulator.{name} = {value}: must be finite")
+        setattr(self._clock, name, self._clock.within(value) if name == "gaussian_time" else value)
+
+    return property(read, write, doc=f"{name} of the scene's clock. gaussian_time_step has no effect.")
+
+
+def _unserved(name: str) -> Any:
+    def call(self: Any, *args: Any, **kwargs: Any) -> NoReturn:
+        raise NotImplementedError(_shared.message(f"habitat_sim.Simulator.{name}"))
+
+    call.__doc__ = "Not served by gsnav: raises NotImplementedError."
+    return call
+
+
+for _name in TIME_SETTINGS:
+    setattr(PeoplePart, _name, _setting(_name))
+for _name in ("set_gaussian_avatar_visible", "update_gaussian_avatar", "update_gaussian_avatar_pose",
+              "update_gaussian_avatar_attributes", "update_gaussian_avatar_bounds", "set_navmesh_dynamic_capsules",
+              "clear_navmesh_dynamic_capsules"):  # fmt: skip
+    setattr(PeoplePart, _name, _unserved(_name))

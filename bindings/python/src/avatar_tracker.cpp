@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+// Moves and metrics among people for the distribution gsnav-habitat, whose agents and clock are free.
+#include <nanobind/stl/shared_ptr.h>
+
+#include <limits>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "bind.hpp"
+#include "fields.hpp"
+#include "gsnav/detail/sim/proximity.hpp"
+#include "gsnav/detail/sim/reward.hpp"
+#include "gsnav/nav.hpp"
+#include "gsnav/sim.hpp"
+
+namespace gsnav::python {
+namespace {
+
+/// An agent among the people of a scene. The rules are those of step(), closest_approach() and
+/// EpisodeTracker. An action is a number of moves.
+class AvatarTracker {
+ public:
+  AvatarTracker(std::shared_ptr<const SimulatorScene> scene, double radius, double height)
+      : scene_(std::move(scene)), radius_(radius), height_(height) {
+    if (scene_->navmesh == nullptr) fail("scene has no NavMesh");
+    if (!is_finite(radius) || radius < 0) fail("radius = " + std::to_string(radius) + ": must be >= 0");
+    if (!is_finite(height) || height < 0) fail("height = " + std::to_string(height) + ": must be >= 0");
+  }
+
+  void reset() { tracker_.reset(0.0), begun_ = false; }
+
+  void begin_action() {
+    if (begun_) tracker_.add(record());
+    begun_ = true;
+    action_ = {};
+    nearest_.clear();
+    distances_.clear();
+  }
+
+  Vec3d move(const Vec3d& start, const Vec3d& end, double t0, double t1, bool slide) {
+    const CapsuleSet bodies = bodies_in(t0, t1);
+    const NavMesh& mesh = *scene_->navmesh;
+    const std::optional<NavPoint> from = mesh.snap_point(start);
+    if (!from || !is_finite(end)) return start;
+    const AgentState agent{from->position, radius_, height_, from->poly};
+    const StepResult r = step(mesh, agent, end - from->position, bodies, {.slide = slide});
+    if (r.blocked_by == BlockedBy::invalid) return start;
+    closest_approach(r.path, radius_, height_, bodies, near_now_);
+    for (std::size_t g = 0; g < near_now_.size(); ++g) {
+      const auto avatar = bodies.capsules_of(bodies.groups()[g])[0].avatar;
+      const auto [at, fresh] = nearest_.try_emplace(avatar, near_now_[g]);
+      if (!fresh) at->second = min(at->second, near_now_[g]);
+      if (near_now_[g] <= 0) action_.avatar_contact = true;
+    }
+    action_.moved += norm(r.position - start);
+    action_.wall_collision = action_.wall_collision || r.hit_wall;
+    action_.capsule_blocked = action_.capsule_blocked || r.blocked_by == BlockedBy::capsule;
+    action_.avatar_contact = action_.avatar_contact || r.pushed_into;
+    return r.position;
+  }
+
+  double distance(const Vec3d& base, double time, double radius, double height) const {
+    const CapsuleSet now = bodies_in(time, time);
+    return clearance({base, radius > 0 ? radius : radius_, height > 0 ? height : height_}, now, time).distance;
+  }
+
+  bool blocked(const Vec3d& start, const Vec3d& end, double time, bool slide, double radius,
+               double height) const {
+    const CapsuleSet now = bodies_in(time, time);
+    const std::optional<NavPoint> from = scene_->navmesh->snap_point(start);
+    if (!from || !is_finite(end)) return false;
+    const AgentState agent{from->position, radius > 0 ? radius : radius_, height > 0 ? height : height_,
+                           from->poly};
+    const StepResult r = step(*scene_->navmesh, agent, end - from->position, now, {.slide = slide});
+    return r.blocked_by == BlockedBy::capsule;
+  }
+
+  EpisodeMetrics metrics() {
+    EpisodeTracker now = tracker_;
+    if (begun_) now.add(record());
+    return now.finish(false, 0.0, 0.0, 0.0);
+  }
+
+  double action_clearance() const {
+    double least = std::numeric_limits<double>::infinity();
+    for (const auto& [avatar, d] : nearest_) least = min(least, d);
+    return least;
+  }
+
+  bool action_collided() const { return action_.avatar_contact || action_.capsule_blocked; }
+
+ private:
+  [[noreturn]] static void fail(const std::string& what) {
+    Status(Errc::invalid_argument, "AvatarTracker: " + what).throw_if_error();
+    throw std::logic_error(what);
+  }
+
+  StepRecord record() {
+    distances_.clear();
+    for (const auto& [avatar, d] : nearest_) distances_.push_back(d);
+    StepRecord made = action_;
+    made.avatar_distances = distances_;
+    return made;
+  }
+
+  CapsuleSet bodies_in(double t0, double t1) const {
+    std::vector<DynamicCapsule> capsules;
+    append_bodies(*scene_, t0, t1, capsules);
+    return CapsuleSet::create(std::move(capsules), t0, t1).value();
+  }
+
+  std::shared_ptr<const SimulatorScene> scene_;
+  double radius_, height_;
+  EpisodeTracker tracker_;
+  bool begun_ = false;
+  StepRecord action_{};                      // Without distances.
+  std::map<std::uint32_t, double> nearest_;  // Smallest distance to each avatar in this action, metres.
+  std::vector<double> distances_, near_now_;
+};
+
+}  // namespace
+
+void bind_avatar_tracker(nb::module_& m) {
+  using A = AvatarTracker;
+  nb::class_<A>(m, "AvatarTracker",
+                "An agent among the people of a scene, with its metrics. It moves by calls of `move`, at any "
+                "times on the scene's clock. Use it from one thread at a time.")
+      .def(
+          "__init__",
+          [](A* self, const SceneArg& scene, double radius, double height) {
+            new (self) A(scene.scene, radius, height);
+          },
+          nb::arg("scene"), nb::arg("radius") = 0.1, nb::arg("height") = 1.5,
+          "Prepares an agent of a radius and a height in metres. Raises InvalidArgument naming the value, "
+          "or if the scene has no NavMesh.")
+      .def("reset", &A::reset, "Begins an episode.")
+      .def("begin_action", &A::begin_action, "Ends the action, if there is one, and begins another.")
+      .def("move", &A::move, nb::arg("start"), nb::arg("end"), nb::arg("t0"), nb::arg("t1"),
+           nb::arg("slide") = true,
+           "Walks from a point towards another during [t0, t1], seconds, and stops at walls and people. "
+           "Returns the position that is reached, shape [3]: `start` if it is off the NavMesh. "
+           "Equal points let the agent stand.")
+      .def("distance", &A::distance, nb::arg("position"), nb::arg("time"), nb::arg("radius") = -1.0,
+           nb::arg("height") = -1.0,
+           "Distance in metres from the surface of an agent at a position to the nearest person, negative "
+           "in overlap; infinite without people. A size <= 0 is that of the constructor.")
+      .def("blocked", &A::blocked, nb::arg("start"), nb::arg("end"), nb::arg("time"),
+           nb::arg("slide") = true, nb::arg("radius") = -1.0, nb::arg("height") = -1.0,
+           "Whether a person who stands as at a time would stop or deflect a move.")
+      .def("metrics", &A::metrics,
+           "Metrics of the actions since reset(). Those of a goal are 0, because there is none.")
+      .def_prop_ro("action_clearance", &A::action_clearance,
+                   "Smallest distance to a person in this action, metres.")
+      .def_prop_ro("action_collided", &A::action_collided,
+                   "Counted by CR: in this action a person was touched or stopped a move.");
+  m.def(
+      "step_reward",
+      [](const RewardConfig& weights, double before, double after, bool success, double clearance, bool human,
+         bool wall) {
+        return step_reward(weights, {before, after, success, clearance, human, wall});
+      },
+      nb::arg("weights"), nb::arg("before"), nb::arg("after"), nb::arg("success"),
+      nb::arg("avatar_clearance"), nb::arg("human_collision"), nb::arg("wall_collision"),
+      "Reward of one action: distances to the goal before and after it and to the nearest person, metres.");
+}
+
+}  // namespace gsnav::python
