@@ -55,6 +55,11 @@ def claim() -> None:
         )
 
 
+def config_path(name: str) -> str:
+    """Path of one of the distribution's configurations for habitat-lab."""
+    return os.path.join(os.path.dirname(os.path.abspath(__file__)), "config", name)
+
+
 def message(name: str) -> str:
     """Text of the error for a name that is not served."""
     return f"gsnav serves navigation only: {name}"

@@ -2,6 +2,7 @@
 """People of a scene: the part of a simulator that has the names of Habitat-GS, and metrics of agents among people."""
 
 import math
+import sys
 from typing import Any, NoReturn
 
 import gsnav_habitat as _shared
@@ -65,6 +66,9 @@ class PeoplePart:
     def _open_people(self) -> None:
         self._clock = Clock(self.config.sim_cfg)
         self._trackers = {}
+        if "habitat.core.registry" in sys.modules and "habitat.tasks.nav.nav" in sys.modules:
+            # Registers measures. Worker processes import nothing else of this distribution, so it is done here.
+            from gsnav_habitat import measures  # noqa: F401
 
     def _tracker(self, agent_id: int) -> Any:
         """The agent's tracker on the present NavMesh, or None in a scene without people or NavMesh."""

@@ -62,7 +62,8 @@ class AvatarTracker {
 
   double distance(const Vec3d& base, double time, double radius, double height) const {
     const CapsuleSet now = bodies_in(time, time);
-    return clearance({base, radius > 0 ? radius : radius_, height > 0 ? height : height_}, now, time).distance;
+    return clearance({base, radius > 0 ? radius : radius_, height > 0 ? height : height_}, now, time)
+        .distance;
   }
 
   bool blocked(const Vec3d& start, const Vec3d& end, double time, bool slide, double radius,
@@ -123,16 +124,18 @@ class AvatarTracker {
 
 void bind_avatar_tracker(nb::module_& m) {
   using A = AvatarTracker;
-  nb::class_<A>(m, "AvatarTracker",
-                "An agent among the people of a scene, with its metrics. It moves by calls of `move`, at any "
-                "times on the scene's clock. Use it from one thread at a time.")
+  nb::class_<A>(
+      m, "AvatarTracker",
+      "An agent among the people of a scene, with its metrics. It moves by calls of `move`, at any "
+      "times on the scene's clock. Use it from one thread at a time.")
       .def(
           "__init__",
           [](A* self, const SceneArg& scene, double radius, double height) {
             new (self) A(scene.scene, radius, height);
           },
           nb::arg("scene"), nb::arg("radius") = 0.1, nb::arg("height") = 1.5,
-          "Prepares an agent of a radius and a height in metres. Raises InvalidArgument naming the value, "
+          "Prepares an agent of a radius and a height in metres. Raises InvalidArgument naming the "
+          "value, "
           "or if the scene has no NavMesh.")
       .def("reset", &A::reset, "Begins an episode.")
       .def("begin_action", &A::begin_action, "Ends the action, if there is one, and begins another.")
@@ -143,7 +146,8 @@ void bind_avatar_tracker(nb::module_& m) {
            "Equal points let the agent stand.")
       .def("distance", &A::distance, nb::arg("position"), nb::arg("time"), nb::arg("radius") = -1.0,
            nb::arg("height") = -1.0,
-           "Distance in metres from the surface of an agent at a position to the nearest person, negative "
+           "Distance in metres from the surface of an agent at a position to the nearest person, "
+           "negative "
            "in overlap; infinite without people. A size <= 0 is that of the constructor.")
       .def("blocked", &A::blocked, nb::arg("start"), nb::arg("end"), nb::arg("time"),
            nb::arg("slide") = true, nb::arg("radius") = -1.0, nb::arg("height") = -1.0,
@@ -156,13 +160,14 @@ void bind_avatar_tracker(nb::module_& m) {
                    "Counted by CR: in this action a person was touched or stopped a move.");
   m.def(
       "step_reward",
-      [](const RewardConfig& weights, double before, double after, bool success, double clearance, bool human,
-         bool wall) {
+      [](const RewardConfig& weights, double before, double after, bool success, double clearance,
+         bool human, bool wall) {
         return step_reward(weights, {before, after, success, clearance, human, wall});
       },
       nb::arg("weights"), nb::arg("before"), nb::arg("after"), nb::arg("success"),
       nb::arg("avatar_clearance"), nb::arg("human_collision"), nb::arg("wall_collision"),
-      "Reward of one action: distances to the goal before and after it and to the nearest person, metres.");
+      "Reward of one action: distances to the goal before and after it and to the nearest person, "
+      "metres.");
 }
 
 }  // namespace gsnav::python

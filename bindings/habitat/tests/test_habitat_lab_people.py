@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What gsnav adds to habitat-lab: measures of people and environments in one process. Skipped without habitat-lab."""
+
+import importlib.util
+import pathlib
+
+import pytest
+
+for _name in ("habitat", "gsnav"):
+    if importlib.util.find_spec(_name) is None:
+        pytest.skip(f"{_name} is not installed", allow_module_level=True)
+from test_habitat_lab import overrides_of, run_module  # noqa: E402
+
+pytestmark = pytest.mark.filterwarnings("default")
+SMALL = [
+    f"habitat.simulator.agents.main_agent.sim_sensors.{s}_sensor.{k}=16"
+    for s in ("rgb", "depth")
+    for k in ("width", "height")
+]
+
+
+def need_baselines():
+    for name in ("torch", "habitat_baselines"):
+        if importlib.util.find_spec(name) is None:
+            pytest.skip(f"{name} is not installed")
+
+
+def test_measures_and_reward_are_those_of_the_simulator(pack, monkeypatch):
+    import gsnav
+    import habitat
+    from gsnav.habitat import avatar_pointnav_config
+    from habitat.gym import make_gym_from_config
+
+    monkeypatch.setenv("GSNAV_PEOPLE", "3")
+    monkeypatch.setenv("GSNAV_ACTION_SECONDS", "0.25")
+    config = habitat.get_config(avatar_pointnav_config(), overrides=[*overrides_of(pack), *SMALL])
+    env = make_gym_from_config(config)
+    sim = env.unwrapped.habitat_env.sim
+    weights = gsnav.TaskConfig.avatar_pointnav().reward
+    env.reset()
+    before, intrusions, hits = env.unwrapped.habitat_env.get_metrics()["distance_to_goal"], [], []
+    for i in range(40):
+        _, reward, _, info = env.step(1 if i % 4 else 2)
+        gap, hit = sim.avatar_step()
+        hits.append(hit)
+        intrusions.append(min(max(1 - gap, 0), 1))
+        want = before - info["distance_to_goal"] - weights.proximity * intrusions[-1] - weights.collision * hit
+        before = info["distance_to_goal"]
+        assert info["avatar_navigation_reward"] == pytest.approx(want, abs=1e-9)
+        assert reward == pytest.approx(want + config.habitat.task.slack_reward, abs=1e-9)
+        assert info["collision_rate"] == pytest.approx(sum(hits) / (i + 1))
+        # The mean over three people is at least a third of that of the nearest.
+        mean = sum(intrusions) / (i + 1)
+        assert mean / 3 - 1e-9 <= info["personal_space_intrusion"] <= mean + 1e-9
+        assert info["human_collision"] in (0.0, 1.0)
+    assert env.reset() is not None and sim.avatar_metrics().steps == 0
+    env.close()
+
+
+def test_one_process_gives_the_bits_of_forkserver_workers(pack, tmp_path):
+    need_baselines()
+    script = str(pathlib.Path(__file__).parent / "compare_vector_envs.py")
+    text = run_module([script, "40", *overrides_of(pack), "habitat_baselines.num_environments=2", *SMALL], tmp_path)
+    assert "episodes agree" in text and "bits agree" in text
