@@ -5,7 +5,11 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
+#include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "bind.hpp"
 #include "fields.hpp"
