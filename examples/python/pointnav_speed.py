@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Measures the steps per second of train_pointnav.py's environments, without an agent.
+
+    python examples/python/pointnav_speed.py --environments 256 --density 0.05
+    python examples/python/pointnav_speed.py --people 5
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+
+import numpy as np
+
+import gsnav
+from pointnav_agent import TRAIN_SEEDS, Draw, Worlds, device_of, world_arguments
+
+
+def main() -> None:
+    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    world_arguments(p)
+    p.add_argument("--flats", type=int, default=64, choices=range(1, 65), metavar="1..64", help="number of flats")
+    p.add_argument("--environments", type=int, default=256, help="number of environments")
+    p.add_argument("--steps", type=int, default=200, help="steps of all environments per run")
+    p.add_argument("--runs", type=int, default=5, help="number of runs; the first one is not counted")
+    p.add_argument("--seed", type=int, default=1, help="seed of episodes and actions")
+    args = p.parse_args()
+    if min(args.environments, args.steps) < 1 or args.runs < 2:
+        p.error("--environments and --steps must be 1 or more, --runs 2 or more")
+    args.device, _ = device_of(args.device)
+
+    print(f"{args.flats} flats ...", flush=True)
+    worlds = Worlds(TRAIN_SEEDS[:args.flats], args, episodes=100)
+    simulator = worlds.simulator(args, args.environments, not args.blind, Draw(worlds, args.seed, 0))
+    # Mostly forward, as trained agents go; nobody stops.
+    actions = np.random.default_rng(args.seed).choice(
+        [int(gsnav.Action.move_forward)] * 2 + [int(gsnav.Action.turn_left), int(gsnav.Action.turn_right)],
+        (args.steps, args.environments))
+    simulator.reset()
+    rates = []
+    for _ in range(args.runs):
+        begin = time.perf_counter()
+        for row in actions:
+            simulator.step(row)
+        rates.append(args.steps * args.environments / (time.perf_counter() - begin))
+    rates = rates[1:]
+    print(f"{args.device}: {statistics.median(rates):,.0f} environment steps/s, median of {len(rates)} runs "
+          f"({min(rates):,.0f} to {max(rates):,.0f}); {args.environments} environments, {args.people} people per flat, "
+          f"{'no images' if args.blind else f'depth {args.size}x{args.size}'}, density {args.density}")
+
+
+if __name__ == "__main__":
+    main()
