@@ -108,8 +108,8 @@ struct SurfaceMesh {
   /// Whether triangles are drawn from behind too.
   bool two_sided = false;
   bool unlit = false;                        ///< Whether the colour is drawn as it is, without shading.
-  MeshAlpha alpha_mode = MeshAlpha::opaque;  ///< How alpha is used: the product of base_alpha, the
-                                             ///< vertex's and the texture's alpha.
+  MeshAlpha alpha_mode = MeshAlpha::opaque;  ///< How the surface's alpha is used. It is the product of
+                                             ///< base_alpha, the vertex's and the texture's alpha.
   float base_alpha = 1;                      ///< Alpha of the material, in [0, 1].
   float alpha_cutoff = 0.5f;  ///< For MeshAlpha::mask: the surface has a hole where alpha is lower.
   std::vector<float> alphas;  ///< One for each vertex, in [0, 1]. Empty: 1.

@@ -179,7 +179,7 @@ inline Status validate(const VisibleSettings& s) {
 
 namespace detail {
 
-/// Fills out.keys with the cells that a viewpoint is in or within 5 cm (world) of. out.cell must be set.
+/// Sets out.keys to the cells within 5 cm (world) of a viewpoint. Their size, out.cell, must be set.
 /// Returns the viewpoints in the asset's frame. Error: invalid_argument for a viewpoint that is not
 /// finite or too far away.
 inline Result<std::vector<Vec3d>> find_cells(VisibleSets& out, std::span<const Vec3d> viewpoints,

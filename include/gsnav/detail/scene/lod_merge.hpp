@@ -79,9 +79,9 @@ inline LodGaussian moment_match(const LodGaussian& a, const LodGaussian& b) noex
   return m;
 }
 
-/// Light that both of two Gaussians take, in units of LodGaussian::mass. It is the integral of the
-/// product of their alphas over the plane across `n` (unit), divided by 2 pi. An alpha is the opacity
-/// (mass / area) times exp(-q / 2).
+/// Measure of how much two Gaussians cover each other, seen along `n` (unit), in units of
+/// LodGaussian::mass. It is the integral of the product of their alphas over the plane perpendicular to
+/// `n`, divided by 2 pi. An alpha is the opacity (mass / area) times exp(-q / 2).
 inline double lod_overlap(const LodGaussian& a, const LodGaussian& b, const Vec3d& n) noexcept {
   const Vec3d any = std::abs(n.x) < 0.6 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0};
   Vec3d u = cross(n, any);

@@ -40,7 +40,7 @@ class SemanticPasses {
     }
   }
 
-  /// The sets, coloured for pass `pass`. They point into this object.
+  /// The sets in the colours of a pass: three white, the others black. They point into this object.
   std::vector<GaussianSet> recolored(std::span<const GaussianSet> sets, std::size_t pass) const {
     std::vector<GaussianSet> out(sets.begin(), sets.end());
     for (std::size_t i = 0; i < out.size(); ++i) {
