@@ -31,7 +31,7 @@ const char kDescription[] =
     "backend, "
     "turns each knob by itself, and judges every image by float64 oracles; skinning, capsule sweeps and "
     "kernel "
-    "benchmarks likewise. Writes OUT/report.csv (one row a measurement), OUT/images and "
+    "benchmarks likewise. Writes OUT/report.csv (one row per measurement), OUT/images and "
     "OUT/report.html. "
     "References are kept by content hash, so that a second run is fast; Ctrl-C leaves a valid CSV that "
     "--resume continues.";
@@ -56,7 +56,7 @@ void add_scenes(CLI::App& app, Options& o, std::vector<std::string>& sizes, std:
       "SCENE=FILE: visible sets of a scene, written by gsnav-navmesh --visible-sets; adds the profile "
       "visible, which is fast with only the Gaussians that are visible from the view's cell. "
       "Repeatable");
-  app.add_option("--views", o.views, "Views a scene, spread over its cameras")
+  app.add_option("--views", o.views, "Views per scene, spread over its cameras")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   app.add_option("--sizes", sizes, "Image sizes, WIDTHxHEIGHT,...")
@@ -95,14 +95,14 @@ void add_kinds_of_rows(CLI::App& app, Options& o, std::vector<std::string>& orac
                  "Only these values of the knobs, as the CSV has them: packed, 1e-3, ...")
       ->delimiter(',');
   list("--oracles", oracles, oracles,
-       "Judges: contract of all rows, the others of those that they say something of");
+       "Judges: `contract` judges all rows, the others those that they have a rule for");
 }
 
 void add_run(CLI::App& app, Options& o) {
   app.add_option("--threads", o.threads,
                  "Threads of the openmp backend and of the oracles; 0: OMP_NUM_THREADS")
       ->check(CLI::Range(0, 1024));
-  app.add_option("--runs", o.runs, "Timed runs a setting")
+  app.add_option("--runs", o.runs, "Timed runs per setting")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   app.add_option("--max-seconds", o.max_seconds, "Time spent on timing one setting, three runs at least")

@@ -67,9 +67,9 @@ void print_table(const Options& options, const SceneFacts& facts,
   row("PSC", s.psc);
   row("H-Coll (episodes with a touch)", s.human_collision_episode_rate);
   row("episodes with avatar contact", s.disturbed_episode_rate);
-  row("wall collisions an episode", s.collisions, "%10.1f");
+  row("wall collisions per episode", s.collisions, "%10.1f");
   row("least clearance to an avatar (m)", s.min_clearance);
-  row("episodes in which one walked into us", static_cast<double>(pushed), "%10.0f");
+  row("episodes with a touch by an avatar", static_cast<double>(pushed), "%10.0f");
   row("steps/s (physics + RGB-D)",
       t.physics + t.render > 0 ? static_cast<double>(t.steps) / (t.physics + t.render) : 0.0, "%10.1f");
   row("render (ms, RGB-D in one pass)", 1e3 * per(t.render, t.renders), "%10.2f");

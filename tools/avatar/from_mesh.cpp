@@ -92,7 +92,7 @@ Status write_driver(const MeshCommand& c, const AvatarAsset& asset, const Motion
       row.push_back({globals[p.joint] * p.p0, globals[p.joint] * p.p1, p.radius});
   }
   if (Status s = io::save_driver(c.driver, frames); !s) return s;
-  std::printf("%s: %zu frames at %g a second, %zu capsules\n", printable(c.driver).c_str(), count,
+  std::printf("%s: %zu frames at %g per second, %zu capsules\n", printable(c.driver).c_str(), count,
               frames.frame_rate, asset.capsules.size());
   return {};
 }

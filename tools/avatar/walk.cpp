@@ -67,8 +67,8 @@ Result<WalkPath> lay_path(const NavMesh& mesh, const WalkCommand& c) {
 }
 
 void print_slide(const std::string& when, const FootSlide& s) {
-  std::printf("feet slide %.1f mm a step on average, %.1f mm at most, over %zu steps %s\n", 1e3 * s.mean,
-              1e3 * s.greatest, s.contacts, when.c_str());
+  std::printf("feet slide %.1f mm per step on average, %.1f mm at most, over %zu steps %s\n",
+              1e3 * s.mean, 1e3 * s.greatest, s.contacts, when.c_str());
 }
 
 double lowest_gaussian(const AvatarAsset& asset) {
@@ -142,7 +142,7 @@ Status save_frames(const WalkCommand& c, const AvatarAsset& asset, const Recorde
     }
   }
   if (Status s = io::save_driver(c.out, frames); !s) return s;
-  std::printf("%s: %zu frames at %g a second\n", printable(c.out).c_str(), walk.joints.size(),
+  std::printf("%s: %zu frames at %g per second\n", printable(c.out).c_str(), walk.joints.size(),
               c.frame_rate);
   return {};
 }

@@ -270,7 +270,7 @@ int main(int argc, char** argv) {
   if (Status s = io::save_scene(out, *cloud); !s) return fail(s.message());
   cloud->row_ids = std::move(as_read);
   const std::uintmax_t bytes = bytes_of(out);
-  std::printf("%s: %zu Gaussians of SH degree %d, %.2f MB, %.1f bytes a Gaussian\n",
+  std::printf("%s: %zu Gaussians of SH degree %d, %.2f MB, %.1f bytes per Gaussian\n",
               printable(out).c_str(), cloud->size(), cloud->sh_degree, static_cast<double>(bytes) / 1e6,
               static_cast<double>(bytes) / static_cast<double>(cloud->size()));
   print_clamped(io::count_clamped(out, *cloud));

@@ -57,9 +57,9 @@ std::string metrics_table(const gsnav::MetricsSummary& s) {
       "share of episodes in which a person was touched");
   row(out, "stopped by a person", s.human_blocked_episode_rate, "",
       "share of episodes with a move stopped by a person");
-  row(out, "wall collisions", s.collisions, "", "an episode");
-  row(out, "actions", s.steps, "", "an episode");
-  row(out, "path", s.path_length, "m", "an episode");
+  row(out, "wall collisions", s.collisions, "", "per episode");
+  row(out, "actions", s.steps, "", "per episode");
+  row(out, "path", s.path_length, "m", "per episode");
   row(out, "nearest to anybody", s.min_clearance, "m", "between surfaces; below 0: in touch");
   return out + "</table>\n";
 }

@@ -217,7 +217,12 @@ Status run(const Options& o, const ReplayOptions& r) {
   const auto found = journal->records().find(r.episode);
   if (found == journal->records().end()) {
     return {Errc::invalid_argument,
-            "--episode " + std::to_string(r.episode) + ": the journal has no such episode"};
+            "--episode " + std::to_string(r.episode) + ": " +
+                (journal->records().empty()
+                     ? "the journal has no episodes"
+                     : "the journal has " + std::to_string(journal->records().size()) + ", from " +
+                           std::to_string(journal->records().begin()->first) + " to " +
+                           std::to_string(journal->records().rbegin()->first))};
   }
   auto sim = make_simulator(o, *stage);
   if (!sim) return sim.status();

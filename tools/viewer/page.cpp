@@ -86,7 +86,7 @@ function show(s) {
   say("episode", "episode " + s.episode + " of " + s.episodes);
   say("news", !s.done ? "" : (s.success ? "Reached the goal." : "Stopped away from the goal.") +
       " N or \u201cnext episode\u201d begins the next one.");
-  say("speed", number(s.rate, 1, " frames/s, ") + number(s.frame_ms, 1, " ms a frame, ") +
+  say("speed", number(s.rate, 1, " frames/s, ") + number(s.frame_ms, 1, " ms per frame, ") +
       s.visible.toLocaleString("en") + " Gaussians in view");
   say("paused", s.paused ? "play" : "pause");
   for (const id of boxes) { if (!(id in once)) $(id).checked = s[id]; }  // another tab may have changed them

@@ -280,7 +280,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
   if (!plan_units(sets, at)) {
     return {Errc::unsupported,
             "CudaBatchRenderer: " + std::to_string(item_capacity) +
-                " parts of chunks times words of cameras in one batch: draw fewer cameras a call"};
+                " parts of chunks times words of cameras in one batch: draw fewer cameras per call"};
   }
   args.sets = at.on_device<BatchSet>(at.sets);
   args.instances = at.on_device<BatchInstance>(at.instances);

@@ -232,7 +232,7 @@ Status CudaBatchRenderer::finish() {
       return {Errc::unsupported, "CudaBatchRenderer: " + std::to_string(n.slots) +
                                      " visible Gaussians, " + std::to_string(n.pairs) +
                                      " tile intersections and " + std::to_string(of_meshes.most) +
-                                     " triangles: draw fewer cameras a call"};
+                                     " triangles: draw fewer cameras per call"};
     }
     const bool had_room = s.fit_capacities(flight);
     const bool last = s.finished + 1 == s.calls;
