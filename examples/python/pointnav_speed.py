@@ -33,7 +33,7 @@ def main() -> None:
     print(f"{args.flats} flats ...", flush=True)
     worlds = Worlds(TRAIN_SEEDS[:args.flats], args, episodes=100)
     simulator = worlds.simulator(args, args.environments, not args.blind, Draw(worlds, args.seed, 0))
-    # Mostly forward, as trained agents go; nobody stops.
+    # Mostly forward, never stop.
     actions = np.random.default_rng(args.seed).choice(
         [int(gsnav.Action.move_forward)] * 2 + [int(gsnav.Action.turn_left), int(gsnav.Action.turn_right)],
         (args.steps, args.environments))

@@ -96,3 +96,10 @@ def test_the_agent_plays_held_out_episodes(first):
     assert run.returncode == 0, run.stderr
     rows = {line.split("|")[1].strip(): line.split("|") for line in run.stdout.splitlines()[2:]}
     assert float(rows["follower"][3]) > 0.9 > float(rows["agent"][3])
+
+
+def test_the_speed_of_the_environments_is_printed():
+    run = subprocess.run([sys.executable, FOLDER / "pointnav_speed.py", "--device", "cpu:1", "--flats", "2",
+                          "--environments", "4", "--steps", "3", "--runs", "2"], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert re.search(r"cpu:1: [\d,]+ environment steps/s", run.stdout)
