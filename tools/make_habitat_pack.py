@@ -13,9 +13,13 @@ import argparse
 import json
 import pathlib
 import struct
+import sys
 
-import gsnav
-import numpy as np
+try:
+    import gsnav
+    import numpy as np
+except ImportError as e:
+    sys.exit(f"make_habitat_pack.py: {e}. Install the package gsnav: docs/guide/python.md")
 
 FLOOR = 0.07  # Height of the floor, metres.
 SCENES = ("skokloster-castle", "van-gogh-room", "apartment_1")

@@ -132,8 +132,8 @@ class Place {
     char note[80];
     std::snprintf(note, sizeof note, "and %.1f of SH bands; %.1f dB, least %.1f", *bands / *n, psnr.mean,
                   psnr.min);
-    add("packed: bytes a Gaussian beside its SH bands", 40, (*bytes - *bands) / *n, false, packed.size(),
-        note);
+    add("packed: bytes per Gaussian beside its SH bands", 40, (*bytes - *bands) / *n, false,
+        packed.size(), note);
     constexpr double kLeast = 1.6e7;  // below this, threads and pages dominate the peak
     if (const auto peak = packed.front()->number("read_peak"); peak && *bytes >= kLeast)
       add("packed: most memory while it is read, relative to its size", 2, *peak / *bytes, false,

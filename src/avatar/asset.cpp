@@ -78,7 +78,7 @@ Status AvatarAsset::validate() const {
   const std::size_t row = static_cast<std::size_t>(influences);
   if (joint_indices.size() != n * row || skinning_weights.size() != n * row) {
     return bad("joint_indices and skinning_weights need " + std::to_string(row) +
-               " values a Gaussian (set_weights makes them)");
+               " values per Gaussian (set_weights makes them)");
   }
   for (std::size_t i = 0; i < n; ++i) {
     int sum = 0;

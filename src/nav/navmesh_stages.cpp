@@ -110,12 +110,12 @@ Status check_grid(const NavMeshSettings& settings, const Vec3d& low, const Vec3d
     return Status(Errc::invalid_argument,
                   "NavMeshSettings.agent_radius = " + std::to_string(settings.agent_radius) +
                       " is more than 127 cells of cell_size " + std::to_string(cs) +
-                      "; raise cell_size");
+                      "; use larger cells (cell_size, --cell-size)");
   } else if (v.height > 255) {
     return Status(Errc::invalid_argument,
                   "NavMeshSettings.agent_height = " + std::to_string(settings.agent_height) +
                       " is more than 255 cells of cell_height " + std::to_string(ch) +
-                      "; raise cell_height");
+                      "; use larger cells (cell_height, --cell-height)");
   }
   // Recast stores vertices in 16 bits and spans in RC_SPAN_HEIGHT_BITS.
   const double most = settings.tile_size > 0 ? 1e9 : 65000;

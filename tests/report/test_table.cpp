@@ -206,7 +206,7 @@ TEST_CASE("targets: one setting beside another, over the views that have both") 
   CHECK(value("packed: most memory").value == doctest::Approx(1.5));
   const std::string text = targets_text(checks);
   CHECK(std::count(text.begin(), text.end(), '\n') == 8);
-  CHECK(text.find("box, 256x256, serial: packed: bytes a Gaussian beside its SH bands: 38") !=
+  CHECK(text.find("box, 256x256, serial: packed: bytes per Gaussian beside its SH bands: 38") !=
         std::string::npos);
   CHECK(check_targets(Table({}, {})).empty());
 }

@@ -129,7 +129,7 @@ TEST_CASE("report: a tiny scene from nothing, again from the cache, and resumed"
   CHECK(knobs == 2 * (3 * 3 + 9));
   CHECK(picture);
   for (const char* target : {"culling: Gaussians touched", "depth alone: times faster",
-                             "depth alone: fewer bytes", "packed: bytes a Gaussian"}) {
+                             "depth alone: fewer bytes", "packed: bytes per Gaussian"}) {
     CAPTURE(target);
     CHECK(first.text.find(std::string("tiny, 48x32, openmp: ") + target) != std::string::npos);
   }
