@@ -44,8 +44,9 @@ TEST_CASE("cuda batch: every camera has the bits it has alone") {
       config.background = {0.25, 0.5, 0.75};
       CudaBatchRenderer renderer(cuda, config);
       for (const unsigned outputs : {kMedianOnly, kAll}) {
-        if (is_emulated() &&
-            ((order == SortOrder::z_depth) != (outputs == kAll) || response == Response::tangent_plane))
+        // Emulated: two of the twelve, in which each rule occurs but the tangent plane.
+        if (is_emulated() && ((order == SortOrder::z_depth) != (outputs == kAll) ||
+                              response != (outputs == kAll ? Response::ewa : Response::ray)))
           continue;
         CAPTURE(static_cast<int>(response));
         CAPTURE(outputs);
@@ -207,6 +208,7 @@ TEST_CASE("cuda batch: long lists, and thousands of Gaussians at one depth, are 
   camera.cx = camera.cy = 24;
   for (const bool sorted : {false, true}) {
     if (sorted) sort_spatially(cloud);
+    if (is_emulated() && !sorted) continue;
     const GaussianArrays<CudaBackend> arrays(cuda, cloud);
     CudaBatchRenderer renderer(cuda);
     const Batch got = draw_batch(cuda, renderer, {arrays.set()}, {camera, camera}, {}, kAll, false);
