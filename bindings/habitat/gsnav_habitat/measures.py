@@ -11,8 +11,6 @@ from habitat.core.embodied_task import Measure
 from habitat.core.registry import registry
 from habitat.tasks.nav.nav import DistanceToGoal
 
-_NOBODY = {"collision_rate": 0.0, "psi": 0.0, "human_collision": 0.0}
-
 
 class _AvatarMeasure(Measure):
     """A field of gsnav.EpisodeMetrics since the begin of the episode."""
@@ -32,7 +30,7 @@ class _AvatarMeasure(Measure):
 
     def update_metric(self, *args: Any, **kwargs: Any) -> None:
         metrics = self._sim.avatar_metrics()
-        self._metric = float(_NOBODY[self._field] if metrics is None else getattr(metrics, self._field))
+        self._metric = 0.0 if metrics is None else float(getattr(metrics, self._field))
 
 
 @registry.register_measure
