@@ -66,7 +66,8 @@ def scene_of(scene: Scene, config: SimulatorConfig) -> SimulatorScene:
     if isinstance(scene, OpenedScene):
         scene = scene.scene
     if not isinstance(scene, SimulatorScene):
-        raise TypeError(f"scene: expected a name, path, OpenedScene or a SimulatorScene, got {type(scene).__name__}")
+        raise TypeError("scene: expected a name, a path, an OpenedScene or a SimulatorScene, got "
+                        f"{type(scene).__name__}")
     if scene.navmesh is None:
         raise InvalidArgument("scene: it has no NavMesh. Open it with OpenOptions(navmesh=\"auto\").")
     return scene
