@@ -69,7 +69,7 @@ void print_table(const Options& options, const SceneFacts& facts,
   row("episodes with avatar contact", s.disturbed_episode_rate);
   row("wall collisions per episode", s.collisions, "%10.1f");
   row("least clearance to an avatar (m)", s.min_clearance);
-  row("episodes with a touch by an avatar", static_cast<double>(pushed), "%10.0f");
+  row("episodes with a push by an avatar", static_cast<double>(pushed), "%10.0f");
   row("steps/s (physics + RGB-D)",
       t.physics + t.render > 0 ? static_cast<double>(t.steps) / (t.physics + t.render) : 0.0, "%10.1f");
   row("render (ms, RGB-D in one pass)", 1e3 * per(t.render, t.renders), "%10.2f");
