@@ -13,6 +13,7 @@ scripts and CMake files name are checked too, except where a string is the whole
 import argparse
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -108,7 +109,9 @@ def tracked(root, *patterns):
 
 
 def is_source_tree(root):
-    return subprocess.run(["git", "-C", str(root), "rev-parse"], capture_output=True, check=False).returncode == 0
+    """True if git is installed and knows the folder."""
+    return shutil.which("git") is not None and subprocess.run(
+        ["git", "-C", str(root), "rev-parse"], capture_output=True, check=False).returncode == 0
 
 
 def found(root, *patterns):
