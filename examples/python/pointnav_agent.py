@@ -1,80 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The worlds and the agent of train_pointnav.py and play_pointnav.py."""
+"""The agent of train_pointnav.py, and its logs."""
 
 from __future__ import annotations
 
-import argparse
-import collections
-import concurrent.futures
 import csv
-import hashlib
-import os
 import pathlib
 import sys
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import torch
+from pointnav_worlds import ACTIONS, device_of
 from torch import Tensor, nn
 
 import gsnav
-
-ACTIONS = 4  # stop, forward, left, right
-TRAIN_SEEDS, HELD_OUT_SEEDS = range(64), range(64, 80)
-METRICS = ("success", "spl", "soft_spl", "collision_rate", "psi", "steps")
-
-
-class Worlds:
-    """Flats and their episodes. The same arguments give the same ones."""
-
-    def __init__(self, seeds: range, args: argparse.Namespace, episodes: int) -> None:
-        self.task = gsnav.TaskConfig.avatar_pointnav() if args.people else gsnav.TaskConfig()
-
-        def make(seed: int) -> tuple[gsnav.SimulatorScene, list[gsnav.PointNavEpisode]]:
-            plan = gsnav.FloorPlanOptions(seed=seed, rooms=args.rooms)
-            scene = gsnav.planned_simulator_scene(plan, args.people, seed, args.density, self.task)
-            assert scene.navmesh is not None
-            return scene, list(gsnav.generate_episodes(scene.navmesh, episodes, seed))
-
-        with concurrent.futures.ThreadPoolExecutor(min(16, os.cpu_count() or 1)) as pool:
-            made = list(pool.map(make, seeds))
-        self.scenes = [scene for scene, _ in made]
-        self.episodes = [gsnav.BatchEpisode(scene=s, episode=made[s][1][k])
-                         for k in range(episodes) for s in range(len(made))]
-
-    def simulator(self, args: argparse.Namespace, environments: int, images: bool,
-                  next_episode: Callable[[int, int], gsnav.BatchEpisode],
-                  image_source: Callable[[int, int], Tensor] | None = None) -> gsnav.BatchSimulator:
-        """Environments with a depth sensor, or with none. After an episode, a step without effect begins the next."""
-        depth = gsnav.SensorSpec(uuid="depth", kind=gsnav.SensorKind.depth, resolution=[args.size, args.size])
-        # With as many slots as environments, one pass draws all images.
-        config = gsnav.BatchConfig(task=self.task, sensors=[depth] if images else [], pose_slots=environments,
-                                   images=gsnav.ImageMemory.backend, auto_reset=gsnav.AutoReset.next_step)
-        return gsnav.BatchSimulator(args.device, self.scenes, config, environments, next_episode,
-                                    image_source=image_source)
-
-
-def mixed(*numbers: int) -> int:
-    """A number of 64 bits that depends on all arguments."""
-    return int.from_bytes(hashlib.blake2b(repr(numbers).encode(), digest_size=8).digest(), "little")
-
-
-class Draw:
-    """Source of the training episodes. They depend on the environment's number among all ranks."""
-
-    def __init__(self, worlds: Worlds, seed: int, first: int) -> None:
-        self.episodes, self.seed, self.first = worlds.episodes, seed, first
-        self.begin(0)
-
-    def begin(self, epoch: int) -> None:
-        """From here on, episodes depend on `epoch` and not on those that were played before."""
-        self.epoch, self.given = epoch, collections.Counter[int]()
-
-    def __call__(self, environment: int, count: int) -> gsnav.BatchEpisode:
-        self.given[environment] += 1
-        at = mixed(self.seed, self.epoch, self.first + environment, self.given[environment])
-        return self.episodes[at % len(self.episodes)]
 
 
 # [snippet: rows]
@@ -161,33 +100,14 @@ def pieces(start: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.nd
     return order, sizes, env, start[first, env]
 
 
-def goals(seen: gsnav.BatchStep) -> np.ndarray:
-    """Goals as the agent gets them, [N][3]: distance (metres), cosine and sine of the angle."""
-    distance, angle = seen.point_goals.T
-    return np.stack([distance, np.cos(angle), np.sin(angle)], 1)
-
-
 def clear(noise: Tensor) -> Tensor:
     """Random numbers whose logarithm of the logarithm is finite."""
     return noise.clamp_(1e-9, 1 - 1e-7)
 
 
-def world_arguments(p: argparse.ArgumentParser) -> None:
-    """Adds the arguments for the worlds and the sensors."""
-    p.add_argument("--device", default="best", help="device of gsnav and torch: best, cuda, cuda:1, cpu, ...")
-    p.add_argument("--people", type=int, default=0, help="people in each flat")
-    p.add_argument("--blind", action="store_true", help="the agent sees no images")
-    p.add_argument("--size", type=int, default=64, help="edge of the depth images, pixels, 36 or more")
-    p.add_argument("--density", type=float, default=0.05, help="factor on the number of Gaussians")
-    p.add_argument("--rooms", type=int, default=4, help="rooms of a flat")
-
-
-def device_of(name: str) -> tuple[str, torch.device]:
+def devices_of(name: str) -> tuple[str, torch.device]:
     """The device of gsnav and the one of torch."""
-    try:
-        device = gsnav.Device.parse(name)
-    except gsnav.Error as e:
-        sys.exit(f"--device {name}: {e}")
+    device = device_of(name)
     if device.kind != gsnav.DeviceKind.cuda:
         return device.name, torch.device("cpu")
     if not torch.cuda.is_available():

@@ -14,7 +14,7 @@ import time
 import numpy as np
 
 import gsnav
-from pointnav_agent import TRAIN_SEEDS, Draw, Worlds, device_of, world_arguments
+from pointnav_worlds import TRAIN_SEEDS, Draw, Worlds, device_of, world_arguments
 
 
 def main() -> None:
@@ -28,7 +28,7 @@ def main() -> None:
     args = p.parse_args()
     if min(args.environments, args.steps) < 1 or args.runs < 2:
         p.error("--environments and --steps must be 1 or more, --runs 2 or more")
-    args.device, _ = device_of(args.device)
+    args.device = device_of(args.device).name
 
     print(f"{args.flats} flats ...", flush=True)
     worlds = Worlds(TRAIN_SEEDS[:args.flats], args, episodes=100)

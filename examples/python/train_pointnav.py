@@ -27,8 +27,8 @@ except ImportError:
     sys.exit("train_pointnav.py needs PyTorch: pip install torch")
 import numpy as np
 import torch.distributed as dist
-from pointnav_agent import ACTIONS, METRICS, TRAIN_SEEDS, Agent, Draw, Reorder, Rows, Worlds
-from pointnav_agent import clear, device_of, goals, mixed, pieces, progress, world_arguments, write_log
+from pointnav_agent import Agent, Reorder, Rows, clear, devices_of, pieces, progress, write_log
+from pointnav_worlds import ACTIONS, METRICS, TRAIN_SEEDS, Draw, Worlds, goals, mixed, world_arguments
 from torch import Tensor, nn
 from torch.nn.utils.rnn import PackedSequence
 
@@ -37,7 +37,8 @@ import gsnav
 GAMMA, LAMBDA, CLIP, VALUE_COEF, ENTROPY_COEF, MAX_NORM = 0.99, 0.95, 0.2, 0.5, 0.01, 0.5
 # Arguments that a checkpoint keeps: with others, training would not go on as it began.
 KEPT = ("seed", "flats", "episodes_per_flat", "people", "blind", "size", "density", "rooms", "environments",
-        "rollout", "chunks", "epochs", "lr", "horizon", "every", "cut_off", "ranks")
+        "rollout", "chunks", "epochs", "lr", "horizon", "every", "cut_off", "ranks", "quality", "success",
+        "critic_updates")
 
 
 class Learner:
@@ -203,7 +204,8 @@ class Learner:
         x = self.agent.features(self.depth[rows], self.goal[rows].reshape(-1, 3), last.reshape(-1))
         hidden = self.first_hidden[chunk][env] * (1 - fresh)[:, None]
         y = self.agent.gru(PackedSequence(Reorder.apply(x, order, inverse), sizes), hidden[None])[0].data
-        log_p, value = self.agent.heads(y)
+        policy_learns = self.update_count >= self.args.critic_updates
+        log_p, value = self.agent.heads(y if policy_learns else y.detach())
         weight, advantage = row(self.result[2]), row(self.advantage)
         ratio = (log_p.gather(-1, row(self.action)[:, None])[:, 0] - row(self.log_p)).exp()
         policy = -torch.min(ratio * advantage, ratio.clamp(1 - CLIP, 1 + CLIP) * advantage)
@@ -211,7 +213,7 @@ class Learner:
         entropy = -(log_p.exp() * log_p).sum(-1)
         parts = torch.stack([(weight * part).mean() for part in (policy, error, entropy)])
         self.losses += parts.detach()
-        return parts[0] + VALUE_COEF * parts[1] - ENTROPY_COEF * parts[2]
+        return parts[0] * policy_learns + VALUE_COEF * parts[1] - ENTROPY_COEF * parts[2] * policy_learns
 
     def update(self) -> None:
         """Epochs of PPO over chunks of time steps. Images are not copied, because a chunk of steps is contiguous."""
@@ -356,6 +358,7 @@ def arguments() -> argparse.Namespace:
     p.add_argument("--chunks", type=int, default=4, help="minibatches: parts of a rollout, one after the other")
     p.add_argument("--epochs", type=int, default=3, help="passes over a rollout")
     p.add_argument("--lr", type=float, default=1e-3, help="learning rate of Adam at the beginning")
+    p.add_argument("--critic-updates", type=int, default=0, help="first updates, in which only values are learned")
     p.add_argument("--horizon", type=float, default=1e8, help="steps after which the learning rate is a tenth of that")
     p.add_argument("--every", type=int, default=50, help="updates from one checkpoint to the next")
     p.add_argument("--cut-off", type=float, default=1.0, help="fraction of ranks whose end ends the rollouts of the "
@@ -375,7 +378,7 @@ def main() -> None:
     local = int(os.environ.get("LOCAL_RANK", -1))
     if local >= 0 and args.device == "cuda":
         args.device = f"cuda:{local}"
-    args.device, args.torch_device = device_of(args.device)
+    args.device, args.torch_device = devices_of(args.device)
     cuda = args.torch_device.type == "cuda"
     torch.use_deterministic_algorithms(True)
     torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = True

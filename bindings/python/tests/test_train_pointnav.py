@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch")
@@ -86,16 +87,29 @@ def test_errors_say_what_to_do(first, tmp_path):
     assert "another folder" in refused(*TINY, "--out", first[0], "--people", "1")
     assert "there are" in refused("--device", "tpu", "--out", tmp_path)
     assert "multiple of --chunks" in refused("--chunks", "3")
-    assert "Train first" in refused("--out", tmp_path, script="play_pointnav.py")
 
 
-def test_the_agent_plays_held_out_episodes(first):
-    run = subprocess.run([sys.executable, FOLDER / "play_pointnav.py", "--device", "cpu:1", "--out", first[0],
-                          "--episodes", "16", "--policies", "agent", "follower"],
-                         env=ONE_THREAD, capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr
-    rows = {line.split("|")[1].strip(): line.split("|") for line in run.stdout.splitlines()[2:]}
-    assert float(rows["follower"][3]) > 0.9 > float(rows["agent"][3])
+def test_the_policy_in_numpy_is_the_agent(first, monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(FOLDER)
+    from pointnav_agent import Agent
+    from pointnav_policy import load, save
+
+    state = torch.load(first[0] / "checkpoint.pt", weights_only=True)
+    agent = Agent(64, blind=False)
+    agent.load_state_dict(state["agent"])
+    policy = load(first[0] / "checkpoint.pt")
+    rng = np.random.default_rng(1)
+    depth, goal = rng.uniform(0, 8, (5, 64, 64, 1)), rng.normal(size=(5, 3))
+    last, start, hidden = rng.integers(0, 4, 5), np.arange(5) % 3 == 0, rng.normal(size=(5, 256))
+    depth, goal, hidden = (x.astype(np.float32) for x in (depth, goal, hidden))
+    log_p, next_hidden = policy.act(depth, goal, last, start, hidden)
+    with torch.no_grad():
+        inputs = agent.features(*(torch.from_numpy(x) for x in (depth, goal, np.where(start, 4, last))))
+        y, state = agent.gru(inputs[None], torch.from_numpy(hidden * ~start[:, None])[None])
+        expected, _ = agent.heads(y[0])
+    assert np.abs(log_p - expected.numpy()).max() < 1e-5 and np.abs(next_hidden - state[0].numpy()).max() < 1e-5
+    save(policy, tmp_path / "policy.npz")
+    assert np.abs(load(tmp_path / "policy.npz").act(depth, goal, last, start, hidden)[0] - log_p).max() < 0.01
 
 
 def test_the_speed_of_the_environments_is_printed():

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The trained agent in numpy: the network of pointnav_agent.py, without torch."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import sys
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, np.dtype[Any]]
+STRIDES = (4, 2, 1)  # of the three convolutions
+
+
+def sigmoid(x: Array) -> Array:
+    """The logistic function; tanh does not overflow."""
+    y: Array = 0.5 + 0.5 * np.tanh(0.5 * x)
+    return y
+
+
+def convolved(x: Array, weight: Array, bias: Array, stride: int) -> Array:
+    """Convolution and ReLU: [N][H][W][C] to [N][H'][W'][D], by weights [D][C][K][K]."""
+    windows = np.lib.stride_tricks.sliding_window_view(x, weight.shape[2:], (1, 2))[:, ::stride, ::stride]
+    n, h, w = windows.shape[:3]
+    y: Array = windows.reshape(n * h * w, -1) @ weight.reshape(len(weight), -1).T + bias
+    return np.maximum(y, 0).reshape(n, h, w, -1)
+
+
+class Policy:
+    """Chooses actions from depth, goal and last action. All numbers are float32."""
+
+    def __init__(self, weights: dict[str, Array], size: int) -> None:
+        self.weights, self.size = {name: w.astype(np.float32) for name, w in weights.items()}, size
+        self.blind = "cnn.0.weight" not in weights
+
+    def linear(self, name: str, x: Array) -> Array:
+        y: Array = x @ self.weights[f"{name}.weight"].T + self.weights[f"{name}.bias"]
+        return y
+
+    def features(self, depth: Array | None, goal: Array, last: Array) -> Array:
+        parts = [self.linear("goal", goal), self.weights["last.weight"][last]]
+        if depth is not None and not self.blind:
+            for layer, stride in enumerate(STRIDES):
+                name = f"cnn.{2 * layer}"
+                depth = convolved(depth, self.weights[f"{name}.weight"], self.weights[f"{name}.bias"], stride)
+            flat = depth.transpose(0, 3, 1, 2).reshape(len(depth), -1)
+            parts.append(np.maximum(self.linear("image.0", flat), 0))
+        return np.concatenate(parts, -1)
+
+    def act(self, depth: Array | None, goal: Array, last: Array, start: Array, hidden: Array) -> tuple[Array, Array]:
+        """Logarithms of the actions' probabilities, [N][4], and the next hidden states, [N][256].
+
+        depth [N][H][W][1] in metres; goal [N][3], see goals(); last actions [N]; start [N]: an episode begins."""
+        none = len(self.weights["last.weight"]) - 1  # stands for the action before the first
+        x = self.features(depth, goal.astype(np.float32), np.where(start, none, last))
+        hidden = hidden * ~start[:, None]
+        input_part, hidden_part = (v @ self.weights[f"gru.weight_{k}_l0"].T + self.weights[f"gru.bias_{k}_l0"]
+                                   for v, k in ((x, "ih"), (hidden, "hh")))
+        (r, z, n), (hidden_r, hidden_z, hidden_n) = np.split(input_part, 3, -1), np.split(hidden_part, 3, -1)
+        r, z = sigmoid(r + hidden_r), sigmoid(z + hidden_z)
+        hidden = (1 - z) * np.tanh(n + r * hidden_n) + z * hidden
+        y = self.linear("policy", hidden)
+        y -= y.max(-1, keepdims=True)
+        return y - np.log(np.exp(y).sum(-1, keepdims=True)), hidden
+
+
+def load(path: pathlib.Path) -> Policy:
+    """Reads the policy from a file of save(), or from the checkpoint.pt of train_pointnav.py. The latter needs torch."""
+    if not path.exists():
+        sys.exit(f"{path}: not found. Train first, or name another file by --weights.")
+    if path.suffix == ".npz":
+        kept = dict(np.load(path))
+        return Policy({name: w for name, w in kept.items() if name != "size"}, int(kept["size"]))
+    try:
+        import torch  # type: ignore[import-not-found,unused-ignore]
+    except ImportError:
+        sys.exit(f"{path}: reading it needs PyTorch: pip install torch")
+    state = torch.load(path, map_location="cpu", weights_only=True)
+    return Policy({name: w.numpy() for name, w in state["agent"].items()}, state["args"]["size"])
+
+
+def save(policy: Policy, path: pathlib.Path) -> None:
+    """Writes the weights, as numbers of 16 bits and without those of the value."""
+    kept: dict[str, Any] = {name: w.astype(np.float16) for name, w in policy.weights.items() if name[:5] != "value"}
+    aside = path.with_name(path.name + ".tmp")
+    with open(aside, "wb") as file:
+        np.savez_compressed(file, **kept, size=np.int32(policy.size))
+    os.replace(aside, path)
