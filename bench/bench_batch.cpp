@@ -223,7 +223,8 @@ void compare_visible(CudaBackend& cuda, const GaussianArrays<CudaBackend>& array
     sum += std::pow(10.0, -0.1 * e.psnr);
   }
   std::printf(
-      "with visible sets beside without, %zu views: least %.1f dB, of all %.1f dB, largest error %.1e\n",
+      "with visible sets compared with none, %zu views: least %.1f dB, of all %.1f dB, largest error "
+      "%.1e\n",
       views, least, -10 * std::log10(sum / static_cast<double>(views)), worst);
 }
 

@@ -12,9 +12,9 @@
 //
 // Depths come from separate frames that are not timed. Their columns are the share of pixels that differ
 // by more than 2 % from the median depths of all of the photo's rays in the pixel, and the 99th
-// percentile. If a streamed scene brings its own levels, they have rows beside those of the tree that is
-// built. "seen": only the Gaussians visible from the camera's cell is drawn (VisibleSets). Where there
-// is a GPU, it has rows too.
+// percentile. If a streamed scene brings its own levels, they have rows next to those of the tree that
+// is built. "seen": only the Gaussians visible from the camera's cell are drawn (VisibleSets). Where
+// there is a GPU, it has rows too.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// NavMesh queries beside Detour's on the same mesh. The pairs are random and connected; they lie on all
-// islands, in proportion to area.
+// NavMesh queries compared with Detour's on the same mesh. The pairs are random and connected; they lie
+// on all islands, in proportion to area.
 #include <DetourNavMeshQuery.h>
 #include <benchmark/benchmark.h>
 

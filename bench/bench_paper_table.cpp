@@ -199,7 +199,7 @@ int main(int argc, char** argv) try {
     std::fprintf(stderr, "bench_paper_table: --backend cuda: no GPU, or a build without CUDA\n");
     return 1;
   }
-  std::printf("%s, %zu threads; %d actions a row, %zu at once\n", gsnav_report::machine_name().c_str(),
+  std::printf("%s, %zu threads; %d actions per row, %zu at once\n", gsnav_report::machine_name().c_str(),
               OpenMPBackend(o.threads).concurrency(), o.steps, o.environments);
   head("by Gaussians");
   for (const double millions : {0.3, 0.5, 1.0, 3.0, 5.0, 7.0}) {

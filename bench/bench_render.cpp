@@ -196,8 +196,8 @@ void render_frames(benchmark::State& state, B& backend, const Variant& v, int wi
 }
 
 /// 64 cameras in one call against 64 calls of one camera, in turns. `gain`: frames per second of the
-/// batch divided by those of the single calls. `bits_differ`: number of image values that are not the
-/// same.
+/// batch divided by those of the single calls. `bits_differ`: number of image values that differ
+/// between the two.
 template <class B>
 void render_batch(benchmark::State& state, B& backend, const Variant& v, int width, int height) {
   constexpr std::size_t kBatch = 64;

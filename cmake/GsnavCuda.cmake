@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Decides whether gsnav::cuda is built (GSNAV_CUDA=AUTO|ON|OFF|EMULATED) and enables the language where it is.
-# Inside another project the default is OFF. AUTO wants an nvcc of CUDA 12 or later (C++20); ON stops where
+# Inside another project the default is OFF. AUTO needs an nvcc of CUDA 12 or later (C++20); ON stops where
 # there is none.
 # EMULATED runs device code on the host, for tests: a C++ compiler reads it, no toolkit is needed (docs/notes/cuda.md).
 set(_default OFF)

@@ -2,7 +2,7 @@
 # Shared by every CMakeLists.txt of the project.
 
 # Warnings and arithmetic of the project's own translation units. Contraction is off so that float
-# results do not depend on whether the compiler sees an fma: kernels that want one call fma().
+# results do not depend on whether the compiler sees an fma: kernels that need an fma call fma().
 function(gsnav_private_options target)
   target_compile_features(${target} PRIVATE cxx_std_20)
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF)

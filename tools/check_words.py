@@ -49,6 +49,7 @@ RULES = {
     "many": "a number has a name: '64 rows at a time', not 'so many rows'; 'as many as' needs a noun",
     "same": "'the same' names what it is the same as: 'the same holds for meshes', not 'the same holds here'",
     "possessive": "a noun follows 's: 'the scene's images', not 'they are the scene's'; no 'ours', 'theirs'",
+    "beside": "'compared with' or 'next to', where two things are compared; a file may lie beside another",
     "of": "a sentence starts with its subject, not with 'Of ...'",
     "old": "plain words: no 'whence', 'lest', 'therein', 'but for', 'can be had', 'as the table has it'",
     "history": "what the code did before belongs in the changelog, what was tried in the notes",
@@ -57,9 +58,13 @@ RULES = {
 UNIT = (r"(?:frame|pixel|tile|row|column|camera|second|minute|hour|episode|thread|core|lane|warp|block|splat|"
         r"gaussian|triangle|voxel|vertex|chunk|slice|byte|view|image|sensor|environment|call|axis|channel|node|joint|"
         r"level|batch|ray|scene|avatar|agent|person|metre|layer|kernel|backend|file|line|cell|set|walker|sample|action|"
-        r"step)")
-COUNTED = (r"(?:ms|us|ns|milliseconds?|microseconds?|nanoseconds?|seconds|bytes|[KMG]i?B|gaussians|pixels|triangles|"
-           r"voxels|threads|registers|allocations|multiplications|additions|times)")
+        r"step|process|policy|body|capsule|setting|measurement|device|GPU|worker|world|mesh|query|path|run)")
+SIZE_OR_TIME = r"(?:ms|us|ns|milliseconds?|microseconds?|nanoseconds?|seconds|bytes|[KMG]i?B)"
+COUNTED = (r"(?:[Gg]aussians|pixels|triangles|voxels|threads|registers|allocations|multiplications|additions|times|"
+           r"actions|values|influences|collisions|cameras|bones|episodes|environments|agents|floats|vertices|faces|"
+           r"chunks|tiles|capsules|joints|queries|rays|kernels|sensors|walkers|evaluations|weights|[Tt]imed runs|"
+           r"[Vv]iews(?= a scene[,;:)]))")
+NUMBER = r"(?<![\w.-])(?:\d[\d.,/x]*(?<![.,/])|%[\d.]*(?:d|f|g|zu|u|ll[du])|\{[^{}\s]*\})"
 PERSONS = (r"(?i:people|persons?|users?|agents?|avatars?|walkers?|readers?|authors?|researchers?|engineers?|"
            r"developers?|contributors?|maintainers?|pedestrians?|reviewers?|actors?|teams?|those|anyone|someone|"
            r"everyone|everybody|somebody|nobody|strangers?|bystanders?|observers?|humans?)")
@@ -71,8 +76,10 @@ VERB = (r"(?:is|are|was|were|has|have|had|does|do|can|cannot|may|must|will|would
 WHAT_SUBJECT = r"(?:an?|the|its?|they|this|these|those|each|every|one|no|all|earlier|later|others?|you|we|Q+)"
 BEFORE_NOUN = r"(?:of|from|with|by|for|to|in|on|than|behind|beyond|into|as|at|over|under|and|or|but|that)"
 
-SMALL = r"(?:for|of|in|by|as|than|or|and|on|to|with|at|from|per|if|when|where|is|are|into|against|is|has|have)"
-NO_VERB = r"(?! (?:is|are|has|have|was|were|may|can|that|which)\b)"
+SMALL = r"(?:for|of|in|by|as|than|or|and|on|to|with|at|from|per|if|when|where|is|are|into|against|is|has|have|without)"
+NO_VERB = r"(?! (?:is|are|has|have|was|were|may|can|that|which|apart|away|ago|later|long|wide|high|too|takes|needs)\b)"
+
+ALIKE = r"(?:\b(?:both|all|any|every|two|three|four|\d+) .*\b|\bwhether .*\b|\bnot )(?:are|is|be|have|has) the same"
 
 # rule -> patterns. In the text inline code is a run of Q.
 DEVICES = {
@@ -85,21 +92,31 @@ DEVICES = {
             rf"^(?!.*\b{PERSONS}\b.* who)(?:.*[^\w-])?(?!(?:{ASKS}|and|or|as)\b,?)[\w-]+,? who (?!it is)\w+"],
     "person": [r"\b[Oo]nes? who\b", r"\b[Ww]ho(?:m)?ever\b", r"\b[Nn]obody(?:'s)?\b", r"\b[Nn]o one\b",
                r"\b[Ss]omebody\b", r"\b[Ee]verybody\b", r"\b[Oo]thers (?:get|go|take|keep|find|know|want|ask|wait)\b",
-               r"\b(?:knows?|knew) nothing\b", r"\b(?:[Hh]e|[Ss]he|[Hh]is|[Hh]er|[Hh]im)\b"],
-    "per": [rf"(?<![\w.-])\d[\d.,/x]*(?<![.,/])(?: (?!{SMALL}\b)[\w-]+)? an? {UNIT}\b{NO_VERB}",
-            rf"\b{COUNTED} an? {UNIT}\b{NO_VERB}",
+               r"\b(?:knows?|knew) nothing\b", r"\b(?:header|file|format|reader|kernel) promises?\b",
+               rf"^(?!.*\b(?:{PERSONS}|who|you|we|they|I)\b.* want).*\bwants?\b",
+               r"\b(?:[Hh]e|[Ss]he|[Hh]is|[Hh]er|[Hh]im)\b"],
+    "per": [rf"{NUMBER}(?: (?!{SMALL}\b)[\w-]+)? an? {UNIT}\b{NO_VERB}",
+            rf"\b{SIZE_OR_TIME} an? (?!few\b|little\b)[a-zA-Z][\w-]*{NO_VERB}",
+            rf"\b{COUNTED} an? {UNIT}\b{NO_VERB}", r"\bframes a (?:second|minute|hour)\b",
             rf"\b(?:one|once|twice|two|three|four)(?: (?!{SMALL}\b)[\w-]+)? an? {UNIT}(?=[.,;:)]|$)"],
     "many": [r"\b[Ss]o (?:many|much)\b(?!.*\bthat\b)", r"\b[Aa]s (?:many|much)(?= as\b|[.,;:)]|$| of\b| at\b)",
              r"\b[Aa]s (?:many|much) (?!.* as\b)"],
-    "same": [r"\b[Tt]he same (?:holds?|is true|goes|applies|here|there)\b(?! (?:for|of|to|with|in) )"],
+    "same": [r"\b[Tt]he same (?:holds?|is true|goes|applies|here|there)\b(?! (?:for|of|to|with|in) )",
+             rf"^(?!.*{ALIKE}).*\b[Tt]he same(?=[.,;:)]|$| again\b)", r"\ball the same(?! \w)",
+             r"^[Tt]he same [\w-]+[.;]?$"],
     "possessive": [r"\w's(?=[.;:,)]|$)", r"\b(?:[Oo]urs|[Tt]heirs)\b"],
-    "of": [r"^Of (?!course\b)"],
+    "beside": [r"\b(?:fast|slow|small|large|cheap|good|better|worse)(?:er)?\b[\w ,]{0,20} beside\b",
+               r"\b[Bb]eside (?:(?:the )?(?:CPUs?|GPUs?|best|fast|exact)|without|those of|Detour|gsplat|Habitat|itself|"
+               r"another(?=[.,;)]|$)|\d+)\b"],
+    "of": [r"^Of (?!course\b)", r"\b(?:is|are) of (?:\d|two|three|four)", r"\bone is as\b"],
     "old": [r"\b(?:[Ww]hence|[Tt]hence|[Ww]herein|[Ww]hereof|[Tt]hereof|[Tt]herein|[Tt]hereby|[Ll]est|[Aa]ught|"
             r"[Ff]orthwith)\b", r"\bbut for\b", r"\bas [\w ]{1,40} (?:has|have) it\b",
             r"\b(?:to|can|could) be had\b", r"\bas ever\b"],
     "history": [r"\btried (?:and|but) (?:not|dropped|given)", r"\b(?:was|were|is) formerly\b",
                 r"(?<!is )(?<!are )\bused to (?:be|have|take|do|give|go|make)\b", r"\bin earlier versions\b",
-                r"\b[Pp]reviously\b", r"\b(?:was|were) [\w-]+ once\b"],
+                r"\b[Pp]reviously\b", r"\b(?:was|were) [\w-]+ once\b", r"\b[Ff]ormerly\b", r"\bonce (?:was|were|had)\b",
+               r"\b(?:was|were) once\b", r"\b[Ww]e (?:tried|dropped)\b", r"^(?:This|It|They|The [\w-]+) no longer\b",
+               r"\b(?:[Ii]n|[Bb]efore|[Uu]ntil) version \d[\d.]*,? (?:.* )?(?:was|were|had)\b"],
 }
 DEVICES = {rule: [re.compile(p) for p in patterns] for rule, patterns in DEVICES.items()}
 ABBREVIATION = re.compile(r"(?:\b(?:e\.g|i\.e|vs|etc|cf|Fig|Eq|Sec|No|approx|al|resp|incl|max|min)|^\W*\d+|\b[A-Z])$")

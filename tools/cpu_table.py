@@ -254,12 +254,12 @@ def summary(rows, threads, baselines):
         if b in BASELINES:
             worst(f"{b} over fast", lambda r: r["baselines"][b]["ms"] / of(r, "fast", "median_ms"),
                   BASELINES[b].least_gain, False)
-    worst("batch of 64, frames a second", lambda r: r["gsnav"].get("batch", {}).get("gain"), 1.3, False)
+    worst("batch of 64, frames per second", lambda r: r["gsnav"].get("batch", {}).get("gain"), 1.3, False)
     worst("batch of 64, bits that differ", lambda r: r["gsnav"].get("batch", {}).get("bits_differ"), 0, True)
     for size in dict.fromkeys(r["size"] for r in rows):
         unit = [f"{r['scene']} {1e6 * of(r, 'fast', 'median_ms') / of(r, 'fast', 'visible+fragments'):.3f}"
                 for r in rows if r["size"] == size]
-        lines.append(f"ns a visible Gaussian or evaluated fragment at {size}: {', '.join(unit)}")
+        lines.append(f"ns per visible Gaussian or evaluated fragment at {size}: {', '.join(unit)}")
     return "\n".join(lines)
 
 

@@ -5,7 +5,7 @@
 # instruction set of this machine, and on the emulated CUDA backend.
 #
 #   tools/image_hashes.sh FILE           builds both tests and writes FILE, one line per image
-#   tools/image_hashes.sh FILE BEFORE    does the same, and fails if a line differs from the file BEFORE
+#   tools/image_hashes.sh FILE BEFORE    writes FILE, and fails if a line differs from the file BEFORE
 #
 # Run it before and after a change that must keep every bit. A first run takes ten minutes on two cores.
 #

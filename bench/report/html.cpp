@@ -24,7 +24,7 @@ struct Section {
 
 const std::array<Section, 10> kSections{{
     {"budgets", "Budgets", "The worst row of each profile against what it promises.", budget_section},
-    {"targets", "Targets", "One setting beside another, over all views of a scene.", target_section},
+    {"targets", "Targets", "Pairs of settings compared, over all views of a scene.", target_section},
     {"pareto", "Speed against error",
      "Each mark is a setting on one backend: the mean over the views of all scenes, with a whisker to "
      "the "

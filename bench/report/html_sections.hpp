@@ -14,7 +14,7 @@ std::string html_table(const std::vector<std::string>& header,
 
 // Sections of the page as HTML; empty if the table has no rows for them.
 std::string budget_section(const Table& table);
-std::string target_section(const Table& table);    ///< one setting beside another
+std::string target_section(const Table& table);    ///< pairs of settings compared
 std::string settings_section(const Table& table);  ///< all numbers of all settings
 std::string image_section(const Table& table);     ///< difference images, embedded
 std::string ledger_section(const Table& table);

@@ -22,8 +22,8 @@ struct TargetCheck {
   bool met() const noexcept { return at_least ? value >= limit : value <= limit; }
 };
 
-/// Checks of all targets that the table has rows for: levels of detail beside `fast`, culling by chunks,
-/// frames of depths alone, memory of packed scenes.
+/// Checks of all targets that the table has rows for: levels of detail compared with `fast`, culling by
+/// chunks, frames of depths alone, memory of packed scenes.
 std::vector<TargetCheck> check_targets(const Table& table);
 
 /// The checks as lines of text.

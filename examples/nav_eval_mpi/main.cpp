@@ -71,7 +71,7 @@ gsnav::Result<gsnav::Device> device_of(const Ranks& ranks, const gsnav::Device& 
 }
 
 /// Renders the agent's sensors at each step, as a policy that uses images would need. The policies here
-/// do not use them, so the metrics stay the same.
+/// do not use them, so the metrics do not change.
 gsnav::Result<Look> looker(const Ranks& ranks, const gsnav_eval::Options& o,
                            const gsnav_eval::Stage& stage, bool draw) {
   if (!draw) return Look{};

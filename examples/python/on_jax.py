@@ -16,7 +16,7 @@ def main(environments: int = 4, steps: int = 10) -> None:
     nearest = jax.jit(lambda depth: depth.min(axis=(1, 2, 3)))
     for _ in range(steps):
         images = observations["depth"]
-        depth = jax.dlpack.from_dlpack(images)  # the same memory
+        depth = jax.dlpack.from_dlpack(images)  # shares the image's memory
         clear = nearest(depth) > 0.5  # metres
         actions = jax.numpy.where(clear, int(gsnav.Action.move_forward), int(gsnav.Action.turn_left))
         observations, rewards, terminated, truncated, infos = envs.step(actions)

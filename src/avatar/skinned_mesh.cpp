@@ -17,7 +17,7 @@ Status SkinnedMesh::validate() const {
   if (triangles.empty()) return bad("no triangles");
   if (influences == 0 || joint_indices.size() != n * influences || weights.size() != n * influences) {
     return bad("joint_indices and weights need " + std::to_string(influences) +
-               " values a vertex, at least one");
+               " values per vertex, at least one");
   }
   if (!uvs.empty() && uvs.size() != n) return bad("uvs has another length than positions");
   if (!colors.empty() && colors.size() != n) return bad("colors has another length than positions");

@@ -113,7 +113,7 @@ Status GltfFile::read_chunks(const ByteSource& bytes, ByteSource& binary) {
       return {Errc::unsupported, source_ + ": GLB version " + std::to_string(version) + ", 2 is read"};
     }
     if (length > bytes.size() || length < kGlbHeader) {
-      return fail("the header promises " + std::to_string(length) + " bytes, " +
+      return fail("the header declares " + std::to_string(length) + " bytes, " +
                   std::to_string(bytes.size()) + " are there");
     }
     text = {};

@@ -166,7 +166,7 @@ Result<LoadedCloud> fill(const PlyHeader& header, const Vertices& v, const std::
 void warn_of_stray_bytes(LoadReport& report, std::uint64_t bytes, std::uint64_t rows) {
   if (bytes == 0) return;
   report.warnings.push_back(std::to_string(bytes) + " stray bytes follow the " + std::to_string(rows) +
-                            " rows that the header promises");
+                            " rows that the header declares");
 }
 
 Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& source,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Builds in tiles. Each tile includes a border of the agent's radius plus three cells, so that erosion
-// and filters see the same context as in a single tile. The walkable cells are therefore the same.
+// and filters see the same context as in a single tile. The walkable cells are therefore
+// those of a single tile.
 #include <algorithm>
 #include <functional>
 #include <mutex>

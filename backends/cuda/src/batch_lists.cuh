@@ -8,7 +8,7 @@
 
 namespace gsnav::cuda {
 
-/// Adds pairs to tile lists, one per lane that wants one. Numbers in the lists are requested first and
+/// Adds pairs to tile lists, one per lane that has one. Numbers in the lists are requested first and
 /// used later. Lanes often share a list, so there is one atomic operation per distinct list. All lanes
 /// of the warp must call both functions together.
 class WarpPairs {

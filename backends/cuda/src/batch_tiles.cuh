@@ -113,7 +113,7 @@ class WarpSlab {
   __device__ WarpSlab(unsigned long long* counter, std::uint32_t slab)
       : counter_(counter), slab_(slab) {}
 
-  /// Place of each lane that wants one. All lanes must call it.
+  /// Place of each lane whose `wanted` is true. All lanes must call it.
   __device__ std::uint64_t take(bool wanted) {
     const unsigned lane = threadIdx.x % 32, votes = __ballot_sync(0xffffffffu, wanted);
     const std::uint32_t count = static_cast<std::uint32_t>(__popc(votes));

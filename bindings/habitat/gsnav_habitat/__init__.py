@@ -14,7 +14,7 @@ _RIVALS = ("habitat_sim", "magnum", "magnum_bindings")
 @functools.lru_cache(maxsize=None)
 def _distributions() -> dict[str, str]:
     """Versions of this distribution and its rivals, where they are installed, by their names in lower case."""
-    # importlib.metadata says the same, and its import alone takes as long as this package may take.
+    # importlib.metadata knows them too, but its import alone takes as long as this package may take.
     found: dict[str, str] = {}
     for folder in sys.path:
         try:

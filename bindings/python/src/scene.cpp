@@ -95,10 +95,11 @@ void bind_scene(nb::module_& m) {
           nb::arg("scene"), nb::arg("navmesh") = nb::none(),
           "A scene that shares the parts of `scene`, with another NavMesh if one is given.")
       .def_ro("navmesh", &SimulatorScene::navmesh, "Surface that agents walk on, or None.")
-      .def("__copy__", itself, nb::sig("def __copy__(self) -> SimulatorScene"), "The same object.")
+      .def("__copy__", itself, nb::sig("def __copy__(self) -> SimulatorScene"), "Returns this object.")
       .def("__deepcopy__", itself_with_memo,
            nb::sig("def __deepcopy__(self, memo: dict[int, object]) -> SimulatorScene"),
-           "The same object, because scenes do not change. Gymnasium copies arguments of environments.")
+           "Returns this object, because scenes do not change. Gymnasium copies arguments of "
+           "environments.")
       .def_prop_ro(
           "avatar_count", [](const SimulatorScene& s) { return s.avatars.size(); }, "Number of people.")
       .def_prop_ro(
@@ -109,9 +110,10 @@ void bind_scene(nb::module_& m) {
   nb::class_<OpenedScene>(
       m, "OpenedScene",
       "A scene with everything that was found or asked for. World frame: metres, Y up.")
-      .def("__copy__", itself, nb::sig("def __copy__(self) -> OpenedScene"), "The same object.")
+      .def("__copy__", itself, nb::sig("def __copy__(self) -> OpenedScene"), "Returns this object.")
       .def("__deepcopy__", itself_with_memo, nb::arg("memo"),
-           nb::sig("def __deepcopy__(self, memo: dict[int, object]) -> OpenedScene"), "The same object.")
+           nb::sig("def __deepcopy__(self, memo: dict[int, object]) -> OpenedScene"),
+           "Returns this object.")
       .def_ro("name", &OpenedScene::name, "The name that was opened.")
       .def_ro("scene", &OpenedScene::scene, "The scene, for renderers and simulators.")
       .def_prop_ro(

@@ -71,7 +71,7 @@ concept Backend = requires(B& b, void* p, const void* q, std::size_t n, detail::
 template <class B>
 inline constexpr bool is_host_backend = std::is_same_v<typename B::memory_space, HostSpace>;
 
-/// Number of pieces that the backend wants work cut into, at least 1.
+/// Number of pieces into which work for this backend should be cut, at least 1.
 template <Backend B>
 std::size_t concurrency_of(const B& b) noexcept {
   if constexpr (requires { b.concurrency(); }) {

@@ -39,7 +39,7 @@ struct NavMeshSettings {
   bool include_static_objects =
       false;  ///< Include objects that never move as obstacles (NavMeshPart::static_object).
   /// Edge of a tile in cells for meshes built from triangles: 0 for a single tile, as in Habitat, or 16
-  /// to 16384. Tiles are built in parallel. The walkable surface stays the same, but its polygons are
+  /// to 16384. Tiles are built in parallel. The walkable surface does not change, but its polygons are
   /// cut at tile borders.
   int tile_size = 0;
   std::size_t max_cells = std::size_t{1} << 28;  ///< Largest number of ground cells. Larger grids are an
