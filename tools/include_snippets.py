@@ -10,8 +10,9 @@ A page names the source in a comment before a code block, and optionally a regio
     ```
 
 A C++ source marks a region with the lines `// [snippet: render]` and `// [/snippet]`, a Python or shell
-source with `# [snippet: render]`. Whole files are shown without their licence line and their markers. In
-README.md, docs/guide and docs/concepts all C++ and Python comes from sources.
+source with `# [snippet: render]`. Whole files are shown without their licence line and their markers. All
+C++ and Python of README.md and docs/ comes from sources, except blocks behind a comment with a reason,
+`<!-- not compiled: its first line must not compile -->`.
 
 usage: include_snippets.py                rewrite the code blocks of README.md and docs/**/*.md
        include_snippets.py --check        name each block that differs; exit status 1 if there is any
@@ -27,7 +28,7 @@ import textwrap
 
 BLOCK = re.compile(r"^<!-- snippet: (\S+)(?: (\S+))? -->\n+```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 CODE_BLOCK = re.compile(r"^```(?:cpp|c\+\+|cuda|python|py)\n", re.MULTILINE)
-COMPILED = ("docs/guide", "docs/concepts")  # folders where all code comes from sources
+NOT_COMPILED = re.compile(r"^<!-- not compiled: \S.* -->\n+(?=```)", re.MULTILINE)
 COMMENT = re.compile(r"^<!-- snippet:", re.MULTILINE)
 BEGIN = re.compile(r"\s*(?://|#) \[snippet: (\S+)\]$")
 END = re.compile(r"\s*(?://|#) \[/snippet\]$")
@@ -90,11 +91,11 @@ def rewritten(root, page):
         if comment.start() not in starts:
             line = text.count("\n", 0, comment.start()) + 1
             wrong.append(f"{name}:{line}: no code block follows this comment")
-    if name == pathlib.Path("README.md") or any(name.is_relative_to(folder) for folder in COMPILED):
-        blocks = [m.span() for m in BLOCK.finditer(text)]
-        for code in CODE_BLOCK.finditer(text):
-            if not any(begin < code.start() < end for begin, end in blocks):
-                wrong.append(f"{name}:{text.count(chr(10), 0, code.start()) + 1}: code without a snippet comment")
+    blocks = [m.span() for m in BLOCK.finditer(text)]
+    excused = {m.end() for m in NOT_COMPILED.finditer(text)}
+    for code in CODE_BLOCK.finditer(text):
+        if code.start() not in excused and not any(begin < code.start() < end for begin, end in blocks):
+            wrong.append(f"{name}:{text.count(chr(10), 0, code.start()) + 1}: code without a snippet comment")
     return result, wrong
 
 
@@ -134,6 +135,8 @@ def self_test():
             ("<!-- snippet: examples/s.cpp -->\n```cpp\n```\n", "differs from examples/s.cpp", whole),
             ("```cpp\nlone();\n```\n", "code without a snippet comment", None),
             ("```python\nlone()\n```\n", "code without a snippet comment", None),
+            ("<!-- not compiled: it is wrong -->\n```cpp\none();\n  two();\n```\n", None, "one();\n  two();\n"),
+            ("<!-- not compiled: -->\n```cpp\nlone();\n```\n", "code without a snippet comment", None),
         ]
         failed = 0
         for text, finds, after in cases:

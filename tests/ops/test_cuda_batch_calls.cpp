@@ -111,11 +111,14 @@ TEST_CASE("cuda batch: images go to another stream and to pinned memory without 
   taken.resize_discard(values);
   PinnedArray<float> here(values), there(values);
   const std::vector<BatchCamera> batch = batch_of(cameras);
+  // [snippet: batch]
   BatchImages to;
-  to.floats.median_depth = depth.data();
+  to.floats.median_depth = depth.data();  // device memory, [cameras][height][width]
   CudaBatchRenderer renderer(cuda);
-  renderer.render(sets, batch, to).throw_if_error();
-  renderer.finish().throw_if_error();  // scratch has grown
+  renderer.render(sets, batch, to).throw_if_error();  // returns at once
+  renderer.finish().throw_if_error();                 // now the images are whole
+  // [/snippet]
+  // Scratch has grown to the size of these calls.
   for (int run = 0; run < (is_emulated() ? 2 : 5); ++run) {
     cuda.fill(depth.data(), 0xa5, values * sizeof(float));
     renderer.render(sets, batch, to).throw_if_error();
