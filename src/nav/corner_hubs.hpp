@@ -89,7 +89,8 @@ class CornerHubs {
     std::uint32_t hub = 0;
   };
 
-  /// Finds the corners and their sights. Returns false if a limit is exceeded.
+  /// Finds the corners, fills the faces' lists of sights, and links each corner to those that it sees.
+  /// Returns false if a limit is exceeded.
   bool look(const UnfoldedMesh& mesh, std::vector<std::vector<Link>>& links);
   void rank(const std::vector<std::vector<Link>>& links);
   bool label(const std::vector<std::vector<Link>>& links);

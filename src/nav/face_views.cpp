@@ -39,7 +39,7 @@ Beam enter(const UnfoldedMesh::Edge& e, const Beam& b) noexcept {
 }
 
 /// Limits the directions of a beam to those between `right` and `left`. A limit is applied only if it is
-/// within half a turn and tighter. Returns false if no line remains.
+/// within half a turn and tighter. Returns false if none remains.
 bool bound(Beam& b, const Flat& right, const Flat& left) noexcept {
   if (cross(b.rightmost, right) > 0) b.rightmost = right;
   if (cross(left, b.leftmost) > 0) b.leftmost = left;
@@ -47,7 +47,8 @@ bool bound(Beam& b, const Flat& right, const Flat& left) noexcept {
   return !(c < 0 && c * c > kSame * kSame * dot(b.rightmost, b.rightmost) * dot(b.leftmost, b.leftmost));
 }
 
-/// Limits directions to those that leave across an edge. Returns false if no line remains.
+/// Limits the directions of a beam to those that leave the face across edge `e`. Returns false if none
+/// remains.
 bool cross_edge(Beam& b, const Flat& e) noexcept {
   const Flat back = e * -1.0;
   if (cross(b.rightmost, back) > 0) return bound(b, back, b.leftmost);
@@ -55,8 +56,8 @@ bool cross_edge(Beam& b, const Flat& e) noexcept {
   return dot(b.rightmost, back) > 0;
 }
 
-/// Limits directions by the ends of the first edge and of the last window. Returns false if no line
-/// remains.
+/// Limits the directions of a beam by the ends of the first edge and of the last window. Returns false
+/// if none remains.
 bool look_ahead(Beam& b) noexcept {
   // Lines cross the first edge outwards, so only points on that side limit them.
   const Flat first = b.first_left - b.first_right, right = b.right - b.first_left,

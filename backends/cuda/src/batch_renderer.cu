@@ -21,7 +21,7 @@ std::size_t bin_words(const cuda::BatchArgs& args) {
   return std::size_t{args.tiles} << args.depth_bins.bits;
 }
 
-/// Words of the counters of a call and its bins.
+/// Number of 32-bit words that are zeroed before a call: its counters and bins.
 std::size_t zeroed_words(const cuda::BatchArgs& args) { return kCounterWords + bin_words(args); }
 
 }  // namespace

@@ -148,7 +148,9 @@ void for_each_set(const BatchCamera& camera, std::size_t sets, const F& f) {
   for (std::uint32_t s = 0; s < sets; ++s) f(s);
 }
 
-/// Offsets of a call's inputs in bytes from the begin of a block, in pinned memory and on the device.
+/// Where a call's inputs lie: offsets in bytes from the start of a block, and that block in pinned
+/// memory
+/// (`host`) and on the device.
 struct InputPlaces {
   std::size_t sets = 0, instances = 0, plain = 0, first = 0, list = 0, offsets = 0;
   unsigned char* host = nullptr;

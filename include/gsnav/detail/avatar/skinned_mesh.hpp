@@ -35,9 +35,9 @@ struct SkinnedMesh {
 
 /// What reading a rigged surface changed. Every repair is counted here.
 struct SkinnedMeshReport {
-  std::size_t vertices = 0, triangles = 0;   ///< Numbers of the mesh that was read.
-  std::size_t skins = 1, skins_in_file = 1;  ///< Skins whose meshes were read, and all skins of the file
-                                             ///< (glTF).
+  std::size_t vertices = 0, triangles = 0;   ///< Size of the mesh that was read.
+  std::size_t skins = 1, skins_in_file = 1;  ///< Number of skins whose meshes were read, and of all
+                                             ///< skins of the file (glTF).
   std::size_t unequal_weights =
       0;  ///< Vertices whose weights did not sum to 1 (within 1e-3); they were divided by the sum.
   /// Least and greatest sum of a vertex's weights in the file.

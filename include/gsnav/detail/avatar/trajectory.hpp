@@ -46,9 +46,9 @@ class StandingTrajectory final : public Trajectory {
 
 /// Settings of WalkTrajectory.
 struct WalkOptions {
-  double speed = 1.2;            ///< Metres per second along the path, > 0.
-  double acceleration = 2.0;     ///< Metres per second squared at stops, > 0.
-  double turn_rate = 2.5;        ///< Mean radians per second of a turn on the spot, > 0.
+  double speed = 1.2;            ///< Walking speed along the path, m/s, > 0.
+  double acceleration = 2.0;     ///< Acceleration and braking at stops, m/s^2, > 0.
+  double turn_rate = 2.5;        ///< Mean speed of a turn on the spot, rad/s, > 0.
   double heading_window = 0.35;  ///< Metres before and after a corner over which the heading turns.
   double stop_angle = 1.75;      ///< Radians. At a sharper corner the walker stops and turns on the
                                  ///< spot.

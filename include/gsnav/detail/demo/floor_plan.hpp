@@ -44,7 +44,7 @@ enum class WallSide { x_low, x_high, z_low, z_high };
 
 /// A room: the floor between its walls.
 struct PlannedRoom {
-  RoomKind kind = RoomKind::hall;  ///< Its use.
+  RoomKind kind = RoomKind::hall;  ///< Use of the room.
   FloorRect inside;                ///< The floor between the walls.
 };
 

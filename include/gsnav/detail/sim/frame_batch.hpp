@@ -124,8 +124,8 @@ class FrameBatch {
     return known_.emplace_back(Known{kind, std::make_unique<Batch>(*backend_, kind.config), {}});
   }
 
-  /// Draws the frames [begin, begin + count) of a group by one call. list_sets() has listed the group's
-  /// sets and cameras.
+  /// Draws the frames [begin, begin + count) of a group by one call. Call list_sets() first, which lists
+  /// the group's sets and cameras.
   Status draw(Known& known, std::size_t begin, std::size_t count, std::span<const FrameJob<float>> jobs,
               CopyKind to) {
     const std::span<const std::size_t> which = std::span(known.jobs).subspan(begin, count);
