@@ -109,8 +109,8 @@ std::uint32_t CudaBatchRenderer::State::room_for(std::uint64_t pairs) const {
                               std::numeric_limits<std::uint32_t>::max()));
 }
 
-/// Fills `seen`, `set_begins` and `cursors` with the sets that each camera sees. Returns the number of
-/// origins.
+/// Fills `seen`, `set_begins` and `cursors` with the sets that each camera sees. Returns the
+/// total number of these sets' origins (origin_count).
 std::size_t CudaBatchRenderer::State::list_seen(std::span<const GaussianSet> sets,
                                                 std::span<const BatchCamera> cameras) {
   seen.clear();
