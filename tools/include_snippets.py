@@ -27,7 +27,8 @@ import tempfile
 import textwrap
 
 BLOCK = re.compile(r"^<!-- snippet: (\S+)(?: (\S+))? -->\n+```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-CODE_BLOCK = re.compile(r"^```(?:cpp|c\+\+|cuda|python|py)\n", re.MULTILINE)
+CODE_BLOCK = re.compile(r"^```(?:cpp|c\+\+|cuda|python|py)\n|(?<=\n\n) {4}(?:#include |import |from [\w.]+ import )",
+                        re.MULTILINE)
 NOT_COMPILED = re.compile(r"^<!-- not compiled: \S.* -->\n+(?=```)", re.MULTILINE)
 COMMENT = re.compile(r"^<!-- snippet:", re.MULTILINE)
 BEGIN = re.compile(r"\s*(?://|#) \[snippet: (\S+)\]$")
@@ -136,6 +137,7 @@ def self_test():
             ("```cpp\nlone();\n```\n", "code without a snippet comment", None),
             ("```python\nlone()\n```\n", "code without a snippet comment", None),
             ("<!-- not compiled: it is wrong -->\n```cpp\none();\n  two();\n```\n", None, "one();\n  two();\n"),
+            ("    import lone\n", "code without a snippet comment", None),
             ("<!-- not compiled: -->\n```cpp\nlone();\n```\n", "code without a snippet comment", None),
         ]
         failed = 0

@@ -29,6 +29,20 @@ def test_ppo_runs_2048_steps(people):
     learn(gsnav.sb3.VecEnv(gsnav.VectorEnv(8, people, autoreset_mode="SameStep", **CONFIG)), 2048)
 
 
+@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::UserWarning")
+def test_the_lines_of_the_guide(people):
+    pytest.importorskip("torch").set_num_threads(1)
+    config, scene = CONFIG["config"], people
+    # [snippet: ppo]
+    import gsnav.sb3
+    import stable_baselines3
+
+    envs = gsnav.sb3.VecEnv(gsnav.VectorEnv(16, scene, config=config, autoreset_mode="SameStep"))
+    model = stable_baselines3.PPO("MultiInputPolicy", envs, n_steps=128).learn(2048)
+    # [/snippet]
+    assert model.num_timesteps == 2048
+
+
 def test_vec_env_has_the_episodes_of_the_vector_env(people):
     own = gsnav.VectorEnv(3, people, autoreset_mode="SameStep", **CONFIG)
     envs = gsnav.sb3.VecEnv(gsnav.VectorEnv(3, people, autoreset_mode="SameStep", **CONFIG))
