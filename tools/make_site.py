@@ -4,9 +4,10 @@
 
 usage: make_site.py [--out FOLDER] [--doxygen PROGRAM]
 
-Writes FOLDER/html/index.html (default: build/site). Fails where a public entity has no documentation, or a
-page has a dead link, lost headings or markup that is shown as text. Headers for users are those of
-include/gsnav outside detail/, those that a module header includes, and those of the backends.
+Writes FOLDER/html/index.html (default: build/site). Fails where a public entity, each overload too, has no
+documentation or one that says TODO, or a page has a dead link, lost headings or markup that is shown as
+text. Headers for users are those of include/gsnav outside detail/, those that a module header includes, and
+those of the backends.
 """
 import argparse
 import os
@@ -208,16 +209,13 @@ OBVIOUS = ((re.compile(r"^ *(?:explicit )?(\w+)\(\1&&\)"), "Moves from the other
 FIELD = r"[A-Za-z_]\w*(?:\[\w+\])?(?: = [^,;]+|\{[^{}]*\})?"
 FIELDS = re.compile(r"^( *)((?:static |inline |constexpr |mutable )*(?:[\w:]+(?:<[^;={}]*>)?)[*&]? )"
                     rf"({FIELD}(?:, {FIELD})+);(?:\s*///< (.*))?$")
-FUNCTION = re.compile(r"^ *(?:template .*> )?(?:GSNAV_HD |static |constexpr |virtual |inline |friend )*"
-                      r"[\w:<>,*& ]*?[ *&](\w+|operator *[^\s(]+)\(")
 
 
 def document_the_obvious(text):
-    """Gives functions that the language defines their meaning, several fields of one line its comment each, and
-    overloads directly behind a documented one a reference to it. Lines keep their numbers."""
-    lines, out, documented, above = text.split("\n"), [], "", ""
+    """Gives functions that the language defines their meaning, and several fields of one line its comment each.
+    Lines keep their numbers."""
+    lines, out, above = text.split("\n"), [], ""
     for line in lines:
-        bare = line.strip()
         commented = above.startswith("///") and not above.startswith("///<")
         several = FIELDS.match(line)
         if several and (several.group(4) or commented) and "(" not in several.group(3).split("=")[0]:
@@ -231,18 +229,19 @@ def document_the_obvious(text):
                 if pattern.match(line):
                     line = f"/** {said} */ {line}"
                     break
-            else:
-                function = FUNCTION.match(line)
-                if function and function.group(1) == documented and "///" not in line:
-                    line = f"/** As above, with other arguments. */ {line}"
-        function = FUNCTION.match(line.split("*/ ", 1)[-1])
-        if function and (commented or "/**" in line or "///<" in line):
-            documented = function.group(1)
-        elif not bare or bare.endswith(("}", "{")) and not function:
-            documented = "" if not bare else documented
         out.append(line)
-        above = bare if not bare.startswith("template") else above
+        above = line.strip() if not line.strip().startswith("template") else above
     return "\n".join(out)
+
+
+UNFINISHED = re.compile(r"\b(TODO|FIXME|XXX|TBD)\b|\?\?\?")
+
+
+def unfinished(text, name):
+    """Lines for comments and pages that say that something is left to write."""
+    return [f"{name}:{number}: error: '{m.group()}' is no documentation"
+            for number, line in enumerate(text.split("\n"), 1)
+            if (m := UNFINISHED.search(line)) and (name.endswith(".md") or "//" in line[:m.start()])]
 
 
 ENUM = re.compile(r"^ *enum (?:class |struct )?(\w+)[^;{]*\{\n(.*?)^ *\}", FLAGS)
@@ -267,10 +266,11 @@ def write_inputs(out):
     known, copies, wrong = set(pages()), {}, []
     for name in sorted(known):
         copies[name] = page_text(name, known, wrong)
+        wrong += unfinished((ROOT / name).read_text(encoding="utf-8"), name)
     for path, group in headers().items():
         name = path.relative_to(ROOT).as_posix()
         copies[name] = header_text(path, re.sub(r"^include/|^backends/\w+/", "", name), group)
-        wrong += bare_enumerators(copies[name], name)
+        wrong += bare_enumerators(copies[name], name) + unfinished(path.read_text(encoding="utf-8"), name)
     for name, text in copies.items():
         (out / "input" / name).parent.mkdir(parents=True, exist_ok=True)
         (out / "input" / name).write_text(text, encoding="utf-8")
@@ -410,6 +410,7 @@ def make(out, doxygen):
     said = (done.stdout + done.stderr).replace(f"{out}/input/", "")
     print(said, end="")
     if done.returncode != 0 or "warning:" in said or "error:" in said:
+        print("\n".join(wrong))
         return 1
     drop_links_to_nothing(out / "html")
     wrong += wrong_pages(out / "html") + dead_links(out / "html")

@@ -25,6 +25,7 @@ struct Place {
   double x = 0, y = 0;  ///< metres
   /// Whether it is here.
   bool here() const;
+  /// Whether the other is here.
   bool here(int other) const;
   bool operator==(const Place&) const = default;
 };
@@ -105,7 +106,13 @@ class Tree(unittest.TestCase):
         line = [k for k, t in enumerate(HEADER.split("\n")) if "struct Place" in t]
         self.assertEqual(line, [k for k, t in enumerate(text.split("\n")) if "struct Place" in t])
         self.assertIn("/** metres */ double y = 0; double x = 0; ///< metres", text)
-        self.assertIn("/** As above, with other arguments. */   bool here(int other) const;", text)
+
+    def test_comments_that_are_left_to_write(self):
+        found = lambda text, name="a.hpp": make_site.unfinished(text, name)  # noqa: E731
+        self.assertEqual(found("/// A.\n/// TODO\nint f();\nint g();  ///< FIXME: units\n"),
+                         ["a.hpp:2: error: 'TODO' is no documentation", "a.hpp:4: error: 'FIXME' is no documentation"])
+        self.assertEqual(found('const char* name = "/tmp/XXX";\n/// Names end in XXXXXX, as for mkstemp.\n'), [])
+        self.assertEqual(found("# Page\n\nTBD\n", "a.md"), ["a.md:3: error: 'TBD' is no documentation"])
 
     def test_comments_of_templates_are_no_markup(self):
         said = make_site.plain_comments("/// Box<b> and `Box<b>`.\n///     Box<b> a;\nBox<b> c;  ///< Box<b>\n")
@@ -127,6 +134,8 @@ class Tree(unittest.TestCase):
         self.assertIn("page_docs_a.html", (html / "index.html").read_text())
         self.assertTrue((html / "search").is_dir())
         for wrong, said in ((HEADER.replace("  /// Whether it is here.\n", ""), "here() const (function) of struct"),
+                            (HEADER.replace("  /// Whether the other is here.\n", ""), "here(int other) const"),
+                            (HEADER.replace("Finds a place.", "TODO"), "'TODO' is no documentation"),
                             (HEADER.replace("/// A place.\n", ""), "Compound gsnav::Place is not documented"),
                             (HEADER.replace("  ///< metres", ""), "Member x (variable)")):
             self.write("include/gsnav/nav/place.hpp", wrong)

@@ -90,6 +90,7 @@ class SkinnedCrowd {
   std::size_t size() const noexcept { return actors_.size(); }
   /// The posed Gaussians of a place. Valid until the next pose().
   GaussianSet set(std::size_t place) const& noexcept { return actors_[place].set(); }
+  /// Deleted for temporaries, because the set refers to the crowd's buffers.
   GaussianSet set(std::size_t place) const&& = delete;
 
  private:

@@ -31,6 +31,7 @@ struct PlacedMeshes {
     }
     return all;
   }
+  /// Deleted for temporaries, because instances refer to the meshes.
   std::vector<MeshInstance> in_world(const Similarity& world_from_scene = {},
                                      std::uint32_t first_id = 0) const&& = delete;
 };

@@ -31,6 +31,7 @@ class GreedyGeodesicFollower {
   static Result<GreedyGeodesicFollower> make(const NavMesh& mesh, const Vec3d& goal,
                                              const TaskConfig& task = {},
                                              const GreedyFollowerOptions& options = {});
+  /// Deleted for temporaries, because the follower refers to the mesh.
   static Result<GreedyGeodesicFollower> make(const NavMesh&& mesh, const Vec3d& goal,
                                              const TaskConfig& task = {},
                                              const GreedyFollowerOptions& options = {}) = delete;
