@@ -26,6 +26,8 @@ PROGRAMS = (
     ("gsnav-eval", "tools/gsnav-eval", "Plays episodes by a policy and reports metrics."),
     ("gsnav-replay", "tools/gsnav-replay", "Plays an episode of gsnav-eval again, from any camera."),
     ("gsnav-viewer", "tools/viewer/gsnav-viewer", "Shows a scene in a browser, to walk in it."),
+    ("gsnav-report", "bench/report/gsnav-report",
+     "Measures speed against error of profiles, sensors and backends; draws a page."),
     ("nav_loop", "examples/nav_loop", "The demo's loop: agents, people, pictures and metrics."),
 )
 HEAD = """# Command lines

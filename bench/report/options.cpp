@@ -72,30 +72,37 @@ void add_scenes(CLI::App& app, Options& o, std::vector<std::string>& sizes, std:
       ->capture_default_str();
 }
 
+std::string joined(const std::vector<std::string>& names) {
+  std::string out;
+  for (const std::string& name : names) out += (out.empty() ? "" : ", ") + name;
+  return out;
+}
+
 void add_kinds_of_rows(CLI::App& app, Options& o, std::vector<std::string>& oracles) {
+  // The names stand in the description, where they have spaces and wrap.
   const auto list = [&app](const char* name, std::vector<std::string>& values,
-                           std::vector<std::string> known, const char* text) {
-    app.add_option(name, values, text)
+                           const std::vector<std::string>& known, const char* text) {
+    const std::string given = values == known ? "all" : joined(values);
+    app.add_option(name, values, std::string(text) + ". Any of " + joined(known) + "; default: " + given)
+        ->type_name("NAME")
         ->delimiter(',')
-        ->check(CLI::IsMember(std::move(known)))
-        ->capture_default_str();
+        ->check(CLI::IsMember(known).description(""));
   };
   list("--kinds", o.kinds, {"render", "ledger", "skinning", "sweep", "kernel"}, "Kinds of rows");
-  list("--sensors", o.sensors, {"rgbd", "rgb", "depth"}, "What is rendered");
+  list("--sensors", o.sensors, {"rgbd", "rgb", "depth"}, "Images that are rendered");
   list("--profiles", o.profiles, {"exact", "fast", "lod", "none"},
-       "Profiles; lod is judged by photo4, and its tree is kept beside the scene's file; none: no such "
+       "Profiles; lod is judged by photo4, and its tree is kept next to the scene's file; none: no such "
        "rows");
   list("--backends", o.backends, {"openmp", "serial", "cuda"},
        "Backends; all but the first with the first sensor only");
   std::vector<std::string> known_knobs = knob_names();
   known_knobs.emplace_back("none");
-  list("--knobs", o.knobs, std::move(known_knobs),
-       "Knobs that are turned by themselves; none: no such rows");
+  list("--knobs", o.knobs, known_knobs, "Knobs that are turned by themselves; none: no such rows");
   app.add_option("--knob-values", o.knob_values,
                  "Only these values of the knobs, as the CSV has them: packed, 1e-3, ...")
       ->delimiter(',');
   list("--oracles", oracles, oracles,
-       "Judges: `contract` judges all rows, the others those that they have a rule for");
+       "Judges; contract judges all rows, the others those that they have a rule for");
 }
 
 void add_run(CLI::App& app, Options& o) {
@@ -122,7 +129,7 @@ void add_run(CLI::App& app, Options& o) {
   app.add_flag("--resume", o.resume,
                "Keeps the rows of OUT/report.csv and makes those that are missing");
   app.add_flag("--acceptance", o.acceptance,
-               "Also judge by gsnav's own budgets and targets, which are of its benchmark scenes");
+               "Also judge by gsnav's own budgets and targets, which hold for its benchmark scenes");
   app.add_flag("--no-html", o.no_html, "No page, the CSV only");
 }
 
@@ -148,7 +155,8 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   app.add_flag(
       "--quick", quick,
       "A first look in under a minute: two views of 256x256, RGB-D by OpenMP, profiles exact and "
-      "fast, the contract's oracle, three timed runs, nothing else; options given beside it hold");
+      "fast, the contract's oracle, three timed runs, nothing else. Options that you name keep their "
+      "values");
   if (const auto status = gsnav_tools::parse_options(app, argc, argv)) {
     exit_code = *status;
     return std::nullopt;

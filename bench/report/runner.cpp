@@ -102,7 +102,7 @@ Status render_scenes(const Options& o, CsvFile& csv, const Row& stamp) {
 
 /// Adds rows of a kind that has no settings, unless the file already has the whole set of them.
 Status add_rows(const Options& o, CsvFile& csv, const Row& stamp, const std::string& kind,
-                const std::function<Result<std::vector<Row>>()>& make) {
+                const std::function<Result<std::vector<Row>>(const OnStep&)>& make) {
   if (!o.wants(kind) || interrupted()) return {};
   const std::string set = kind + " of " + stamp.get("commit") + " on " + stamp.get("machine");
   const auto key = [&](std::size_t i, std::size_t n) {
@@ -110,7 +110,16 @@ Status add_rows(const Options& o, CsvFile& csv, const Row& stamp, const std::str
   };
   if (csv.has(key(0, 1))) return {};
   std::fprintf(stderr, "%s rows\n", kind.c_str());
-  const Result<std::vector<Row>> rows = make();
+  Progress progress(0);
+  bool shown = false;
+  const Result<std::vector<Row>> rows =
+      make([&](std::size_t done, std::size_t total, const std::string& what) {
+        shown = true;
+        progress.set_total(total);
+        progress.show(done, what);
+        return !interrupted();
+      });
+  if (shown) progress.finish();
   if (!rows) return rows.status();
   for (std::size_t i = 0; i < rows->size(); ++i) {
     if (csv.has(key(i, rows->size()))) continue;  // an interrupted run has added this row
@@ -134,20 +143,34 @@ Status run_report(const Options& o) {
       .set("date", today());
 
   watch_interrupts();
-  if (Status s = add_rows(o, *csv, stamp, "ledger", [] { return ledger_rows(); }); !s) return s;
+  if (Status s = add_rows(o, *csv, stamp, "ledger", [](const OnStep&) { return ledger_rows(); }); !s)
+    return s;
   if (o.wants("render")) {
     if (Status s = render_scenes(o, *csv, stamp); !s) return s;
   }
   SkinningOptions skinning;
   skinning.threads = o.threads;
   skinning.runs = o.runs;
-  if (Status s = add_rows(o, *csv, stamp, "skinning", [&] { return skinning_rows(skinning); }); !s)
+  if (Status s = add_rows(o, *csv, stamp, "skinning",
+                          [&](const OnStep& on_step) {
+                            skinning.on_step = on_step;
+                            return skinning_rows(skinning);
+                          });
+      !s)
     return s;
   SweepOptions sweep;
   sweep.runs = o.runs;
-  if (Status s = add_rows(o, *csv, stamp, "sweep", [&] { return sweep_rows(sweep); }); !s) return s;
+  if (Status s = add_rows(o, *csv, stamp, "sweep",
+                          [&](const OnStep& on_step) {
+                            sweep.on_step = on_step;
+                            return sweep_rows(sweep);
+                          });
+      !s)
+    return s;
   if (!o.benchmarks.empty()) {
-    if (Status s = add_rows(o, *csv, stamp, "kernel", [&] { return kernel_rows(o.benchmarks); }); !s)
+    if (Status s =
+            add_rows(o, *csv, stamp, "kernel", [&](const OnStep&) { return kernel_rows(o.benchmarks); });
+        !s)
       return s;
   }
   if (interrupted())

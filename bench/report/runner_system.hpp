@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 
 namespace gsnav_report {
@@ -21,6 +22,10 @@ void reset_peak_memory();
 /// After this call the first Ctrl-C only sets interrupted(); a second one ends the process.
 void watch_interrupts();
 bool interrupted() noexcept;
+
+/// Called before each step of a longer task, with the number of steps done, that of all steps, and the
+/// name of the next one. The task ends if it returns false.
+using OnStep = std::function<bool(std::size_t done, std::size_t total, const std::string& what)>;
 
 /// A line of progress: settings done, time elapsed, and the remaining time at the pace so far. On a
 /// terminal it is one line that changes, otherwise a new line every ten seconds.

@@ -169,12 +169,19 @@ Result<std::vector<Row>> skinning_rows(const SkinningOptions& o) {
   OpenMPBackend openmp(o.threads);
   const std::pair<const char*, const std::vector<LocalPose>*> sets[] = {{"walk", &walking},
                                                                         {"random_60deg", &random}};
+  constexpr std::size_t kMostInfluences = 8;
+  std::size_t done = 0;
+  const auto stopped = [&](const std::string& what) {
+    return o.on_step && !o.on_step(done++, std::size(sets) * (kMostInfluences + 1), what);
+  };
   for (const auto& [name, poses] : sets) {
     const std::vector<Matrices> matrices = skinning_matrices(skeleton, *poses);
     Row base;
     base.set("kind", "skinning").set("scene", "humanoid").set("knob", "poses").set("knob_value", name);
     std::vector<double> weights;
-    for (std::size_t k = 1; k <= 8; ++k) {
+    for (std::size_t k = 1; k <= kMostInfluences; ++k) {
+      if (stopped(std::string(name) + ", influences per Gaussian: " + std::to_string(k)))
+        return std::vector<Row>{};
       SkinningErrors e;
       for (std::size_t i = 0; i < sampled->size(); ++i) {
         truncate_weights(&dense[i * joints], joints, k, weights);
@@ -190,6 +197,7 @@ Result<std::vector<Row>> skinning_rows(const SkinningOptions& o) {
           .set("note", "float64, K greatest weights against all joints");
       add_skinning_rows(rows, std::move(row), e);
     }
+    if (stopped(std::string(name) + ", float32")) return std::vector<Row>{};
     base.set("profile", "exact");
     Row by_serial = base, by_openmp = base;
     by_serial.set("backend", "serial").set("threads", 1);

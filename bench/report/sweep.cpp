@@ -2,7 +2,9 @@
 #include "sweep.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <string>
 #include <utility>
@@ -211,10 +213,22 @@ long double least_gap(const MovingCapsule<double>& a, const MovingCapsule<double
 }
 
 std::vector<Row> sweep_rows(const SweepOptions& o) {
+  constexpr std::array kSpeeds{0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0};  // metres per motion
+  std::size_t done = 0;
+  const auto stopped = [&](const std::string& what) {
+    return o.on_step && !o.on_step(done, 2 * kSpeeds.size(), what);
+  };
+  if (stopped("distances of segments")) return {};  // fast, so that it does not count as a step
   std::vector<Row> rows{distance_row<float>(o, "float32"), distance_row<double>(o, "float64")};
-  for (const double speed : {0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0}) {
+  for (const double speed : kSpeeds) {
+    char metres[16];
+    std::snprintf(metres, sizeof metres, "%g m", speed);
+    if (stopped(std::string("sweeps over ") + metres + ", float32")) return {};
     speed_rows<float>(o, "float32", speed, rows);
+    ++done;
+    if (stopped(std::string("sweeps over ") + metres + ", float64")) return {};
     speed_rows<double>(o, "float64", speed, rows);
+    ++done;
   }
   return rows;
 }

@@ -6,6 +6,7 @@
 
 #include "csv.hpp"
 #include "gsnav/math/capsule.hpp"
+#include "runner_system.hpp"
 
 namespace gsnav_report {
 
@@ -26,10 +27,11 @@ long double least_gap(const gsnav::MovingCapsule<double>& a, const gsnav::Moving
 struct SweepOptions {
   int pairs = 1000;  ///< random pairs per row
   int runs = 15;     ///< timed passes over them
+  OnStep on_step;    ///< may be empty
 };
 
 /// Rows of capsule distances and sweeps in float32 and float64 against long double; sweeps by speed of
-/// motion.
+/// motion. No rows if `on_step` returns false.
 std::vector<Row> sweep_rows(const SweepOptions& options);
 
 }  // namespace gsnav_report

@@ -51,8 +51,15 @@ TEST_CASE("sweep rows: within the contract's budget at every speed") {
   SweepOptions options;
   options.pairs = 40;
   options.runs = 1;
+  std::vector<std::size_t> steps;
+  options.on_step = [&](std::size_t done, std::size_t total, const std::string&) {
+    CHECK(total == 7 * 2);
+    steps.push_back(done);
+    return true;
+  };
   const std::vector<Row> rows = sweep_rows(options);
   CHECK(rows.size() == 2 + 7 * 4);
+  CHECK(steps == std::vector<std::size_t>{0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13});
   for (const Row& row : rows) {
     CAPTURE(row.get("name"));
     CAPTURE(row.get("knob_value"));
@@ -60,6 +67,28 @@ TEST_CASE("sweep rows: within the contract's budget at every speed") {
     if (row.get("name").rfind("penetration", 0) == 0) CHECK(*row.number("error_max") <= 1e-5);
     CHECK(*row.number("items_per_second") > 0);
   }
+}
+
+TEST_CASE("rows of sweeps and skinning: a step that is refused ends the work without rows") {
+  std::size_t last = 0;
+  const auto until_two = [&](std::size_t done, std::size_t, const std::string&) {
+    last = done;
+    return done < 2;
+  };
+  SweepOptions sweep;
+  sweep.pairs = 4;
+  sweep.runs = 1;
+  sweep.on_step = until_two;
+  CHECK(sweep_rows(sweep).empty());
+  CHECK(last == 2);
+  SkinningOptions skinning;
+  skinning.gaussians = skinning.sampled = 2000;
+  skinning.poses = 1;
+  skinning.runs = 1;
+  skinning.on_step = until_two;
+  last = 0;
+  CHECK(skinning_rows(skinning).value().empty());
+  CHECK(last == 2);
 }
 
 TEST_CASE("skinning rows: more influences, less error; float32 within the budget") {
