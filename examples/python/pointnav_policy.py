@@ -67,7 +67,7 @@ class Policy:
 
 
 def load(path: pathlib.Path) -> Policy:
-    """Reads the policy from a file of save(), or from the checkpoint.pt of train_pointnav.py. The latter needs torch."""
+    """Reads the policy from a file of save(), or from checkpoint.pt of train_pointnav.py, which needs torch."""
     if not path.exists():
         sys.exit(f"{path}: not found. Train first, or name another file by --weights.")
     if path.suffix == ".npz":
