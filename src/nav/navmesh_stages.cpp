@@ -4,12 +4,20 @@
 #include <DetourNavMeshBuilder.h>
 
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 
 namespace gsnav::detail {
 namespace {
 
 constexpr double kEdge = 1e-6;  // Rounding error of a length that is a multiple of a cell, in cells.
+
+/// A number with up to six digits, without trailing zeros.
+std::string short_text(double v) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", v);
+  return text;
+}
 
 int clamp_cells(double v) noexcept { return static_cast<int>(min(max(v, 0.0), 30000.0)); }
 
@@ -102,19 +110,20 @@ Status check_grid(const NavMeshSettings& settings, const Vec3d& low, const Vec3d
   const double columns = (high.x - low.x) / cs, rows = (high.z - low.z) / cs;
   const double levels = (high.y - low.y) / ch;
   const auto size = [&] {
-    return std::to_string(columns) + " x " + std::to_string(rows) + " cells of " + std::to_string(cs) +
-           " m, " + std::to_string(levels) + " levels of " + std::to_string(ch) + " m";
+    return short_text(std::ceil(columns)) + " x " + short_text(std::ceil(rows)) + " cells of " +
+           short_text(cs) + " m, " + short_text(std::ceil(levels)) + " levels of " + short_text(ch) +
+           " m";
   };
   // Recast stores the agent's radius in half cells, and free heights in cells, in 8 bits.
   if (const VoxelSettings v(settings); v.radius > 127) {
     return Status(Errc::invalid_argument,
-                  "NavMeshSettings.agent_radius = " + std::to_string(settings.agent_radius) +
-                      " is more than 127 cells of cell_size " + std::to_string(cs) +
+                  "NavMeshSettings.agent_radius = " + short_text(settings.agent_radius) +
+                      " is more than 127 cells of cell_size " + short_text(cs) +
                       "; use larger cells (cell_size, --cell-size)");
   } else if (v.height > 255) {
     return Status(Errc::invalid_argument,
-                  "NavMeshSettings.agent_height = " + std::to_string(settings.agent_height) +
-                      " is more than 255 cells of cell_height " + std::to_string(ch) +
+                  "NavMeshSettings.agent_height = " + short_text(settings.agent_height) +
+                      " is more than 255 cells of cell_height " + short_text(ch) +
                       "; use larger cells (cell_height, --cell-height)");
   }
   // Recast stores vertices in 16 bits and spans in RC_SPAN_HEIGHT_BITS.
@@ -124,12 +133,13 @@ Status check_grid(const NavMeshSettings& settings, const Vec3d& low, const Vec3d
     return Status(Errc::invalid_argument, "NavMesh: a grid of " + size() +
                                               " exceeds 65000 per side or NavMeshSettings.max_cells = " +
                                               std::to_string(settings.max_cells) +
-                                              "; raise cell_size or crop the scene");
+                                              "; use larger cells (cell_size, --cell-size) or a smaller "
+                                              "part of the scene");
   }
   if (!(levels < static_cast<double>(RC_SPAN_MAX_HEIGHT))) {
     return Status(Errc::invalid_argument, "NavMesh: a grid of " + size() + " exceeds " +
                                               std::to_string(RC_SPAN_MAX_HEIGHT) +
-                                              " levels; raise cell_height");
+                                              " levels; use higher cells (cell_height, --cell-height)");
   }
   return {};
 }

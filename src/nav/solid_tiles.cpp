@@ -215,8 +215,8 @@ Status join_tiles(VoxelGrid& g, const TileLists& lists, std::vector<TileRuns>& t
   for (const TileRuns& t : tiles) all += t.runs.size();
   if (all >= std::numeric_limits<std::uint32_t>::max()) {
     return {Errc::out_of_memory,
-            "NavMesh from Gaussians: more than 2^32 runs of solid voxels; raise cell_size or crop "
-            "the scene"};
+            "NavMesh from Gaussians: more than 2^32 runs of solid voxels; use larger cells "
+            "(cell_size, --cell-size) or crop the scene (GaussianNavOptions.crop, --crop)"};
   }
   for (std::size_t t = 0; t < tiles.size(); ++t) {
     columns(t, [&](std::size_t c, std::uint32_t n, std::size_t) { g.first[c + 1] = n; });
