@@ -19,8 +19,9 @@ inline constexpr int kInfluences4 = 4,  ///< four joints per Gaussian
     kInfluences8 = 8;                   ///< eight joints per Gaussian
 /// Number of parts that make a skinning weight of 1. Weights are stored as integers of parts, and those
 /// of a Gaussian sum to kWeightParts exactly. Rounding weights (detail/avatar/skinning_weights.hpp)
-/// moves a Gaussian by at most K / (4 kWeightParts) times the greatest distance between two positions
-/// that single joints would give it. Per metre of that distance: 15 um for K = 4, 31 um for K = 8.
+/// moves a Gaussian of K joints by at most K d / (4 kWeightParts). Each joint alone would move it to a
+/// position of its own; d is the greatest distance between two of these positions. For d = 1 m the bound
+/// is 15 um with four joints, and 31 um with eight.
 inline constexpr int kWeightParts = 65535;
 /// Smallest determinant of a blended linear part that still has a useful orientation. Below it (a 180
 /// degree twist, the candy-wrapper effect) the joint with the greatest weight gives the rotation.

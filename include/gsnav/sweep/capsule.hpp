@@ -259,9 +259,9 @@ GSNAV_HD SweepResult<L> sweep(const MovingCapsule<L>& agent, const MovingCapsule
   return detail::sweep_steps(agent, body, rules, rules.max_iterations, unfinished);
 }
 
-/// Smallest gap of two linearly moving capsules over the unit interval, or `best` if that is smaller. It
-/// is too large by at most `tolerance` (metres, > 0). The plane between the capsules bounds how long
-/// they cannot come closer.
+/// Smallest gap of two linearly moving capsules over the unit interval, or `best` if that is smaller.
+/// The result is too large by at most `tolerance` (metres, > 0). It advances in time: a plane between
+/// the capsules tells how long neither can cross it, and so how long the gap stays above the result.
 template <class S>
 GSNAV_HD S least_gap(const MovingCapsule<S>& agent, const MovingCapsule<S>& body, S best,
                      S tolerance) noexcept {

@@ -42,9 +42,11 @@ struct SplatDepth {
   S g[3]{}, gx[3]{}, gy[3]{};
 };
 
-/// Record that converts the linearised response to the response along each ray. With f = f0 + fx dx + fy
-/// dy, the exponent |w|^2 becomes |w|^2 / (f^2 + c |w|^2) where f > 0. Where f <= 0 the pixel is behind
-/// the camera and has no response.
+/// Record that converts the linearised response of a Gaussian to its response along each ray
+/// (every Response but ewa). (dx, dy) is the pixel's distance from the reference point of the splat, w the
+/// whitened offset whose |w|^2 is the linearised exponent (both: SplatGeometry). With f = f0 + fx dx +
+/// fy dy, the exponent becomes |w|^2 / (f^2 + c |w|^2), where c is a number of the Gaussian. A pixel
+/// with f <= 0 is behind the camera and has no response.
 template <class S>
 struct SplatPerspective {
   S f0{}, fx{}, fy{}, c{};

@@ -50,8 +50,8 @@ struct SpanWords {
 };
 static_assert(sizeof(TileSpans) == 4 * sizeof(std::int32_t) && TileSpans::kRows == 5);
 
-/// Tiles of kWidth splats, as for_each_tile finds them, in each lane. `lanes` has the bits of the lanes
-/// that are needed.
+/// Finds the tiles of kWidth splats, one splat per lane. They are the tiles that for_each_tile() finds.
+/// `lanes` has the bits of the lanes that are needed; the words of the others mean nothing.
 GSNAV_HD SpanWords find_tiles(const TileGrid& grid, const SplatGeometry<F>& g, float log2_alpha_min,
                               const PixelBox<F>& box, std::uint32_t lanes) noexcept {
   const F zero(0.0f), one(1.0f), size(static_cast<float>(grid.tile_size));

@@ -131,9 +131,9 @@ inline constexpr std::size_t kSampleCells = 16, kLeastSampled = 64;
 /// on it.
 struct ViewpointOrder {
   std::vector<std::size_t> sample;  ///< Sampled cells, spread evenly; empty if none are sampled.
-  std::vector<std::size_t> order;   ///< [viewpoints].
-  std::size_t sampled = 0;          ///< Number of viewpoints, first in `order`, after which the sampled
-                                    ///< cells are complete.
+  std::vector<std::size_t> order;   ///< Viewpoints in the order of processing, [viewpoints].
+  std::size_t sampled = 0;          ///< The sampled cells are complete after this many viewpoints of
+                                    ///< `order`.
 };
 
 /// Orders the viewpoints. `counts_for(cell, viewpoint)` returns whether the cell sees what this

@@ -20,7 +20,7 @@ namespace gsnav {
 template <Backend B>
 class SensorRig {
  public:
-  /// Plans for sensors, which must be valid.
+  /// Plans the views of `sensors`. Precondition: validate() accepts each of them.
   SensorRig(B& backend, std::vector<SensorSpec> sensors)
       : backend_(&backend),
         plan_(std::move(sensors)),
