@@ -43,9 +43,9 @@ struct SplatDepth {
 };
 
 /// Record that converts the linearised response of a Gaussian to its response along each ray
-/// (every Response but ewa). (dx, dy) is the pixel's distance from the reference point of the splat, w the
-/// whitened offset whose |w|^2 is the linearised exponent (both: SplatGeometry). With f = f0 + fx dx +
-/// fy dy, the exponent becomes |w|^2 / (f^2 + c |w|^2), where c is a number of the Gaussian. A pixel
+/// (every Response but ewa). (dx, dy) is the pixel's distance from the reference point of the splat, w
+/// the whitened offset whose |w|^2 is the linearised exponent (both: SplatGeometry). With f = f0 + fx dx
+/// + fy dy, the exponent becomes |w|^2 / (f^2 + c |w|^2), where c is a number of the Gaussian. A pixel
 /// with f <= 0 is behind the camera and has no response.
 template <class S>
 struct SplatPerspective {

@@ -38,8 +38,8 @@ GSNAV_HD Skinned<L> skin(const DualQuat<L>& blend, const Vec3<L>& mean, const Qu
 }
 
 /// m with its singular values clamped to [kLeastStretch, kGreatestStretch]. Where a body folds over,
-/// det(m) < 0: the smallest singular value is then taken as negative, and is raised to the lower limit. A
-/// matrix within the limits is returned unchanged, bit for bit.
+/// det(m) < 0: the smallest singular value is then taken as negative, and is raised to the lower limit.
+/// A matrix within the limits is returned unchanged, bit for bit.
 template <class S>
 GSNAV_HD Mat3<S> clamped_stretch(const Mat3<S>& m) noexcept {
   // Most Gaussians are hardly stretched. If |m^T m - 1| < 0.75, all singular values are within the
