@@ -56,7 +56,13 @@ Status validate(const OpenedScene& scene, int width, int height, double hfov) {
     return bad("an image of " + std::to_string(width) + " x " + std::to_string(height) +
                " pixels: sides must be in [1, 16384]");
   if (!(hfov > 0 && hfov < 180)) return bad("hfov = " + std::to_string(hfov) + ": must be in (0, 180)");
-  if (scene.scene == nullptr || (scene.scene->assets.empty() && scene.scene->meshes.empty()))
+  const auto drawn = [](const SceneMesh& mesh) {
+    return std::ranges::any_of(mesh.surface->instances, [&](const TexturedScene::Instance& i) {
+      return !mesh.surface->meshes.mesh(i.part).geometry.vertices.empty();
+    });
+  };
+  if (scene.scene == nullptr ||
+      (scene.scene->assets.empty() && !std::ranges::any_of(scene.scene->meshes, drawn)))
     return bad("the scene has nothing to look at");
   return {};
 }

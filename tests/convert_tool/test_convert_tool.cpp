@@ -327,6 +327,7 @@ TEST_CASE("convert: a name that cannot be written is said before anything is rea
   };
   says("absent.ply out.txt", "out.txt: unknown kind of file to write");
   says("absent.ply none/out.ply", "none does not exist");
+  says("absent.ply out.ply --bogus", "there is no option --bogus\n");
   std::filesystem::create_directory(folder / "folder.ply");
   says("absent.ply folder.ply", "it is a folder");
 }

@@ -152,6 +152,18 @@ TEST_CASE("render tool: a folder that cannot be is said before the scene is read
   CHECK_FALSE(out.ok);
   CHECK(out.says("--out file/in: the folder cannot be made"));
   CHECK_FALSE(out.says("absent.ply"));
+
+  const Outcome cameras = run(folder, "--scene absent.ply --cameras none.json --out views");
+  CHECK(cameras.says("none.json"));
+  CHECK_FALSE(cameras.says("absent.ply"));
+}
+
+TEST_CASE("render tool: a scene without anything in it and an eye that is no point are said") {
+  const TempFolder folder("render_nothing");
+  write_file(folder / "empty.obj", "");
+  CHECK(run(folder, "--scene empty.obj --out o").says("nothing to look at"));
+  CHECK(run(folder, "--eye nan 0 0 --target 1 0 0 --out o").says("--eye: must be finite"));
+  CHECK(run(folder, "--eye 0 0 0 --target 1 0 inf --out o").says("--target: must be finite"));
 }
 
 TEST_CASE("render tool: control characters of a name do not reach the terminal") {

@@ -146,8 +146,8 @@ TEST_CASE("scene: options that cannot be used exit with 2, help and version with
        {"", "castle --out a.ply", "flat", "flat --out a.ply --gaussians 10",
         "flat --out a.ply --views 0", "flat --out a.ply --gaussians 99999999999",
         "flat --out a.ply --gaussians -5", "flat --out a.ply --sh-degree 4",
-        "rooms --out a.ply --rooms 13", "rooms --out a.ply --gaussians 20000 --density 1",
-        "humanoid --gaussians 1 --out a.npz"}) {
+        "rooms --out a.ply --rooms 13", "rooms --out a.ply --seed -1",
+        "rooms --out a.ply --gaussians 20000 --density 1", "humanoid --gaussians 1 --out a.npz"}) {
     CAPTURE(arguments);
     CHECK(exits_with(folder, arguments, 2));
   }

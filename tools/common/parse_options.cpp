@@ -26,13 +26,27 @@ std::string unknown_option(const CLI::App& app) {
     if (!word.starts_with("-")) continue;
     const std::string option = word.substr(0, word.find('='));
     for (const CLI::Option* known : app.get_options()) {
-      const std::string name = "--" + (known->get_lnames().empty() ? "" : known->get_lnames()[0]);
+      if (known->get_lnames().empty()) continue;
+      const std::string name = "--" + known->get_lnames()[0];
       if (name.starts_with(option) || option.starts_with(name))
         return "there is no option " + option + "; did you mean " + name + "?";
     }
     return "there is no option " + option;
   }
   return {};
+}
+
+/// Makes negative numbers errors where an option takes an unsigned one. CLI11 would wrap them round.
+void refuse_negative(CLI::App& app) {
+  for (CLI::Option* option : app.get_options()) {
+    if (option->get_type_name() != "UINT") continue;
+    option->check(CLI::Validator(
+        [](const std::string& v) {
+          return v.starts_with('-') ? v + ": must not be negative" : std::string();
+        },
+        ""));
+  }
+  for (CLI::App* command : app.get_subcommands({})) refuse_negative(*command);
 }
 
 /// Column at which the lines that continue `line` begin: that of its description, or of its text.
@@ -67,6 +81,7 @@ std::optional<int> parse_options(CLI::App& app, int argc, const char* const* arg
                                  const std::function<void()>& check) {
   const std::string name = argc > 0 ? std::filesystem::path(argv[0]).filename().string() : "";
   app.name(name);
+  refuse_negative(app);
   app.set_version_flag("--version", name + " " + version());
   std::setvbuf(stdout, nullptr, _IOLBF, BUFSIZ);  // Line buffering keeps output to a pipe in order with
                                                   // errors.

@@ -2,6 +2,7 @@
 #include "options.hpp"
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 
@@ -94,6 +95,11 @@ std::string refused(const Options& o) {
   }
   if ((o.width > 0) != (o.height > 0)) return "--width and --height go together";
   if (o.eye.empty() != o.target.empty()) return "--eye and --target go together";
+  for (std::size_t k = 0; k < o.eye.size(); ++k) {
+    if (!std::isfinite(o.eye[k]) || !std::isfinite(o.target[k])) {
+      return std::string(std::isfinite(o.eye[k]) ? "--target" : "--eye") + ": must be finite numbers";
+    }
+  }
   return "";
 }
 

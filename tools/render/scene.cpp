@@ -31,15 +31,22 @@ Result<std::vector<Camera>> views_of(const Options& o, const OpenedScene& scene,
   return views_around(scene, o.orbit, width, height, o.hfov);
 }
 
-Result<std::vector<Camera>> cameras_of(const Options& o, const OpenedScene& scene) {
-  if (!o.cameras.empty()) {
-    auto cameras = io::load_cameras(o.cameras, o.width, o.height);
-    if (!cameras) return cameras.status();
-    if (cameras->empty()) return {Errc::invalid_file, o.cameras + ": has no cameras"};
+/// Cameras of the file, in the axes of the scene file. Empty if none is named.
+Result<std::vector<Camera>> cameras_in_file(const Options& o) {
+  if (o.cameras.empty()) return std::vector<Camera>{};
+  auto cameras = io::load_cameras(o.cameras, o.width, o.height);
+  if (cameras && cameras->empty()) return {Errc::invalid_file, o.cameras + ": has no cameras"};
+  return cameras;
+}
+
+/// The cameras of the file, placed in the world, or those of the options.
+Result<std::vector<Camera>> cameras_of(const Options& o, std::vector<Camera> cameras,
+                                       const OpenedScene& scene) {
+  if (!cameras.empty()) {
     if (scene.up == "keep") return cameras;
     const auto placed = upright(scene.up);
     if (!placed) return placed.status();
-    for (Camera& camera : *cameras) camera = in_world(camera, *placed);
+    for (Camera& camera : cameras) camera = in_world(camera, *placed);
     return cameras;
   }
   const int width = o.width > 0 ? o.width : 640, height = o.height > 0 ? o.height : 480;
@@ -59,12 +66,14 @@ Result<Scene> load_scene(const Options& o) {
   OpenOptions how = gsnav_tools::open_options(o);
   how.eye.set_hfov(o.width > 0 ? o.width : 640, o.height > 0 ? o.height : 480, o.hfov);
   how.eye.near_plane = o.near_plane;
+  auto in_file = cameras_in_file(o);
+  if (!in_file) return in_file.status();
   gsnav_tools::print_device(o.device, stdout);
   auto opened = gsnav_tools::open_scene(o, how, stdout);
   if (!opened) return opened.status();
   if (!opened->scene->assets.empty() && o.scene != "default")
     std::fputs(io::report_text(opened->report).c_str(), stdout);
-  auto cameras = cameras_of(o, *opened);
+  auto cameras = cameras_of(o, std::move(*in_file), *opened);
   if (!cameras) return cameras.status();
   for (Camera& c : *cameras) c.near_plane = o.near_plane;
   return Scene{std::move(*opened), std::move(*cameras)};
