@@ -16,7 +16,7 @@ inline constexpr int kBlock = 4;  ///< Width in pixels of a block that has its o
 /// Depth that is summed during blending. For a median, only the slot is stored and its depth is looked
 /// up afterwards.
 template <DepthMode D>
-inline constexpr DepthMode kBlendedDepth = D == DepthMode::any ? D : DepthMode::none;
+inline constexpr DepthMode kBlendedDepth = D == DepthMode::all ? D : DepthMode::none;
 
 /// A splat of a list in shared memory.
 struct StagedSplat {
@@ -138,7 +138,7 @@ __device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>&
   const SplatColor<float> color = from.color;
   const std::uint32_t slot =
       __float_as_uint(color.pad);  // 0 for the splat that covers nothing. Any slot would do.
-  const SplatDepth<float>* const depth = kBlendedDepth<D> == DepthMode::any ? a.depths + slot : nullptr;
+  const SplatDepth<float>* const depth = kBlendedDepth<D> == DepthMode::all ? a.depths + slot : nullptr;
   constexpr bool kAlongRays = F == Form::perspective;
   const SplatPerspective<float>* const perspective = kAlongRays ? a.perspectives + slot : nullptr;
   for (int k = 0; k < K; ++k) {

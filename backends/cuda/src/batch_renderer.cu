@@ -70,7 +70,7 @@ void CudaBatchRenderer::State::size_scratch() {
   const std::size_t pixels = args.cameras * static_cast<std::size_t>(args.grid.width) *
                              static_cast<std::size_t>(args.grid.height);
   const bool records_depths =
-      mode == DepthMode::any || !raster.mesh.empty() ||
+      mode == DepthMode::all || !raster.mesh.empty() ||
       (mode == DepthMode::median &&
        2 * pixels >= cuda::policy::Capacity::kHalfPixelsPerDepth * slot_capacity);
   const bool perspective = config.response != Response::ewa;

@@ -26,7 +26,7 @@ struct TileProgress {
 GSNAV_HD constexpr std::size_t blend_state_values(DepthMode mode) noexcept {
   const std::size_t bytes = mode == DepthMode::none     ? sizeof(BlendState<float, DepthMode::none>)
                             : mode == DepthMode::median ? sizeof(BlendState<float, DepthMode::median>)
-                                                        : sizeof(BlendState<float, DepthMode::any>);
+                                                        : sizeof(BlendState<float, DepthMode::all>);
   return bytes / sizeof(float);
 }
 
@@ -86,13 +86,13 @@ GSNAV_HD L pixel_alpha(const BlendColor<L>& state) noexcept {
 }
 template <class S, class L>
 GSNAV_HD L pixel_expected_depth(const RasterArgs<S>& args,
-                                const BlendState<L, DepthMode::any>& state) noexcept {
+                                const BlendState<L, DepthMode::all>& state) noexcept {
   const L alpha = pixel_alpha(state), one(S(1)), zero(S(0));
   const auto returned = alpha > L(args.rules.return_alpha);
   return select(returned, state.accumulated / select(returned, alpha, one) + state.z_ref, zero);
 }
 template <class L>
-GSNAV_HD L pixel_accumulated_depth(const BlendState<L, DepthMode::any>& state) noexcept {
+GSNAV_HD L pixel_accumulated_depth(const BlendState<L, DepthMode::all>& state) noexcept {
   return fma(pixel_alpha(state), state.z_ref, state.accumulated);
 }
 
@@ -193,8 +193,8 @@ void dispatch_raster(const RasterArgs<S>& args, const F& f) {
         return with_exp2.template operator()<C, DepthMode::none>();
       case DepthMode::median:
         return with_exp2.template operator()<C, DepthMode::median>();
-      case DepthMode::any:
-        return with_exp2.template operator()<C, DepthMode::any>();
+      case DepthMode::all:
+        return with_exp2.template operator()<C, DepthMode::all>();
     }
   };
   if (args.images.rgb != nullptr) {

@@ -64,7 +64,7 @@ struct DepthState<L, DepthMode::median> {
   }
 };
 template <class L>
-struct DepthState<L, DepthMode::any> {
+struct DepthState<L, DepthMode::all> {
   L median{scalar_of<L>(0)};
   /// Sum of w (z - z_ref), where z_ref is the first blended depth. The difference keeps precision for
   /// distant walls.

@@ -144,8 +144,8 @@ void dispatch_composite(const RasterArgs<S>& args, const F& f) {
         return f.template operator()<C, DepthMode::none, G>();
       case DepthMode::median:
         return f.template operator()<C, DepthMode::median, G>();
-      case DepthMode::any:
-        return f.template operator()<C, DepthMode::any, G>();
+      case DepthMode::all:
+        return f.template operator()<C, DepthMode::all, G>();
     }
   };
   const bool general = !args.perspectives.empty() || args.rules.exclusive_stop,
@@ -173,7 +173,7 @@ struct HardDepthPixel {
     const S a = alpha[pixel], z = mesh.depth[pixel], d = expected[pixel];
     const bool covered = has_mesh(z), dropped = !(a > S(0.01)), lost = dropped || (covered && d > z);
     const S t = lost ? S(1) : S(1) - a;
-    for_each_image<DepthMode::any>(images, [&]<Output O>(S* image) GSNAV_INLINED {
+    for_each_image<DepthMode::all>(images, [&]<Output O>(S* image) GSNAV_INLINED {
       if (image == nullptr) return;
       if constexpr (O == kRgb) {
         const S* const k = mesh.color + 3 * pixel;

@@ -32,7 +32,7 @@ enum Output : unsigned {
 };
 
 /// Depths that a compiled blend loop computes. Fewer are faster.
-enum class DepthMode { none, median, any };
+enum class DepthMode { none, median, all };
 
 /// Pointers to the images of one camera. Null: the image is not requested.
 template <class S>
@@ -67,9 +67,9 @@ inline constexpr ImageKind<S> kImages[] = {
     {kRgb, 3, DepthMode::none, true, &FrameImages<S>::rgb},
     {kAlpha, 1, DepthMode::none, true, &FrameImages<S>::alpha},
     {kMedianDepth, 1, DepthMode::median, false, &FrameImages<S>::median_depth},
-    {kExpectedDepth, 1, DepthMode::any, true, &FrameImages<S>::expected_depth},
-    {kAccumulatedDepth, 1, DepthMode::any, true, &FrameImages<S>::accumulated_depth},
-    {kFirstHitDepth, 1, DepthMode::any, false, &FrameImages<S>::first_hit_depth},
+    {kExpectedDepth, 1, DepthMode::all, true, &FrameImages<S>::expected_depth},
+    {kAccumulatedDepth, 1, DepthMode::all, true, &FrameImages<S>::accumulated_depth},
+    {kFirstHitDepth, 1, DepthMode::all, false, &FrameImages<S>::first_hit_depth},
 };
 inline constexpr std::size_t kImageCount = std::size(kImages<float>);
 inline constexpr unsigned kAllOutputs = (1u << kImageCount) - 1;

@@ -94,7 +94,7 @@ inline void prefetch_images(const RasterArgs<float>& args, int tile_x, int tile_
       }
     }
   };
-  for_each_image<DepthMode::any>(args.images, [&]<Output O>(const float* image) GSNAV_INLINED {
+  for_each_image<DepthMode::all>(args.images, [&]<Output O>(const float* image) GSNAV_INLINED {
     constexpr std::size_t kChannels = channels_of(O);
     prefetch(image, kChannels);
   });
