@@ -359,7 +359,7 @@ TEST_CASE("panes: every output alone, batches, and what the frame does not have 
   REQUIRE(draw_frame<float>(serial, ws, std::span(&set, 1), {solid.instances, {}}, axis_camera(83),
                             config, images)
               .ok());
-  CHECK(ws.fragments.bytes() == 0);
+  CHECK(ws.fragments.capacity_bytes() == 0);
   // Habitat-GS's rule has one layer per pixel.
   config.composite = Composite::hard_depth;
   const Status refused = draw_frame<float>(serial, ws, std::span(&set, 1), {panes.instances, {}},

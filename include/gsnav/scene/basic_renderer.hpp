@@ -152,8 +152,8 @@ class BasicRenderer {
 
   /// Bytes of scratch memory that the renderer holds.
   std::size_t scratch_bytes() const noexcept {
-    std::size_t sum = workspace_.bytes();
-    if constexpr (ThreadFramesBackend<B>) sum += thread_frames_.bytes();
+    std::size_t sum = workspace_.capacity_bytes();
+    if constexpr (ThreadFramesBackend<B>) sum += thread_frames_.capacity_bytes();
     return sum;
   }
 

@@ -119,7 +119,7 @@ class DepthSlices {
     return {{sums_.data(), sums_.size()}, stride};
   }
 
-  /// Grows the capacity to that of `o` (see RenderWorkspace::grow_to).
+  /// Grows the capacity to that of `o` (see ScratchMemory::grow_to).
   void grow_to(const DepthSlices& o) {
     chunks_.reserve(o.chunks_.capacity());
     list_.reserve(o.list_.capacity());

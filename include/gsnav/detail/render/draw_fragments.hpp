@@ -11,13 +11,14 @@
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/detail/mesh/mesh_fragments.hpp"
 #include "gsnav/detail/render/draw_meshes.hpp"
+#include "gsnav/detail/render/scratch_memory.hpp"
 
 namespace gsnav {
 
 /// Scratch memory of `draw_fragments`. It grows to the largest frame, and is empty while there are no
 /// see-through surfaces.
 template <class S, Backend B>
-struct FragmentWorkspace {
+struct FragmentWorkspace : ScratchMemory<FragmentWorkspace<S, B>> {
   explicit FragmentWorkspace(B& b) : mesh(b), ranges(b), tile_begin(b), fragments(b) {}
 
   MeshWorkspace<S, B> mesh;  ///< workspace for the triangles of see-through surfaces
@@ -25,17 +26,9 @@ struct FragmentWorkspace {
   Buffer<std::uint64_t, B> tile_begin;
   Buffer<MeshFragment<S>, B> fragments;
 
-  std::size_t bytes() const noexcept {
-    return mesh.bytes() + ranges.capacity_bytes() + tile_begin.capacity_bytes() +
-           fragments.capacity_bytes();
-  }
-  std::size_t capacity_bytes() const noexcept { return bytes(); }
-  /// Grows the capacity to that of `o` (see RenderWorkspace::grow_to).
-  void grow_to(const FragmentWorkspace& o) {
-    mesh.grow_to(o.mesh);
-    ranges.grow_to(o.ranges);
-    tile_begin.grow_to(o.tile_begin);
-    fragments.grow_to(o.fragments);
+  template <class A, class C, class F>
+  static void for_each(A& a, C& b, const F& f) {
+    f(a.mesh, b.mesh), f(a.ranges, b.ranges), f(a.tile_begin, b.tile_begin), f(a.fragments, b.fragments);
   }
 };
 

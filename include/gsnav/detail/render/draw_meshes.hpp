@@ -12,6 +12,7 @@
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/stages.hpp"
 #include "gsnav/detail/mesh/mesh_shade.hpp"
+#include "gsnav/detail/render/scratch_memory.hpp"
 #include "gsnav/render/config.hpp"
 #include "gsnav/render/frames.hpp"
 
@@ -20,7 +21,7 @@ namespace gsnav {
 /// Scratch memory of `draw_meshes`. It grows to the largest frame, and is empty while there are no
 /// meshes.
 template <class S, Backend B>
-struct MeshWorkspace {
+struct MeshWorkspace : ScratchMemory<MeshWorkspace<S, B>> {
   explicit MeshWorkspace(B& b)
       : placements(b),
         vertex_chunks(b),
@@ -55,36 +56,14 @@ struct MeshWorkspace {
   std::vector<std::uint32_t> host_not_finite;
   std::vector<std::uint32_t> unhidden;  ///< chunks of Gaussians that no mesh hides
 
-  std::size_t bytes() const noexcept {
-    std::size_t sum = 0;
-    for_each(*this, *this, [&sum](const auto& own, const auto&) {
-      if constexpr (requires { own.capacity_bytes(); }) sum += own.capacity_bytes();
-    });
-    return sum;
-  }
-  /// Grows the capacity to that of `o` (see RenderWorkspace::grow_to).
-  void grow_to(const MeshWorkspace& o) {
-    for_each(*this, o, [](auto& own, const auto& other) {
-      if constexpr (requires { own.grow_to(other); }) {
-        own.grow_to(other);
-      } else {
-        own.reserve(other.capacity());
-      }
-    });
-  }
-  std::size_t capacity_bytes() const noexcept { return bytes(); }
-
- private:
   template <class A, class C, class F>
   static void for_each(A& a, C& b, const F& f) {
-    f(a.placements, b.placements), f(a.vertex_chunks, b.vertex_chunks),
-        f(a.triangle_chunks, b.triangle_chunks);
-    f(a.vertices, b.vertices), f(a.counts, b.counts), f(a.not_finite, b.not_finite),
-        f(a.offsets, b.offsets);
-    f(a.triangles, b.triangles), f(a.cursors, b.cursors), f(a.tile_offsets, b.tile_offsets);
-    f(a.tile_triangles, b.tile_triangles), f(a.depth, b.depth), f(a.visible, b.visible),
-        f(a.tile_far, b.tile_far);
-    f(a.color, b.color), f(a.host_placements, b.host_placements);
+    f(a.placements, b.placements), f(a.vertex_chunks, b.vertex_chunks);
+    f(a.triangle_chunks, b.triangle_chunks), f(a.vertices, b.vertices), f(a.counts, b.counts);
+    f(a.not_finite, b.not_finite), f(a.offsets, b.offsets), f(a.triangles, b.triangles);
+    f(a.cursors, b.cursors), f(a.tile_offsets, b.tile_offsets), f(a.tile_triangles, b.tile_triangles);
+    f(a.depth, b.depth), f(a.visible, b.visible), f(a.tile_far, b.tile_far), f(a.color, b.color);
+    f(a.host_placements, b.host_placements);
     f(a.host_vertex_chunks, b.host_vertex_chunks), f(a.host_triangle_chunks, b.host_triangle_chunks);
     f(a.host_not_finite, b.host_not_finite), f(a.unhidden, b.unhidden);
   }

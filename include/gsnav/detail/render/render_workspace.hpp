@@ -14,13 +14,14 @@
 #include "gsnav/detail/render/draw_fragments.hpp"
 #include "gsnav/detail/render/draw_meshes.hpp"
 #include "gsnav/detail/render/order_visible.hpp"
+#include "gsnav/detail/render/scratch_memory.hpp"
 #include "gsnav/render/frames.hpp"
 
 namespace gsnav {
 
 /// Scratch memory of `render_camera`. It grows to the largest frame and is reused.
 template <class S, Backend B>
-struct RenderWorkspace {
+struct RenderWorkspace : ScratchMemory<RenderWorkspace<S, B>> {
   explicit RenderWorkspace(B& b)
       : offsets(b),
         geometry(b),
@@ -60,26 +61,6 @@ struct RenderWorkspace {
   std::vector<ViewedSet<S>> projections;  ///< [sets], one projection per set
   ProjectOutputs<S> projected;            ///< outputs of the projection
 
-  std::size_t bytes() const noexcept {
-    std::size_t sum = 0;
-    for_each(*this, *this, [&sum](const auto& own, const auto&) {
-      if constexpr (requires { own.capacity_bytes(); }) sum += own.capacity_bytes();
-    });
-    return sum;
-  }
-  /// Grows the capacity to at least that of `o`, so that a frame that fits either workspace allocates
-  /// nothing. The content is lost.
-  void grow_to(const RenderWorkspace& o) {
-    for_each(*this, o, [](auto& own, const auto& other) {
-      if constexpr (requires { own.grow_to(other); }) {
-        own.grow_to(other);
-      } else {
-        own.reserve(other.capacity());
-      }
-    });
-  }
-
- private:
   template <class A, class C, class F>
   static void for_each(A& a, C& b, const F& f) {
     f(a.offsets, b.offsets), f(a.geometry, b.geometry), f(a.colors, b.colors);

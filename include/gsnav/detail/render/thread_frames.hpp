@@ -74,9 +74,9 @@ class ThreadFrames {
     return detail::guarded([&] { return even_out(); });
   }
 
-  std::size_t bytes() const noexcept {
+  std::size_t capacity_bytes() const noexcept {
     std::size_t sum = 0;
-    for (const auto& worker : workers_) sum += worker->workspace.bytes();
+    for (const auto& worker : workers_) sum += worker->workspace.capacity_bytes();
     return sum;
   }
 
