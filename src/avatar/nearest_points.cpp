@@ -33,23 +33,17 @@ NearestPoints::NearestPoints(std::vector<Vec3d> points) : points_(std::move(poin
 std::vector<std::pair<double, std::size_t>> NearestPoints::near(std::size_t i, std::size_t count) const {
   constexpr std::int64_t kRings = 5;
   std::vector<std::pair<double, std::size_t>> out;
-  const Cell c = cell_of(points_[i]);
+  const GridCell c = cell_of(points_[i]);
   for (std::int64_t ring = 0; ring <= kRings; ++ring) {
-    for (std::int64_t z = -ring; z <= ring; ++z) {
-      for (std::int64_t y = -ring; y <= ring; ++y) {
-        const bool shell = std::abs(z) == ring || std::abs(y) == ring;
-        for (std::int64_t x = -ring; x <= ring; x += shell || ring == 0 ? 1 : 2 * ring) {
-          const auto found = cells_.find(key({c[0] + x, c[1] + y, c[2] + z}));
-          if (found == cells_.end()) continue;
-          for (const std::size_t k : found->second) {
-            const Vec3d d = points_[k] - points_[i];
-            // Cells that share a key are visited more than once.
-            if (k != i && cell_of(points_[k]) == Cell{c[0] + x, c[1] + y, c[2] + z})
-              out.emplace_back(dot(d, d), k);
-          }
-        }
+    for_each_cell_in_ring(c, ring, [&](const GridCell& cell) {
+      const auto found = cells_.find(key(cell));
+      if (found == cells_.end()) return;
+      for (const std::size_t k : found->second) {
+        const Vec3d d = points_[k] - points_[i];
+        // Cells that share a key are visited more than once.
+        if (k != i && cell_of(points_[k]) == cell) out.emplace_back(dot(d, d), k);
       }
-    }
+    });
     // All points within `ring` cells are in `out` now.
     const double reach = static_cast<double>(ring) * cell_;
     if (out.size() < count) continue;
@@ -61,14 +55,14 @@ std::vector<std::pair<double, std::size_t>> NearestPoints::near(std::size_t i, s
   return out;
 }
 
-NearestPoints::Cell NearestPoints::cell_of(const Vec3d& p) const {
-  Cell c{};
+GridCell NearestPoints::cell_of(const Vec3d& p) const {
+  GridCell c{};
   for (int k = 0; k < 3; ++k)
     c[static_cast<std::size_t>(k)] = static_cast<std::int64_t>(std::floor(p[k] / cell_));
   return c;
 }
 
-std::uint64_t NearestPoints::key(const Cell& c) noexcept {
+std::uint64_t NearestPoints::key(const GridCell& c) noexcept {
   std::uint64_t h = 0;
   for (const std::int64_t v : c) h = (h ^ static_cast<std::uint64_t>(v)) * 0x9e3779b97f4a7c15ull;
   return h;

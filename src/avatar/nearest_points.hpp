@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include "cell_rings.hpp"
 #include "gsnav/math/functions.hpp"
 #include "gsnav/math/vec.hpp"
 
@@ -27,9 +27,8 @@ class NearestPoints {
   std::vector<std::pair<double, std::size_t>> near(std::size_t i, std::size_t count) const;
 
  private:
-  using Cell = std::array<std::int64_t, 3>;
-  Cell cell_of(const Vec3d& p) const;
-  static std::uint64_t key(const Cell& c) noexcept;
+  GridCell cell_of(const Vec3d& p) const;
+  static std::uint64_t key(const GridCell& c) noexcept;
   std::vector<Vec3d> points_;
   double cell_ = 1.0;
   std::unordered_map<std::uint64_t, std::vector<std::size_t>> cells_;

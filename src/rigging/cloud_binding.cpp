@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "../avatar/cell_rings.hpp"
 #include "mesh_weights.hpp"
 
 namespace gsnav {
@@ -58,8 +59,7 @@ NearestTriangle::NearestTriangle(const SkinnedMesh& mesh) : mesh_(mesh), around_
   cell_ = max(2 * edges / (3 * static_cast<double>(mesh.triangles.size())), 1e-9);
   for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
     if (around_[v].empty()) continue;
-    const auto c = cell_of(mesh.positions[v]);
-    cells_[key(c[0], c[1], c[2])].push_back(static_cast<std::uint32_t>(v));
+    cells_[key(cell_of(mesh.positions[v]))].push_back(static_cast<std::uint32_t>(v));
   }
 }
 
@@ -70,19 +70,14 @@ MeshSample NearestTriangle::find(const Vec3d& p, double& distance) const {
   // Search rings of cells outwards, and one ring beyond the first with a vertex, because the triangle of
   // a farther vertex may be nearer.
   for (std::int64_t ring = 0, last = kRings; ring <= last; ++ring) {
-    for (std::int64_t z = -ring; z <= ring; ++z) {
-      for (std::int64_t y = -ring; y <= ring; ++y) {
-        const bool shell = std::abs(z) == ring || std::abs(y) == ring;
-        for (std::int64_t x = -ring; x <= ring; x += shell || ring == 0 ? 1 : 2 * ring) {
-          const auto found = cells_.find(key(c[0] + x, c[1] + y, c[2] + z));
-          if (found == cells_.end()) continue;
-          last = std::min(last, ring + 1);
-          for (const std::uint32_t v : found->second) {
-            for (const std::uint32_t t : around_[v]) look(t, p, best, distance);
-          }
-        }
+    for_each_cell_in_ring(c, ring, [&](const GridCell& cell) {
+      const auto found = cells_.find(key(cell));
+      if (found == cells_.end()) return;
+      last = std::min(last, ring + 1);
+      for (const std::uint32_t v : found->second) {
+        for (const std::uint32_t t : around_[v]) look(t, p, best, distance);
       }
-    }
+    });
   }
   if (distance == std::numeric_limits<double>::max()) {  // far away from the mesh
     for (std::size_t t = 0; t < mesh_.triangles.size(); ++t)
@@ -110,9 +105,9 @@ std::array<std::int64_t, 3> NearestTriangle::cell_of(const Vec3d& p) const {
   return {part(p.x), part(p.y), part(p.z)};
 }
 
-std::uint64_t NearestTriangle::key(std::int64_t x, std::int64_t y, std::int64_t z) noexcept {
+std::uint64_t NearestTriangle::key(const std::array<std::int64_t, 3>& cell) noexcept {
   const auto part = [](std::int64_t v) { return static_cast<std::uint64_t>(v) & 0x1fffffu; };
-  return part(x) << 42 | part(y) << 21 | part(z);
+  return part(cell[0]) << 42 | part(cell[1]) << 21 | part(cell[2]);
 }
 
 }  // namespace detail

@@ -33,7 +33,7 @@ class NearestTriangle {
 
   void look(std::uint32_t t, const Vec3d& p, MeshSample& best, double& distance) const;
   std::array<std::int64_t, 3> cell_of(const Vec3d& p) const;
-  static std::uint64_t key(std::int64_t x, std::int64_t y, std::int64_t z) noexcept;
+  static std::uint64_t key(const std::array<std::int64_t, 3>& cell) noexcept;
   const SkinnedMesh& mesh_;
   std::vector<std::vector<std::uint32_t>> around_;
   std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
