@@ -22,29 +22,33 @@ struct alignas(16) WarpRows {
 
 /// Data that a lane reads of its row.
 struct LaneRow {
-  float mean[3], quat[4], scales[3], opacity;
+  Vec3<float> mean;
+  Quat<float> quat;
+  Vec3<float> scales;
+  float opacity;
 };
 
 /// Reads row `row`, or row 0 if it does not exist. There are no stores or branches in between, because
 /// loads would then wait for each other.
 template <bool PlainRules>
 __device__ inline LaneRow read_row(const ShapeRows& rows, std::size_t row) {
-  const std::size_t at = row < rows.size ? row : 0;
-  const bool has_axes = !PlainRules && !rows.axes.empty();
-  const auto of = [&](const float* plane) { return (has_axes ? rows.means.data[0] : plane)[at]; };
-  LaneRow r;
-  for (int k = 0; k < 3; ++k) r.mean[k] = rows.means.data[k][at];
-  r.opacity = rows.opacities.data[at];
-  for (int k = 0; k < 4; ++k) r.quat[k] = of(rows.quats.data[k]);
-  for (int k = 0; k < 3; ++k) r.scales[k] = of(rows.scales.data[k]);
-  return r;
+  ShapeRows from = rows;
+  if (!PlainRules && !rows.axes.empty()) {  // The values are not used, but their addresses must exist.
+    from.quats.data[0] = from.quats.data[1] = from.quats.data[2] = from.quats.data[3] =
+        from.scales.data[0] = from.scales.data[1] = from.scales.data[2] = rows.means.data[0];
+  }
+  const SetRows<OneRow> set{{from, row < rows.size ? row : 0}};
+  return {set.mean(), set.quat(), set.scales(), set.opacity()};
 }
 
 __device__ inline void keep_row(const LaneRow& r, WarpRows& to) {
   const unsigned lane = threadIdx.x % 32;
   for (int k = 0; k < 3; ++k) to.mean[k][lane] = r.mean[k];
   to.opacity[lane] = r.opacity;
-  for (int k = 0; k < 4; ++k) to.quat[k][lane] = r.quat[k];
+  to.quat[0][lane] = r.quat.w;
+  to.quat[1][lane] = r.quat.x;
+  to.quat[2][lane] = r.quat.y;
+  to.quat[3][lane] = r.quat.z;
   for (int k = 0; k < 3; ++k) to.scales[k][lane] = r.scales[k];
   __syncwarp();
 }

@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "gsnav/core/view.hpp"
+#include "gsnav/detail/frame/set_rows.hpp"
 #include "gsnav/frame/gaussians.hpp"
 #include "gsnav/math/functions.hpp"
 
@@ -48,7 +49,7 @@ GSNAV_HD Vec3<S> temporal_offset(const Vec3<S>& velocity, const Vec3<S>& acceler
 template <class S>
 GSNAV_HD Vec3<S> temporal_state(const TemporalView& in, std::size_t i, double t, S& opacity) noexcept {
   const S dt = static_cast<S>(t - static_cast<double>(in.times[i]));
-  opacity = S(in.base.shape.opacities[i]) * temporal_weight(dt, S(in.sigmas[i]));
+  opacity = S(opacity_of(in.base.shape, i)) * temporal_weight(dt, S(in.sigmas[i]));
   if (!(opacity >= S(1.0 / 255))) {
     opacity = S(0);
     return {};
@@ -72,9 +73,8 @@ struct GaussianAt {
   GSNAV_HD void operator()(std::size_t i) const noexcept {
     S opacity;
     const Vec3<S> offset = temporal_state<S>(in, i, t, opacity);
-    means[0][i] = static_cast<float>(S(in.base.shape.means[0][i]) + offset.x);
-    means[1][i] = static_cast<float>(S(in.base.shape.means[1][i]) + offset.y);
-    means[2][i] = static_cast<float>(S(in.base.shape.means[2][i]) + offset.z);
+    const Vec3<S> mean = vec_cast<S>(mean_of(in.base.shape, i)) + offset;
+    for (int k = 0; k < 3; ++k) means[k][i] = static_cast<float>(mean[k]);
     opacities[i] = static_cast<float>(opacity);
   }
 };
@@ -92,18 +92,19 @@ struct BoundChunkAt {
     ChunkBounds b;
     bool first = true;
     for (std::size_t i = begin; i < end; ++i) {
-      if (!(rows.opacities[i] > 0)) continue;
-      const Vec3d origin = moment.origin_of(i);
+      const float opacity = opacity_of(rows, i);
+      if (!(opacity > 0)) continue;
+      const Vec3d origin = moment.origin_of(i), mean = vec_cast<double>(mean_of(rows, i));
+      const Vec3<float> scales = scales_of(rows, i);
       for (int k = 0; k < 3; ++k) {
-        const std::size_t axis = static_cast<std::size_t>(k);
-        const double offset = static_cast<double>(rows.means[axis][i]), x = origin[k] + offset;
+        const double x = origin[k] + mean[k];
         // culling assumes offsets within the lattice; these may be larger
-        const double pad = 1e-6 * abs(offset);
+        const double pad = 1e-6 * abs(mean[k]);
         b.low[k] = first ? x - pad : min(b.low[k], x - pad);
         b.high[k] = first ? x + pad : max(b.high[k], x + pad);
-        b.scale_max = max(b.scale_max, rows.scales[axis][i]);
+        b.scale_max = max(b.scale_max, scales[k]);
       }
-      b.opacity_max = max(b.opacity_max, rows.opacities[i]);
+      b.opacity_max = max(b.opacity_max, opacity);
       first = false;
     }
     bounds[c] = b;
