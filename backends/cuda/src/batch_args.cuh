@@ -146,7 +146,7 @@ struct DepthBins {
 struct BatchCounters {
   static constexpr std::size_t kLine = 256;
   alignas(kLine) unsigned long long slots;
-  alignas(kLine) unsigned long long hard;
+  alignas(kLine) unsigned long long high_precision;
   alignas(kLine) unsigned long long several;
   alignas(kLine) unsigned long long large;
   alignas(kLine) unsigned long long pairs;
@@ -189,7 +189,7 @@ struct BatchArgs {
   SplatDepth<float>* depths;  ///< Null if no image sums depths and there are few median depths compared
                               ///< with visible splats.
   SplatPerspective<float>* perspectives;  ///< Null for Response::ewa.
-  HighPrecisionSplat* hard;
+  HighPrecisionSplat* high_precision;
   SplatKey* several;
   LargeRow* large;
   /// Shape [tiles << depth_bins.bits]. First the number of pairs; then, once lists have places, the
@@ -210,7 +210,7 @@ struct BatchArgs {
   Pair* pairs;                ///< Lists of all tiles. Unsorted, or sorted after order_lists.
   Pair* pairs_alt;
   BeyondPair* beyond;
-  std::uint32_t slot_capacity, hard_capacity, several_capacity, large_capacity, part_capacity;
+  std::uint32_t slot_capacity, high_precision_capacity, several_capacity, large_capacity, part_capacity;
   std::uint32_t pair_capacity;  ///< Number of `pairs`, if lists are counted first.
   /// Numbers of `beyond` and `pairs_alt`, if lists have reserved space.
   std::uint32_t beyond_capacity, alt_capacity;

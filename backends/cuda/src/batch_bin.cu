@@ -274,12 +274,12 @@ __device__ void place_bins(const BatchArgs& a, std::uint32_t* of_length) {
   }
 }
 
-template <bool Room>
+template <bool Reserved>
 __global__ void __launch_bounds__(kThreads) place_kernel(const BatchArgs a) {
   __shared__ std::uint32_t of_length[33];
   if (threadIdx.x < 33) of_length[threadIdx.x] = 0;
   __syncthreads();
-  if constexpr (Room) {
+  if constexpr (Reserved) {
     measure_lists(a, of_length);
   } else {
     place_bins(a, of_length);

@@ -211,9 +211,9 @@ __device__ SplatDepth<float> depth_record(const BatchArgs& a, std::uint32_t came
   const ViewedSet<float>& args = instance_of(a, camera, source).args;
   const ViewedRow row({args.gaussians.shape, source - args.first_rank}, args.offsets);
   const RowKey<float> key = row_key<float>(args.camera64, row);
-  const ProjectedRow<float> seen(args.camera, row, key);
-  if (!gsnav::detail::needs_double(args.camera, seen.splat))
-    return make_splat_depth(args.camera, seen.axes, seen.splat);
+  const ProjectedRow<float> projected(args.camera, row, key);
+  if (!gsnav::detail::needs_double(args.camera, projected.splat))
+    return make_splat_depth(args.camera, projected.axes, projected.splat);
   SplatDepth<float> depth;
   depth_record64(args, row, key, depth);
   return depth;

@@ -124,7 +124,7 @@ __device__ void write(const BlendArgs& b, std::size_t pixel,
 }
 
 /// Variants that RasterArgs selects at run time and that the inner loop must know at compile time.
-enum class Form { plain, exclusive_stop, perspective };
+enum class Form { standard, exclusive_stop, perspective };
 
 /// Blends a splat into K pixels of a column. `mesh` has the depths of their meshes. See median_of for
 /// `median`.
@@ -154,8 +154,8 @@ __device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>&
     }
     if constexpr (D == DepthMode::median)
       median[k] = last_above_half(state[k].transmittance, slot, median[k]);
-    blend_drawn<Color, kBlendedDepth<D>, F != Form::plain>(state[k], rules, drawn, alpha, &color, depth,
-                                                           px, py[k]);
+    blend_drawn<Color, kBlendedDepth<D>, F != Form::standard>(state[k], rules, drawn, alpha, &color,
+                                                              depth, px, py[k]);
   }
 }
 
@@ -203,13 +203,13 @@ void dispatch_blending(const BlendArgs& b, const L& launch) {
   if (!b.raster.mesh.empty()) {
     dispatch_composite(b.raster, [&]<bool C, DepthMode D, bool General>() {
       // check_batch rejects more general cases.
-      if constexpr (!General) launch.template operator()<C, D, Exp2::degree5, Form::plain, true>();
+      if constexpr (!General) launch.template operator()<C, D, Exp2::degree5, Form::standard, true>();
     });
     return;
   }
   dispatch_raster(b.raster, [&]<bool C, DepthMode D, Exp2 M, bool General>() {
     if constexpr (!General) {
-      launch.template operator()<C, D, device_exp2(M), Form::plain, false>();
+      launch.template operator()<C, D, device_exp2(M), Form::standard, false>();
     } else if (b.batch.perspectives != nullptr) {
       launch.template operator()<C, D, M, Form::perspective, false>();
     } else {

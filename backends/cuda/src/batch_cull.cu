@@ -25,20 +25,20 @@ __device__ bool part_is_candidate(const ViewedSet<float>& args, std::size_t chun
                         gs.part_bounds.empty() ? gs.chunk_bounds[chunk] : gs.part_bounds[at]);
 }
 
-/// Mask of the parts of a chunk that the lane's instance may see, one bit per part; 0 unless `seen`,
-/// which says whether it may see the chunk. If the chunk lies wholly in view or its parts have no
-/// bounds, the mask has all parts with rows that may be seen. If it is at the edge of the view, the
-/// lanes of the warp test its parts together, with kPartsPerChunk lanes for each such instance.
-__device__ unsigned parts_in_view(const BatchInstance* instances, std::size_t chunk, bool seen) {
+/// Mask of the parts of a chunk that the lane's instance may see, one bit per part; 0 unless
+/// `candidate`, which says whether it may see the chunk. If the chunk lies wholly in view or its parts
+/// have no bounds, the mask has all parts with rows that may be seen. If it is at the edge of the view,
+/// the lanes of the warp test its parts together, with kPartsPerChunk lanes for each such instance.
+__device__ unsigned parts_in_view(const BatchInstance* instances, std::size_t chunk, bool candidate) {
   const unsigned lane = threadIdx.x % 32;
   const GaussianRows& gs = instances[0].args.gaussians;
   const std::size_t rows = gs.size() - chunk * kProjectChunk;
   const unsigned all =
       (1u << (rows < kProjectChunk ? (rows + kChunkPart - 1) / kChunkPart : kPartsPerChunk)) - 1;
-  unsigned parts = seen ? all : 0;
-  if (seen) parts &= instances[lane].args.seen_rows(chunk).parts();
+  unsigned parts = candidate ? all : 0;
+  if (candidate) parts &= instances[lane].args.seen_rows(chunk).parts();
   unsigned edges =
-      __ballot_sync(kAll, seen && !gs.part_bounds.empty() &&
+      __ballot_sync(kAll, candidate && !gs.part_bounds.empty() &&
                               !lies_in_view(instances[lane].args.camera64, gs.chunk_bounds[chunk]));
   while (edges != 0) {
     unsigned mine = edges, rest = edges;
@@ -88,10 +88,10 @@ __global__ void __launch_bounds__(kThreads) cull_kernel(const BatchArgs a) {
       const std::uint32_t word = at / set.chunks, index = 32 * word + lane;
       first += 32 * word;
       instances += 32 * word;
-      const bool seen =
+      const bool candidate =
           index < set.instances && chunk_is_candidate(instances[lane].args, at % set.chunks);
       chunk = chunk_of(instances[0], at % set.chunks);
-      const unsigned parts = parts_in_view(instances, chunk, seen);
+      const unsigned parts = parts_in_view(instances, chunk, candidate);
       part = lane;
       mask = 0;
       for (unsigned p = 0; p < kPartsPerChunk; ++p) {

@@ -109,11 +109,11 @@ std::uint32_t CudaBatchRenderer::State::room_for(std::uint64_t pairs) const {
                               std::numeric_limits<std::uint32_t>::max()));
 }
 
-/// Fills `seen`, `set_begins` and `cursors` with the sets that each camera sees. Returns the
+/// Fills `camera_sets`, `set_begins` and `cursors` with the sets that each camera sees. Returns the
 /// total number of these sets' origins (origin_count).
-std::size_t CudaBatchRenderer::State::list_seen(std::span<const GaussianSet> sets,
-                                                std::span<const BatchCamera> cameras) {
-  seen.clear();
+std::size_t CudaBatchRenderer::State::list_camera_sets(std::span<const GaussianSet> sets,
+                                                       std::span<const BatchCamera> cameras) {
+  camera_sets.clear();
   set_begins.assign(sets.size() + 1, 0);
   std::size_t origins = 0;
   for (std::uint32_t c = 0; c < cameras.size(); ++c) {
@@ -121,7 +121,7 @@ std::size_t CudaBatchRenderer::State::list_seen(std::span<const GaussianSet> set
     std::size_t place = 0;
     const auto see = [&](std::uint32_t s) {
       const auto bits = cameras[c].seen.empty() ? sets[s].selection.seen : cameras[c].seen[place++];
-      seen.push_back({s, c, rank, bits});
+      camera_sets.push_back({s, c, rank, bits});
       rank += static_cast<std::uint32_t>(sets[s].gaussians.size());
       ++set_begins[s + 1];
       origins += origin_count(sets[s].gaussians);
@@ -139,10 +139,10 @@ cuda::InputPlaces CudaBatchRenderer::State::reserve_inputs(std::size_t sets, std
   cuda::Layout layout;
   cuda::InputPlaces at;
   at.sets = layout.add<BatchSet>(sets);
-  at.instances = layout.add<BatchInstance>(seen.size());
-  at.plain = layout.add<cuda::PlainCamera>(plain_rules ? seen.size() : 0);
+  at.instances = layout.add<BatchInstance>(camera_sets.size());
+  at.plain = layout.add<cuda::PlainCamera>(plain_rules ? camera_sets.size() : 0);
   at.first = layout.add<std::uint32_t>(cameras + 1);
-  at.list = layout.add<std::uint32_t>(seen.size());
+  at.list = layout.add<std::uint32_t>(camera_sets.size());
   at.offsets = layout.add<Vec3d>(origins);
   cuda::Flight& flight = flights[calls % cuda::policy::Batch::kInFlight];
   cuda::need(cudaEventSynchronize(flight.done), "waiting for an earlier batch");
@@ -166,18 +166,18 @@ void CudaBatchRenderer::State::fill_instances(std::span<const GaussianSet> sets,
   auto* const offsets = at.on_host<Vec3d>(at.offsets);
   std::size_t origin = 0;
   std::fill(first, first + cameras.size() + 1, 0u);
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    const GaussianSet& set = sets[seen[i].set];
-    const Camera& camera = cameras[seen[i].camera].camera;
-    const std::uint32_t index = cursors[seen[i].set]++;
+  for (std::size_t i = 0; i < camera_sets.size(); ++i) {
+    const GaussianSet& set = sets[camera_sets[i].set];
+    const Camera& camera = cameras[camera_sets[i].camera].camera;
+    const std::uint32_t index = cursors[camera_sets[i].set]++;
     list[i] = index;
-    ++first[seen[i].camera + 1];
+    ++first[camera_sets[i].camera + 1];
     BatchInstance instance{};
-    instance.camera = seen[i].camera;
+    instance.camera = camera_sets[i].camera;
     ViewedSet<float>& to = instance.args;
     to = view_set<float>(camera, set, rules, config.quality.max_sh_degree);
-    to.selection.seen = seen[i].bits;
-    to.first_rank = seen[i].first_rank;
+    to.selection.seen = camera_sets[i].bits;
+    to.first_rank = camera_sets[i].first_rank;
     to.offsets = {at.on_device<Vec3d>(at.offsets) + origin, origin_count(set.gaussians)};
     const std::size_t first_origin = origin;
     for (std::size_t o = 0; o < to.offsets.size; ++o) offsets[origin++] = origin_offset(to, o);
@@ -191,7 +191,7 @@ void CudaBatchRenderer::State::fill_instances(std::span<const GaussianSet> sets,
 bool CudaBatchRenderer::State::plan_units(std::span<const GaussianSet> sets,
                                           const cuda::InputPlaces& at) {
   auto* const units = at.on_host<BatchSet>(at.sets);
-  args.seen_rows = std::any_of(seen.begin(), seen.end(), [&](const Seen& v) {
+  args.seen_rows = std::any_of(camera_sets.begin(), camera_sets.end(), [&](const CameraSet& v) {
     return v.bits.size > seen_chunk_words(sets[v.set].gaussians.chunk_count());
   });
   item_capacity = 0;
@@ -247,7 +247,7 @@ void CudaBatchRenderer::State::guess_capacities(std::uint64_t gaussians, bool fe
     if (capacity == 0) capacity = n;
   };
   guess(slot_capacity, slots);
-  guess(hard_capacity, slots / Policy::kSlotsPerHard);
+  guess(high_precision_capacity, slots / Policy::kSlotsPerHighPrecision);
   guess(large_capacity, slots / Policy::kSlotsPerLarge);
   guess(several_capacity, slots / (few ? Policy::kSlotsPerSeveralOfFew : Policy::kSlotsPerSeveral));
   if (few) {
@@ -270,7 +270,7 @@ void CudaBatchRenderer::State::guess_capacities(std::uint64_t gaussians, bool fe
 Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
                                          std::span<const BatchCamera> cameras,
                                          const BatchImages& images) {
-  const std::size_t origins = list_seen(sets, cameras);
+  const std::size_t origins = list_camera_sets(sets, cameras);
   const bool plain_rules = has_plain_rules(config, sets, cameras);
   const cuda::InputPlaces at = reserve_inputs(sets.size(), cameras.size(), origins, plain_rules);
   fill_instances(sets, cameras, at, plain_rules);
@@ -290,7 +290,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
   args.set_count = static_cast<std::uint32_t>(sets.size());
   args.cameras = static_cast<std::uint32_t>(cameras.size());
   std::uint64_t gaussians = 0;
-  for (const Seen& v : seen) gaussians += sets[v.set].gaussians.size();
+  for (const CameraSet& v : camera_sets) gaussians += sets[v.set].gaussians.size();
   const bool few = plan_tiles(cameras, gaussians);
   if (args.tiles > cuda::kMostTiles)
     return {Errc::unsupported, "CudaBatchRenderer: more than 2^31 tiles in one batch"};

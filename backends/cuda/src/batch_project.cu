@@ -18,8 +18,8 @@ __device__ unsigned rows_there(std::size_t size, std::size_t first) {
   return size - first >= 32 ? kAll : (1u << (size - first)) - 1u;
 }
 
-/// Writes the record of a splat. `Room`: lists have reserved space and are not counted first.
-template <bool Plain, bool Room>
+/// Writes the record of a splat. `Reserved`: lists have reserved space and are not counted first.
+template <bool GeometryOnly, bool Reserved>
 __device__ void write_record(const BatchArgs& a, const SplatKey& of, std::uint32_t source,
                              const Splat& s, const SplatColor<float>& c) {
   const SplatGeometry<float>& g = s.geometry;
@@ -40,12 +40,12 @@ __device__ void write_record(const BatchArgs& a, const SplatKey& of, std::uint32
                         c.b,
                         x,
                         y};
-  if constexpr (!Room) {
+  if constexpr (!Reserved) {
     const TileWindow window = window_of(a, s.bounds);
     a.entries[of.slot] = {of.key, window.corner, window.tiles, of.camera};
   }
   a.sources[of.slot] = source;
-  if (Plain) return;
+  if (GeometryOnly) return;
   if (a.depths != nullptr) a.depths[of.slot] = s.depth;
   if (a.perspectives != nullptr) a.perspectives[of.slot] = s.perspective;
 }
@@ -53,7 +53,7 @@ __device__ void write_record(const BatchArgs& a, const SplatKey& of, std::uint32
 /// Result of projecting a row for one camera.
 struct CameraSplat {
   bool drawn = false;
-  bool hard = false;  ///< Float32 is not precise enough for it. project_hard_kernel draws it.
+  bool high_precision = false;  ///< It needs double: project_high_precision_kernel draws it.
   std::uint32_t code = 0, camera = 0;
   RowKey<float> key;
   Splat splat;
@@ -63,9 +63,9 @@ struct CameraSplat {
 /// mask. If cameras see only some of the rows (`SomeRows`), the rows of all cameras are processed side
 /// by side. All lanes must call every function together.
 /// @tparam PlainRules There are plain_cameras.
-/// @tparam Plain Records of depth and perspective are not needed.
-/// @tparam Room Lists have reserved space and are not counted first.
-template <bool PlainRules, bool Plain, bool SomeRows, bool Room>
+/// @tparam GeometryOnly Records of depth and perspective are not needed.
+/// @tparam Reserved Lists have reserved space and are not counted first.
+template <bool PlainRules, bool GeometryOnly, bool SomeRows, bool Reserved>
 class WarpProjection {
  public:
   __device__ WarpProjection(const BatchArgs& args, WarpRows& rows)
@@ -104,7 +104,7 @@ class WarpProjection {
 
   /// Marks places that were reserved but not used.
   __device__ void mark_rest() const {
-    if constexpr (!Room) {
+    if constexpr (!Reserved) {
       slots_.rest([&](std::uint64_t slot) {
         if (slot < a_.slot_capacity) a_.entries[slot] = {0, 0, 0, kNoSlot};
       });
@@ -136,26 +136,27 @@ class WarpProjection {
   /// Projects row first_ + at for an instance and lists it. `exists` is false for lanes without a row.
   __device__ void draw(bool exists, std::uint32_t index, unsigned at) {
     const std::uint32_t row = static_cast<std::uint32_t>(first_ + at);
-    CameraSplat seen;
-    see(exists, index, at, seen);
-    const bool wanted = seen.drawn || seen.hard;
+    CameraSplat projected;
+    project_row(exists, index, at, projected);
+    const bool wanted = projected.drawn || projected.high_precision;
     const std::uint64_t taken = slots_.take(wanted);
     const std::uint32_t slot =
         wanted && taken < a_.slot_capacity ? static_cast<std::uint32_t>(taken) : kNoSlot;
-    if (seen.hard) queue_hard({slot, index, row});
-    list(seen, slot, index, at);
+    if (projected.high_precision) queue_high_precision({slot, index, row});
+    list(projected, slot, index, at);
   }
 
   /// Projects row first_ + at for an instance.
-  __device__ void see(bool exists, std::uint32_t index, unsigned at, CameraSplat& out) const {
+  __device__ void project_row(bool exists, std::uint32_t index, unsigned at, CameraSplat& out) const {
     // For rows beyond the near plane.
-    const auto project_row = [&](const ProjectionCamera<float>& camera, const auto& from,
-                                 const auto& camera64) {
-      const ProjectedRow<float> seen_row(camera, from, out.key);
-      if (!seen_row.splat.visible) return;
-      out.hard = gsnav::detail::needs_double(camera, seen_row.splat);
-      out.drawn = !out.hard && make_splat<Plain>(camera, camera64(), a_.depths != nullptr, out.key,
-                                                 seen_row, out.splat);
+    const auto fill = [&](const ProjectionCamera<float>& camera, const auto& from,
+                          const auto& camera64) {
+      const ProjectedRow<float> projected(camera, from, out.key);
+      if (!projected.splat.visible) return;
+      out.high_precision = gsnav::detail::needs_double(camera, projected.splat);
+      out.drawn =
+          !out.high_precision && make_splat<GeometryOnly>(camera, camera64(), a_.depths != nullptr,
+                                                          out.key, projected, out.splat);
     };
     if constexpr (PlainRules) {
       const PlainCamera& packed = a_.plain_cameras[index];
@@ -167,7 +168,7 @@ class WarpProjection {
         ProjectionCamera<float> camera = camera_of(a_, packed.axes);
         camera.near_plane = near_plane;
         out.code = packed.code.key(out.key.z);
-        project_row(camera, from, [&] { return camera_of(PlainCamera::Mean(packed.mean)); });
+        fill(camera, from, [&] { return camera_of(PlainCamera::Mean(packed.mean)); });
       }
     } else {
       const BatchInstance& instance = a_.instances[index];
@@ -177,41 +178,41 @@ class WarpProjection {
       out.camera = instance.camera;
       if (exists && beyond_near_plane(args.camera.near_plane, out.key.z)) {
         out.code = args.camera.key_code(sort_key(args.camera64, out.key));
-        project_row(args.camera, from,
-                    [&]() -> const ProjectionCamera<double>& { return args.camera64; });
+        fill(args.camera, from, [&]() -> const ProjectionCamera<double>& { return args.camera64; });
       }
     }
   }
 
-  __device__ void queue_hard(const HighPrecisionSplat& splat) const {
-    const unsigned long long place = atomicAdd(&a_.counters->hard, 1ull);
-    if (!Room && splat.slot != kNoSlot)
+  __device__ void queue_high_precision(const HighPrecisionSplat& splat) const {
+    const unsigned long long place = atomicAdd(&a_.counters->high_precision, 1ull);
+    if (!Reserved && splat.slot != kNoSlot)
       a_.entries[splat.slot] = {0, 0, 0, kNoSlot};  // Until it has a record.
-    if (place < a_.hard_capacity) a_.hard[place] = splat;
+    if (place < a_.high_precision_capacity) a_.high_precision[place] = splat;
   }
 
   /// Writes the record and the pairs of a visible splat, or queues it for a kernel that finds its tiles.
-  __device__ void list(const CameraSplat& seen, std::uint32_t slot, std::uint32_t index, unsigned at) {
-    const SplatKey of{slot, seen.code, seen.camera};
-    const SplatBounds& bounds = seen.splat.bounds;
-    const bool listed = seen.drawn && slot != kNoSlot;
+  __device__ void list(const CameraSplat& projected, std::uint32_t slot, std::uint32_t index,
+                       unsigned at) {
+    const SplatKey of{slot, projected.code, projected.camera};
+    const SplatBounds& bounds = projected.splat.bounds;
+    const bool listed = projected.drawn && slot != kNoSlot;
     LargeRows large{0, 0};
     if (listed && is_large(a_, bounds)) large = large_rows(a_, bounds);
     LargeQueue queue;
     queue.ask(a_, large);
     const bool small = listed && large.count == 0;
-    const bool queued = small && (Room ? is_wide(a_, bounds) : window_of(a_, bounds).tiles == 0);
+    const bool queued = small && (Reserved ? is_wide(a_, bounds) : window_of(a_, bounds).tiles == 0);
     NearPairs pairs;
-    if constexpr (Room) pairs.ask(a_, seen.camera, small && !queued, bounds);
-    if (!has_sh_ && __any_sync(kAll, seen.drawn)) {
+    if constexpr (Reserved) pairs.ask(a_, projected.camera, small && !queued, bounds);
+    if (!has_sh_ && __any_sync(kAll, projected.drawn)) {
       wait_for_sh();
       has_sh_ = true;
     }
-    if (listed) write(of, seen, index, at);
-    if constexpr (Room) {
-      pairs.put(a_, {seen.code, slot});
+    if (listed) write(of, projected, index, at);
+    if constexpr (Reserved) {
+      pairs.put(a_, {projected.code, slot});
     } else if (small && !queued) {
-      add_to_bin(a_, tile_of(a_, seen.camera, window_of(a_, bounds), 0), seen.code);
+      add_to_bin(a_, tile_of(a_, projected.camera, window_of(a_, bounds), 0), projected.code);
     }
     queue.put(a_, of, large);
     if (__any_sync(kAll, queued)) {
@@ -220,7 +221,7 @@ class WarpProjection {
     }
   }
 
-  __device__ void write(const SplatKey& of, const CameraSplat& seen, std::uint32_t index,
+  __device__ void write(const SplatKey& of, const CameraSplat& projected, std::uint32_t index,
                         unsigned at) const {
     std::uint32_t first_rank;
     if constexpr (PlainRules) {
@@ -228,10 +229,11 @@ class WarpProjection {
     } else {
       first_rank = a_.instances[index].args.first_rank;
     }
-    write_record<Plain, Room>(
-        a_, of, first_rank + static_cast<std::uint32_t>(first_ + at), seen.splat,
-        a_.color ? row_color<PlainRules>(gaussians_->color, degree_, first_, at, rows_, seen.key.delta)
-                 : SplatColor<float>{});
+    write_record<GeometryOnly, Reserved>(
+        a_, of, first_rank + static_cast<std::uint32_t>(first_ + at), projected.splat,
+        a_.color
+            ? row_color<PlainRules>(gaussians_->color, degree_, first_, at, rows_, projected.key.delta)
+            : SplatColor<float>{});
   }
 
   const BatchArgs& a_;
@@ -245,11 +247,11 @@ class WarpProjection {
   bool has_sh_ = false;  ///< The coefficients have arrived, or are not needed.
 };
 
-template <bool PlainRules, bool Plain, bool SomeRows, bool Room>
+template <bool PlainRules, bool GeometryOnly, bool SomeRows, bool Reserved>
 __global__ void __launch_bounds__(32 * Policy::kWarps, Policy::kResident)
     project_kernel(const BatchArgs a) {
   __shared__ WarpRows shared[Policy::kWarps];
-  WarpProjection<PlainRules, Plain, SomeRows, Room> warp(a, shared[threadIdx.x / 32]);
+  WarpProjection<PlainRules, GeometryOnly, SomeRows, Reserved> warp(a, shared[threadIdx.x / 32]);
   const std::uint32_t halves = a.counters->items * kWarpsPerPart;
   const auto item_of = [&](std::uint32_t half) {
     return half < halves ? a.items[half / kWarpsPerPart] : BatchItem{};
@@ -264,10 +266,11 @@ __global__ void __launch_bounds__(32 * Policy::kWarps, Policy::kResident)
   warp.mark_rest();
 }
 
-__global__ void __launch_bounds__(Policy::kHardThreads) project_hard_kernel(const BatchArgs a) {
-  const std::uint32_t n = used(a.counters->hard, a.hard_capacity);
+__global__ void __launch_bounds__(Policy::kHighPrecisionThreads)
+    project_high_precision_kernel(const BatchArgs a) {
+  const std::uint32_t n = used(a.counters->high_precision, a.high_precision_capacity);
   for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < n; i += gridDim.x * blockDim.x) {
-    const HighPrecisionSplat h = a.hard[i];
+    const HighPrecisionSplat h = a.high_precision[i];
     if (h.slot == kNoSlot) continue;
     const BatchInstance& instance = a.instances[h.instance];
     const ViewedSet<float>& args = instance.args;
@@ -306,17 +309,17 @@ __global__ void __launch_bounds__(Policy::kHardThreads) project_hard_kernel(cons
 }  // namespace
 
 void launch_projection(const BatchArgs& args, int multiprocessors, cudaStream_t stream) {
-  const unsigned blocks = static_cast<unsigned>(multiprocessors) * Policy::kHardBlocks;
-  const bool plain = args.depths == nullptr && args.perspectives == nullptr;
+  const unsigned blocks = static_cast<unsigned>(multiprocessors) * Policy::kHighPrecisionBlocks;
+  const bool geometry_only = args.depths == nullptr && args.perspectives == nullptr;
   const auto project = [&](auto kernel) {
     kernel<<<static_cast<unsigned>(multiprocessors) * Policy::kResident, 32 * Policy::kWarps, 0,
              stream>>>(args);
   };
-  const auto of_lists = [&]<bool SomeRows, bool Room>() {
-    if (plain && args.plain_cameras != nullptr)
-      return project(project_kernel<true, true, SomeRows, Room>);
-    project(plain ? project_kernel<false, true, SomeRows, Room>
-                  : project_kernel<false, false, SomeRows, Room>);
+  const auto of_lists = [&]<bool SomeRows, bool Reserved>() {
+    if (geometry_only && args.plain_cameras != nullptr)
+      return project(project_kernel<true, true, SomeRows, Reserved>);
+    project(geometry_only ? project_kernel<false, true, SomeRows, Reserved>
+                          : project_kernel<false, false, SomeRows, Reserved>);
   };
   if (args.seen_rows) {
     args.list_room != 0 ? of_lists.template operator()<true, true>()
@@ -325,7 +328,7 @@ void launch_projection(const BatchArgs& args, int multiprocessors, cudaStream_t 
     args.list_room != 0 ? of_lists.template operator()<false, true>()
                         : of_lists.template operator()<false, false>();
   }
-  project_hard_kernel<<<blocks, Policy::kHardThreads, 0, stream>>>(args);
+  project_high_precision_kernel<<<blocks, Policy::kHighPrecisionThreads, 0, stream>>>(args);
 }
 
 }  // namespace gsnav::cuda

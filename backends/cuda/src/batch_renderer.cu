@@ -46,7 +46,7 @@ void CudaBatchRenderer::State::size_scratch() {
   args.entries =
       with_room(entries, counted ? std::min<std::uint64_t>(slot_capacity, entry_capacity) : 0);
   args.sources = exactly(sources, slot_capacity);
-  args.hard = exactly(hard, hard_capacity);
+  args.high_precision = exactly(high_precision, high_precision_capacity);
   args.several = exactly(several, several_capacity);
   args.large = exactly(large, large_capacity);
   // Both kinds of counters are in one block, so that one operation clears them.
@@ -79,20 +79,20 @@ void CudaBatchRenderer::State::size_scratch() {
   raster.depths = {args.depths, records_depths ? slot_capacity : 0};
   raster.perspectives = {args.perspectives, perspective ? slot_capacity : 0};
   args.slot_capacity = slot_capacity;
-  args.hard_capacity = hard_capacity;
+  args.high_precision_capacity = high_precision_capacity;
   args.several_capacity = several_capacity;
   args.large_capacity = large_capacity;
   args.pair_capacity = pair_capacity;
   args.beyond_capacity = beyond_capacity;
   args.alt_capacity = alt_capacity;
-  stats.scratch_bytes = inputs.capacity_bytes() + items.capacity_bytes() + records.capacity_bytes() +
-                        entries.capacity_bytes() + sources.capacity_bytes() + hard.capacity_bytes() +
-                        several.capacity_bytes() + large.capacity_bytes() + parts.capacity_bytes() +
-                        long_parts.capacity_bytes() + zeroed.capacity_bytes() +
-                        tile_counts.capacity_bytes() + tile_begins.capacity_bytes() +
-                        tile_shifts.capacity_bytes() + tile_order.capacity_bytes() +
-                        pairs.capacity_bytes() + pairs_alt.capacity_bytes() + beyond.capacity_bytes() +
-                        depths.capacity_bytes() + perspectives.capacity_bytes() + meshes.bytes();
+  stats.scratch_bytes =
+      inputs.capacity_bytes() + items.capacity_bytes() + records.capacity_bytes() +
+      entries.capacity_bytes() + sources.capacity_bytes() + high_precision.capacity_bytes() +
+      several.capacity_bytes() + large.capacity_bytes() + parts.capacity_bytes() +
+      long_parts.capacity_bytes() + zeroed.capacity_bytes() + tile_counts.capacity_bytes() +
+      tile_begins.capacity_bytes() + tile_shifts.capacity_bytes() + tile_order.capacity_bytes() +
+      pairs.capacity_bytes() + pairs_alt.capacity_bytes() + beyond.capacity_bytes() +
+      depths.capacity_bytes() + perspectives.capacity_bytes() + meshes.bytes();
 }
 
 void CudaBatchRenderer::State::fit_room(const cuda::BatchCounters& n) {
@@ -198,7 +198,7 @@ bool CudaBatchRenderer::State::fit_capacities(const cuda::Flight& flight) {
     had = false;
   };
   fit(slot_capacity, was.slot_capacity, n.slots);
-  fit(hard_capacity, was.hard_capacity, n.hard);
+  fit(high_precision_capacity, was.high_precision_capacity, n.high_precision);
   fit(several_capacity, was.several_capacity, n.several);
   fit(large_capacity, was.large_capacity, n.large);
   if (was.depth_bins.many()) {

@@ -195,7 +195,7 @@ struct CudaBatchRenderer::State {
         long_parts(b),
         depths(b),
         perspectives(b),
-        hard(b),
+        high_precision(b),
         parts(b),
         pairs(b),
         pairs_alt(b),
@@ -226,7 +226,7 @@ struct CudaBatchRenderer::State {
   Status prepare(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                  const BatchImages& images);
   // Steps of prepare().
-  std::size_t list_seen(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras);
+  std::size_t list_camera_sets(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras);
   cuda::InputPlaces reserve_inputs(std::size_t sets, std::size_t cameras, std::size_t origins,
                                    bool plain_rules);
   void fill_instances(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
@@ -274,7 +274,7 @@ struct CudaBatchRenderer::State {
   Array<std::uint32_t> sources, zeroed, tile_counts, tile_begins, tile_order, long_parts;
   Array<SplatDepth<float>> depths;
   Array<SplatPerspective<float>> perspectives;
-  Array<cuda::HighPrecisionSplat> hard;
+  Array<cuda::HighPrecisionSplat> high_precision;
   Array<cuda::ListPart> parts;
   Array<cuda::Pair> pairs, pairs_alt;
   Array<cuda::BeyondPair> beyond;
@@ -287,7 +287,7 @@ struct CudaBatchRenderer::State {
   std::uint64_t entry_capacity = 0;  ///< Largest number of slots that the call may take.
   bool recordable = true;
   bool prepared = false;  ///< True if `args`, `raster` and `meshes` belong to the last call.
-  std::uint32_t slot_capacity = 0, hard_capacity = 0, several_capacity = 0, large_capacity = 0,
+  std::uint32_t slot_capacity = 0, high_precision_capacity = 0, several_capacity = 0, large_capacity = 0,
                 pair_capacity = 0, beyond_capacity = 0, alt_capacity = 0;
   std::uint32_t list_room = 0,
                 room_tiles = 0;  ///< Space of lists that are not counted first, and the number of tiles
@@ -299,11 +299,11 @@ struct CudaBatchRenderer::State {
   } taken;  ///< Counts of the last call whose counters have been read.
 
   // Reused by every call.
-  struct Seen {
+  struct CameraSet {
     std::uint32_t set, camera, first_rank;
     View<const std::uint32_t> bits;  ///< Selection::seen.
   };
-  std::vector<Seen> seen;  ///< Ordered by camera.
+  std::vector<CameraSet> camera_sets;  ///< Ordered by camera.
   std::vector<std::uint32_t> set_begins, cursors;
 };
 

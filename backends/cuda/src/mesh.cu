@@ -28,7 +28,7 @@ __global__ void __launch_bounds__(kThreads)
   const MeshPlacement& placement = args.placements[chunk.placement];
   const std::size_t i = chunk.begin + threadIdx.x;
   if (i < placement.mesh.vertices.size)
-    project_mesh_vertex(seen_by(args, work, chunk.placement), placement, i);
+    project_mesh_vertex(placed_for(args, work, chunk.placement), placement, i);
 }
 
 template <class Work>
@@ -41,7 +41,7 @@ __global__ void __launch_bounds__(kThreads)
   std::uint32_t n = 0;
   bool finite = true;
   if (t < args.placements[chunk.placement].mesh.triangle_count()) {
-    finite = detail::for_each_piece<false>(seen_by(args, work, chunk.placement), chunk.placement, t,
+    finite = detail::for_each_piece<false>(placed_for(args, work, chunk.placement), chunk.placement, t,
                                            [&n](const MeshTriangle<float>&) { ++n; });
   }
   const int bad = __syncthreads_count(finite ? 0 : 1);
@@ -100,18 +100,18 @@ __global__ void __launch_bounds__(kThreads)
   __shared__ typename Scan::TempStorage storage;
   if (args.counts[blockIdx.x] == 0) return;
   const MeshChunk chunk = work.triangle_chunk(args);
-  const MeshSetupArgs<float> seen = seen_by(args, work, chunk.placement);
+  const MeshSetupArgs<float> setup = placed_for(args, work, chunk.placement);
   const std::size_t t = chunk.begin + threadIdx.x;
   const bool exists = t < args.placements[chunk.placement].mesh.triangle_count();
   std::uint32_t n = 0;
   if (exists)
-    detail::for_each_piece<false>(seen, chunk.placement, t, [&n](const MeshTriangle<float>&) { ++n; });
+    detail::for_each_piece<false>(setup, chunk.placement, t, [&n](const MeshTriangle<float>&) { ++n; });
   std::uint32_t at = 0;
   Scan(storage).ExclusiveSum(n, at);
   if (n == 0) return;
   std::uint64_t to = work.first_triangle(args, chunk.placement) + at;
   const std::uint64_t room = work.room();
-  detail::for_each_piece<true>(seen, chunk.placement, t, [&](const MeshTriangle<float>& piece) {
+  detail::for_each_piece<true>(setup, chunk.placement, t, [&](const MeshTriangle<float>& piece) {
     if (to < room) args.triangles.data[to] = piece;
     ++to;
   });

@@ -68,8 +68,8 @@ struct ManyCameras {
 
 /// `args` with the camera of a placement.
 template <class Work>
-__device__ MeshSetupArgs<float> seen_by(const MeshSetupArgs<float>& args, const Work& work,
-                                        std::uint32_t placement) {
+__device__ MeshSetupArgs<float> placed_for(const MeshSetupArgs<float>& args, const Work& work,
+                                           std::uint32_t placement) {
   MeshSetupArgs<float> out = args;
   out.camera = work.lens(args, placement);
   return out;

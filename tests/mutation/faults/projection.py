@@ -42,8 +42,9 @@ FAULTS = [
           "p.b * ref.dy, p.log2_opacity};",
           RESPONSE, "N01_ewa_offaxis_grid", "N02_exact_ray_grid", why="w2 has a part along x"),
     fault("mean_in_float", "make_splat",
-          "  return make_splat<GeometryOnly>(camera, depth, seen, mean_x, mean_y, out);",
-          "  return make_splat<GeometryOnly>(camera, depth, seen, seen.splat.mean_x, seen.splat.mean_y, out);",
+          "  return make_splat<GeometryOnly>(camera, depth, projected, mean_x, mean_y, out);",
+          "  return make_splat<GeometryOnly>(camera, depth, projected, projected.splat.mean_x, projected.splat.mean_y,"
+          " out);",
           RESPONSE, "N01_ewa_offaxis_grid", "N02_exact_ray_grid"),
     fault("mean_in_float_in_lanes", "g",
           "reference_of<F>(camera.width, camera.height, mean_x, mean_y)",

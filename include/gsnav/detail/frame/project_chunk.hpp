@@ -168,23 +168,24 @@ GSNAV_HD bool project_row(const ViewedSet<S>& args, bool depth, std::size_t i,
   RowKey<float> key = row_key<float>(args.camera64, row);
   if constexpr (sizeof(S) == sizeof(float)) {
     if (!beyond_near_plane(args.camera.near_plane, key.z)) return false;
-    const ProjectedRow<float> seen(args.camera, row, key);
-    if (!seen.splat.visible) return false;
+    const ProjectedRow<float> projected(args.camera, row, key);
+    if (!projected.splat.visible) return false;
     out.key = sort_key(args.camera64, key);
     out.delta = key.delta;
-    if (detail::needs_double(args.camera, seen.splat))
+    if (detail::needs_double(args.camera, projected.splat))
       return make_splat64(args.camera64, depth, row, key, out.splat);
-    return make_splat<false>(args.camera, args.camera64, depth, key, seen, out.splat);
+    return make_splat<false>(args.camera, args.camera64, depth, key, projected, out.splat);
   } else {
     // The float64 reference computes its own depths, so that an error in `row_key` shows in comparisons.
     const Vec3d position = args.camera.rotation * key.delta64;
     key.z = static_cast<float>(position.z * args.camera.scale);
-    const ProjectedRow<double> seen(args.camera, row, key);
-    if (!seen.splat.visible) return false;
+    const ProjectedRow<double> projected(args.camera, row, key);
+    if (!projected.splat.visible) return false;
     const bool by_z = args.camera.sort_order == SortOrder::z_depth;
     out.key = by_z ? key.z : static_cast<float>(norm(position) * args.camera.scale);
     out.delta = key.delta64;
-    return make_splat<false>(args.camera, depth, seen, seen.splat.mean_x, seen.splat.mean_y, out.splat);
+    return make_splat<false>(args.camera, depth, projected, projected.splat.mean_x,
+                             projected.splat.mean_y, out.splat);
   }
 }
 

@@ -252,15 +252,15 @@ struct Splat {
 /// Returns false if no pixel centre lies in its bounds.
 /// @tparam GeometryOnly neither depth nor perspective is requested
 template <bool GeometryOnly, class T, class U, class S>
-GSNAV_HD bool make_splat(const ProjectionCamera<T>& camera, bool depth, const ProjectedRow<T>& seen,
+GSNAV_HD bool make_splat(const ProjectionCamera<T>& camera, bool depth, const ProjectedRow<T>& projected,
                          U mean_x, U mean_y, Splat<S>& out) noexcept {
-  if (!detail::splat_bounds(camera, seen.splat, out.bounds)) return false;
+  if (!detail::splat_bounds(camera, projected.splat, out.bounds)) return false;
   const ReferencePixel<T> ref = reference_of<T>(camera.width, camera.height, mean_x, mean_y);
-  out.geometry = record_cast<S>(splat_geometry(seen.splat, ref));
+  out.geometry = record_cast<S>(splat_geometry(projected.splat, ref));
   if constexpr (!GeometryOnly) {
     if (camera.response != Response::ewa)
-      out.perspective = record_cast<S>(splat_perspective(seen.splat, ref));
-    if (depth) out.depth = record_cast<S>(make_splat_depth(camera, seen.axes, seen.splat));
+      out.perspective = record_cast<S>(splat_perspective(projected.splat, ref));
+    if (depth) out.depth = record_cast<S>(make_splat_depth(camera, projected.axes, projected.splat));
   }
   return true;
 }
@@ -268,11 +268,11 @@ GSNAV_HD bool make_splat(const ProjectionCamera<T>& camera, bool depth, const Pr
 /// Makes the records of a row for which float is precise enough. Only its mean is computed in double.
 template <bool GeometryOnly>
 GSNAV_HD bool make_splat(const ProjectionCamera<float>& camera, const ProjectionCamera<double>& camera64,
-                         bool depth, const RowKey<float>& key, const ProjectedRow<float>& seen,
+                         bool depth, const RowKey<float>& key, const ProjectedRow<float>& projected,
                          Splat<float>& out) noexcept {
   double mean_x, mean_y;
   detail::project_mean(camera64, key.delta64, mean_x, mean_y);
-  return make_splat<GeometryOnly>(camera, depth, seen, mean_x, mean_y, out);
+  return make_splat<GeometryOnly>(camera, depth, projected, mean_x, mean_y, out);
 }
 
 /// Makes the records of a row computed in double, for the float64 reference and for rows that need it
@@ -280,8 +280,9 @@ GSNAV_HD bool make_splat(const ProjectionCamera<float>& camera, const Projection
 template <class S, class Row>
 GSNAV_HD bool make_splat64(const ProjectionCamera<double>& camera, bool depth, const Row& row,
                            const RowKey<float>& key, Splat<S>& out) noexcept {
-  const ProjectedRow<double> seen(camera, row, key);
-  return make_splat<false>(camera, depth, seen, seen.splat.mean_x, seen.splat.mean_y, out);
+  const ProjectedRow<double> projected(camera, row, key);
+  return make_splat<false>(camera, depth, projected, projected.splat.mean_x, projected.splat.mean_y,
+                           out);
 }
 
 }  // namespace gsnav

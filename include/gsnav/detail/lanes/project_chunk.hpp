@@ -87,9 +87,10 @@ inline void project_chunk(const ViewedSet<float>& args, const ProjectOutputs<flo
     const ViewedRows<PackOfRows> rows({shape, packed, i, count}, args.offsets);
     const RowKey<F> key = row_key<F>(args.camera64, rows);
     if (!any(beyond_near_plane(camera.near_plane, key.z))) continue;
-    const ProjectedRow<F> seen(camera, rows, key);
-    const std::uint32_t bits = lane_bits(seen.splat.visible) & wanted & ((1u << count) - 1u);
-    if (bits != 0) written += write_splats(args, out, base, written, {i, key, seen}, bits, survivors);
+    const ProjectedRow<F> projected(camera, rows, key);
+    const std::uint32_t bits = lane_bits(projected.splat.visible) & wanted & ((1u << count) - 1u);
+    if (bits != 0)
+      written += write_splats(args, out, base, written, {i, key, projected}, bits, survivors);
   }
   if (!out.colors.empty()) {
     const ColorRows& sh = args.gaussians.color;

@@ -21,7 +21,7 @@ inline namespace GSNAV_LANES_TAG {
 struct ProjectedPack {
   std::size_t first;
   const RowKey<F>& key;
-  const ProjectedRow<F>& seen;
+  const ProjectedRow<F>& projected;
 };
 
 namespace detail {
@@ -155,7 +155,7 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
   const std::size_t slot = base + count;
   const GaussianRows& gs = args.gaussians;
   const ProjectionCamera<float>& camera = args.camera;
-  const Projected<F>& p = pack.seen.splat;
+  const Projected<F>& p = pack.projected.splat;
   const PixelBox<F> box = gsnav::detail::pixel_box(camera, p);
   // Few rows are too inexact in float. Each of them is projected alone.
   const std::uint32_t alone = lane_bits(gsnav::detail::needs_double(camera, p)) & bits;
@@ -186,7 +186,7 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
     detail::store_bounds(box, spans, bounds);
   }
   if (depth) {
-    const SplatDepth<F> d = make_splat_depth(camera, pack.seen.axes, p);
+    const SplatDepth<F> d = make_splat_depth(camera, pack.projected.axes, p);
     const F low[8] = {d.mean_x, d.mean_y, d.z, d.reach, d.g[0], d.g[1], d.g[2], d.gx[0]};
     const F high[8] = {d.gx[1], d.gx[2], d.gy[0], d.gy[1], d.gy[2], F(0.0f), F(0.0f), F(0.0f)};
     store_columns<8>(low, depths[0]);
