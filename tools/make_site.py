@@ -181,7 +181,8 @@ def header_text(path, name, group):
     text = re.sub(r"^inline namespace GSNAV_LANES_TAG \{$|^\}  // (?:inline )?namespace GSNAV_LANES_TAG$", "", text,
                   flags=re.MULTILINE)
     # Explicit instantiations repeat a template that is documented elsewhere.
-    text = re.sub(r"^extern template [^;]*;", lambda m: "\n" * m.group().count("\n"), text, flags=re.MULTILINE)
+    text = re.sub(r"^(?:extern template |GSNAV_\w+_FUNCTIONS\(extern)[^;]*;",
+                  lambda m: "\n" * m.group().count("\n"), text, flags=re.MULTILINE)
     return document_the_obvious(plain_comments(text))
 
 

@@ -54,19 +54,5 @@ gsnav::Frames<S> render(B& backend, const std::vector<gsnav::GaussianSet>& sets,
 // Compiled once for all tests (support/compiled_frames.cpp).
 namespace gsnav {
 using gsnav_test::ToyBackend;
-extern template Status render_camera<float, ToyBackend>(ToyBackend&, RenderWorkspace<float, ToyBackend>&,
-                                                        std::span<const GaussianSet>, const Camera&,
-                                                        const RenderConfig&, const FrameImages<float>&,
-                                                        RenderStats*);
-extern template Status draw_frame<float, ToyBackend>(ToyBackend&, RenderWorkspace<float, ToyBackend>&,
-                                                     std::span<const GaussianSet>, const MeshFrame&,
-                                                     const Camera&, const RenderConfig&,
-                                                     const FrameImages<float>&, RenderStats*);
-extern template Status draw_meshes<float, ToyBackend>(ToyBackend&, MeshWorkspace<float, ToyBackend>&,
-                                                      std::span<const MeshInstance>, const Camera&,
-                                                      const MeshLight&, int, bool, MeshImages<float>,
-                                                      MeshStats*);
-extern template Status detail::render_frame<float, ToyBackend>(
-    ToyBackend&, RenderWorkspace<float, ToyBackend>&, std::span<const GaussianSet>, const Camera&,
-    const RenderConfig&, const MeshLayer<float>&, const FrameImages<float>&, RenderStats&);
+GSNAV_FRAME_FUNCTIONS(extern, float, ToyBackend);
 }  // namespace gsnav

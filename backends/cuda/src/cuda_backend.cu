@@ -232,25 +232,8 @@ void CudaBackend::run(stage::BlendWithMeshes, const RasterArgs<float>& args) {
   note(cudaGetLastError(), "the blending among meshes");
 }
 
-template Status render_camera<float, CudaBackend>(CudaBackend&, RenderWorkspace<float, CudaBackend>&,
-                                                  std::span<const GaussianSet>, const Camera&,
-                                                  const RenderConfig&, const FrameImages<float>&,
-                                                  RenderStats*);
-template Status draw_frame<float, CudaBackend>(CudaBackend&, RenderWorkspace<float, CudaBackend>&,
-                                               std::span<const GaussianSet>, const MeshFrame&,
-                                               const Camera&, const RenderConfig&,
-                                               const FrameImages<float>&, RenderStats*);
-template Status detail::render_frame<float, CudaBackend>(CudaBackend&,
-                                                         RenderWorkspace<float, CudaBackend>&,
-                                                         std::span<const GaussianSet>, const Camera&,
-                                                         const RenderConfig&, const MeshLayer<float>&,
-                                                         const FrameImages<float>&, RenderStats&);
-template Status draw_meshes<float, CudaBackend>(CudaBackend&, MeshWorkspace<float, CudaBackend>&,
-                                                std::span<const MeshInstance>, const Camera&,
-                                                const MeshLight&, int, bool, MeshImages<float>,
-                                                MeshStats*);
-template Status skin_gaussians<float, CudaBackend, float>(CudaBackend&, const SkinningArgs<float>&);
-template Status skin_all<float, CudaBackend, float>(CudaBackend&, std::span<const SkinningArgs<float>>);
+GSNAV_FRAME_FUNCTIONS(, float, CudaBackend);
+GSNAV_SKIN_FUNCTIONS(, CudaBackend);
 template void CudaBackend::parallel_for<CutDepth>(std::size_t, const CutDepth&);
 
 }  // namespace gsnav

@@ -14,6 +14,7 @@
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/render/draw_frame.hpp"
+#include "gsnav/detail/render/instantiate.hpp"
 #include "gsnav/detail/sweep/first_impacts.hpp"
 #include "gsnav/render/render.hpp"
 #include "gsnav/skin/skin.hpp"
@@ -177,26 +178,8 @@ static_assert(Backend<CudaBackend>);
 
 #if !defined(__CUDACC__)
 // Templates compiled into gsnav::cuda, because a host compiler cannot compile them.
-extern template Status render_camera<float, CudaBackend>(CudaBackend&,
-                                                         RenderWorkspace<float, CudaBackend>&,
-                                                         std::span<const GaussianSet>, const Camera&,
-                                                         const RenderConfig&, const FrameImages<float>&,
-                                                         RenderStats*);
-extern template Status draw_frame<float, CudaBackend>(CudaBackend&, RenderWorkspace<float, CudaBackend>&,
-                                                      std::span<const GaussianSet>, const MeshFrame&,
-                                                      const Camera&, const RenderConfig&,
-                                                      const FrameImages<float>&, RenderStats*);
-extern template Status detail::render_frame<float, CudaBackend>(
-    CudaBackend&, RenderWorkspace<float, CudaBackend>&, std::span<const GaussianSet>, const Camera&,
-    const RenderConfig&, const MeshLayer<float>&, const FrameImages<float>&, RenderStats&);
-extern template Status draw_meshes<float, CudaBackend>(CudaBackend&, MeshWorkspace<float, CudaBackend>&,
-                                                       std::span<const MeshInstance>, const Camera&,
-                                                       const MeshLight&, int, bool, MeshImages<float>,
-                                                       MeshStats*);
-extern template Status skin_gaussians<float, CudaBackend, float>(CudaBackend&,
-                                                                 const SkinningArgs<float>&);
-extern template Status skin_all<float, CudaBackend, float>(CudaBackend&,
-                                                           std::span<const SkinningArgs<float>>);
+GSNAV_FRAME_FUNCTIONS(extern, float, CudaBackend);
+GSNAV_SKIN_FUNCTIONS(extern, CudaBackend);
 extern template void CudaBackend::parallel_for<CutDepth>(std::size_t, const CutDepth&);
 extern template Status capsule_gaps<CudaBackend, float>(CudaBackend&, const CapsuleGapArgs<float>&);
 extern template Status capsule_gaps<CudaBackend, double>(CudaBackend&, const CapsuleGapArgs<double>&);

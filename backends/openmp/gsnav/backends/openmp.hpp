@@ -33,6 +33,7 @@
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/mesh/mesh_shade.hpp"
 #include "gsnav/detail/render/draw_frame.hpp"
+#include "gsnav/detail/render/instantiate.hpp"
 #include "gsnav/detail/sweep/capsule_batch.hpp"
 #include "gsnav/skin/lbs.hpp"
 #include "gsnav/skin/skin.hpp"
@@ -250,30 +251,9 @@ static_assert(Backend<OpenMPBackend>);
 }  // namespace GSNAV_LANES_TAG
 #else
 // Compiled in gsnav::openmp, so that users need not compile them.
-extern template Status render_camera<float, OpenMPBackend>(OpenMPBackend&,
-                                                           RenderWorkspace<float, OpenMPBackend>&,
-                                                           std::span<const GaussianSet>, const Camera&,
-                                                           const RenderConfig&,
-                                                           const FrameImages<float>&, RenderStats*);
-extern template Status draw_frame<float, OpenMPBackend>(OpenMPBackend&,
-                                                        RenderWorkspace<float, OpenMPBackend>&,
-                                                        std::span<const GaussianSet>, const MeshFrame&,
-                                                        const Camera&, const RenderConfig&,
-                                                        const FrameImages<float>&, RenderStats*);
-extern template Status render_camera<double, OpenMPBackend>(OpenMPBackend&,
-                                                            RenderWorkspace<double, OpenMPBackend>&,
-                                                            std::span<const GaussianSet>, const Camera&,
-                                                            const RenderConfig&,
-                                                            const FrameImages<double>&, RenderStats*);
-extern template Status draw_frame<double, OpenMPBackend>(OpenMPBackend&,
-                                                         RenderWorkspace<double, OpenMPBackend>&,
-                                                         std::span<const GaussianSet>, const MeshFrame&,
-                                                         const Camera&, const RenderConfig&,
-                                                         const FrameImages<double>&, RenderStats*);
-extern template Status skin_gaussians<float, OpenMPBackend, float>(OpenMPBackend&,
-                                                                   const SkinningArgs<float>&);
-extern template Status skin_all<float, OpenMPBackend, float>(OpenMPBackend&,
-                                                             std::span<const SkinningArgs<float>>);
+GSNAV_FRAME_FUNCTIONS(extern, float, OpenMPBackend);
+GSNAV_FRAME_FUNCTIONS(extern, double, OpenMPBackend);
+GSNAV_SKIN_FUNCTIONS(extern, OpenMPBackend);
 #endif
 
 }  // namespace gsnav
