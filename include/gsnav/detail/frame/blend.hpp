@@ -12,7 +12,8 @@
 
 namespace gsnav {
 
-/// State of tiles that is kept between the slices of depth of one frame.
+/// State of tiles that is kept between the slices of depth of one frame. A frame with meshes has one
+/// slice.
 template <class S>
 struct TileProgress {
   View<std::uint64_t> open;  ///< [tiles], one bit per cell of the tile in row order (OpenCells), set if

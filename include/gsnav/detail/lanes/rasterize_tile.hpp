@@ -52,7 +52,7 @@ class TileBlender {
   void blend() noexcept {
     const TileProgress<float>& progress = args_.progress;
     const std::uint64_t begin = args_.tile_offsets[tile_], end = args_.tile_offsets[tile_ + 1];
-    if (progress.first) {
+    if (Mesh || progress.first) {  // frames with meshes have one slice
       pixels_.open_all();
     } else {
       if (progress.open[tile_] == 0 || (begin == end && !progress.last)) return;
