@@ -189,13 +189,7 @@ void GeodesicSearch::open(std::uint32_t edge, const Flat& root, const Flat& righ
       dl + length(right - mesh_->edges[mesh_->next(edge)].at) + kRounding < g + length(right - root)) {
     return;
   }
-  Node n;
-  n.root = UnfoldedMesh::across(here, root);
-  n.right = UnfoldedMesh::across(here, right);
-  n.left = UnfoldedMesh::across(here, left);
-  n.g = g;
-  n.edge = here.twin;
-  n.parent = parent;
+  const Node n = window_beyond(here, root, right, left, g, parent);
   if (!has_goal_) {
     // Nearest point of the window.
     const double t = clamp(dot(root - right, extent) / dot(extent, extent), 0.0, 1.0);

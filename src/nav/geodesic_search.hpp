@@ -106,6 +106,12 @@ class GeodesicSearch {
             std::uint32_t parent);
   /// Opens a window for paths without bends.
   void open_straight(std::uint32_t edge, const Flat& root, Flat right, Flat left, std::uint32_t parent);
+  /// A window seen through edge `here`, in the plane of the face beyond it.
+  static Node window_beyond(const UnfoldedMesh::Edge& here, const Flat& root, const Flat& right,
+                            const Flat& left, double g, std::uint32_t parent) noexcept {
+    const auto across = [&here](const Flat& p) { return UnfoldedMesh::across(here, p); };
+    return {across(root), across(right), across(left), g, here.twin, parent, false};
+  }
   void reach(std::uint32_t edge, const Flat& root, double g, std::uint32_t parent);
   void offer_goal(double length, std::uint32_t node);
   void push(double f, const Node& node);

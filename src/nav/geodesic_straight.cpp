@@ -88,12 +88,7 @@ void GeodesicSearch::open_straight(std::uint32_t edge, const Flat& root, Flat ri
       return;
     }
   }
-  Node n;
-  n.root = UnfoldedMesh::across(here, root);
-  n.right = UnfoldedMesh::across(here, right);
-  n.left = UnfoldedMesh::across(here, left);
-  n.edge = here.twin;
-  n.parent = parent;
+  const Node n = window_beyond(here, root, right, left, 0, parent);
   const Flat e = left - right;
   const double width = length(e);
   if (there.face == goal_.face) {
