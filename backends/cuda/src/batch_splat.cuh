@@ -17,14 +17,20 @@ __device__ inline ProjectionCamera<double> key_camera_of(const PlainCamera& p) {
   return c;
 }
 
-/// The float camera that `p` packs, without its key.
-__device__ inline ProjectionCamera<float> camera_of(const BatchArgs& a, const PlainCamera::Axes& p) {
-  ProjectionCamera<float> c;
+/// Copies the rotation and the intrinsics.
+template <class S, class Packed>
+__device__ inline void set_lens(ProjectionCamera<S>& c, const Packed& p) {
   for (int i = 0; i < 9; ++i) c.rotation.row[i / 3][i % 3] = p.rotation[i];
   c.fx = p.fx;
   c.fy = p.fy;
   c.cx = p.cx;
   c.cy = p.cy;
+}
+
+/// The float camera that `p` packs, without its key.
+__device__ inline ProjectionCamera<float> camera_of(const BatchArgs& a, const PlainCamera::Axes& p) {
+  ProjectionCamera<float> c;
+  set_lens(c, p);
   c.u_min = p.u_min;
   c.u_max = p.u_max;
   c.v_min = p.v_min;
@@ -39,11 +45,7 @@ __device__ inline ProjectionCamera<float> camera_of(const BatchArgs& a, const Pl
 /// The double camera, as far as means and keys need it.
 __device__ inline ProjectionCamera<double> camera_of(const PlainCamera::Mean& p) {
   ProjectionCamera<double> c;
-  for (int i = 0; i < 9; ++i) c.rotation.row[i / 3][i % 3] = p.rotation[i];
-  c.fx = p.fx;
-  c.fy = p.fy;
-  c.cx = p.cx;
-  c.cy = p.cy;
+  set_lens(c, p);
   return c;
 }
 

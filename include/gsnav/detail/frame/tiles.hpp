@@ -145,6 +145,13 @@ struct BinArgs {
                           ///< empty
 };
 
+/// Calls f(tile) for each tile that the footprint of a splat may reach.
+template <class S, class F>
+GSNAV_HD void for_each_tile(const BinArgs<S>& args, std::uint32_t splat, const F& f) noexcept {
+  for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min, args.elliptic,
+                f);
+}
+
 namespace detail {
 /// Prefetches the records of a later splat, because `order` accesses them at random.
 template <class S>
@@ -169,8 +176,7 @@ GSNAV_HD void for_each_intersection(const BinArgs<S>& args, std::size_t block, c
   for (std::size_t i = r.begin; i < r.end; ++i) {
     prefetch_splat(args, i);
     const std::uint32_t splat = args.order[i];
-    for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min,
-                  args.elliptic, [&](std::size_t tile) GSNAV_INLINED { f(tile, splat); });
+    for_each_tile(args, splat, [&](std::size_t tile) GSNAV_INLINED { f(tile, splat); });
   }
 }
 }  // namespace detail

@@ -49,8 +49,7 @@ GSNAV_HD void for_each_intersection(const BinArgs<float>& args, const Cull& cull
         }
       },
       [&](std::uint32_t splat) GSNAV_INLINED {
-        gsnav::for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min,
-                             args.elliptic, [&](std::size_t tile) GSNAV_INLINED { visit(tile, splat); });
+        gsnav::for_each_tile(args, splat, [&](std::size_t tile) GSNAV_INLINED { visit(tile, splat); });
       });
 }
 
@@ -82,8 +81,7 @@ inline void count_tiles(const CountTileIntersections<float>& kernel, std::size_t
         }
       },
       [&](std::uint32_t splat) noexcept {
-        gsnav::for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min,
-                             args.elliptic, [=](std::size_t tile) { note(tile, tile + 1); });
+        gsnav::for_each_tile(args, splat, [=](std::size_t tile) { note(tile, tile + 1); });
       });
   std::uint64_t count = 0;
   for (std::size_t t = 0; t < tiles; ++t) change[t] = count += change[t];

@@ -59,12 +59,11 @@ struct CountSplatTiles {
   __device__ void operator()(std::size_t i) const {
     const std::uint32_t splat = args.order[i];
     std::uint32_t n = 0;
-    for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min,
-                  args.elliptic, [&](std::size_t tile) {
-                    if (cull.hides(tile, splat)) return;
-                    atomicAdd(per_tile + tile, 1u);  // Order does not matter for a sum of ones.
-                    ++n;
-                  });
+    for_each_tile(args, splat, [&](std::size_t tile) {
+      if (cull.hides(tile, splat)) return;
+      atomicAdd(per_tile + tile, 1u);  // Order does not matter for a sum of ones.
+      ++n;
+    });
     per_splat[i] = n;
   }
 };
@@ -80,12 +79,11 @@ struct EmitSplatTiles {
   __device__ void operator()(std::size_t i) const {
     const std::uint32_t splat = args.order[i];
     std::uint64_t at = offsets[i];
-    for_each_tile(args.grid, args.geometry[splat], args.bounds[splat], args.log2_alpha_min,
-                  args.elliptic, [&](std::size_t tile) {
-                    if (cull.hides(tile, splat)) return;
-                    tiles[at] = static_cast<std::uint32_t>(tile);
-                    splats[at++] = splat;
-                  });
+    for_each_tile(args, splat, [&](std::size_t tile) {
+      if (cull.hides(tile, splat)) return;
+      tiles[at] = static_cast<std::uint32_t>(tile);
+      splats[at++] = splat;
+    });
   }
 };
 
