@@ -230,19 +230,6 @@ GSNAV_HD auto blend_influences(int count, const Joint& joint, const Weight& weig
   return sum;
 }
 
-/// Blended joint of Gaussian i, for linear blending.
-template <class S, class Out>
-GSNAV_HD Affine3<S> blended_joint(const SkinningArgs<S, Out>& args, std::size_t i) noexcept {
-  const std::size_t row = static_cast<std::size_t>(args.influences) * i;
-  return blend_influences(
-      args.influences,
-      [&](int k) GSNAV_INLINED -> const Affine3<S>& {
-        return args.joints[args.joint_indices[row + static_cast<std::size_t>(k)]];
-      },
-      [&](int k)
-          GSNAV_INLINED { return skinning_weight<S>(args.weights[row + static_cast<std::size_t>(k)]); });
-}
-
 /// Inputs of skinning for one Gaussian.
 template <int K>
 struct SkinRow {
