@@ -16,6 +16,8 @@
 namespace gsnav::cuda {
 
 inline constexpr std::uint32_t kNoSlot = 0xffffffffu;
+/// Mask of all lanes of a warp.
+inline constexpr unsigned kAll = 0xffffffffu;
 
 /// A set seen by a camera. Instances of one set are adjacent. camera_instances lists those of a camera
 /// in order of first_rank.

@@ -19,7 +19,6 @@ constexpr std::uint32_t kPartLength = policy::Bin::kPartLength;
 /// one splat, and a warp with all rows of the largest splat would delay the launch.
 template <class F>
 __device__ void for_each_tile_of_large(const BatchArgs& a, const F& f) {
-  constexpr unsigned kAll = 0xffffffffu;
   const std::uint32_t n = used(a.counters->large, a.large_capacity);
   const int ts = a.grid.tile_size;
   const std::uint32_t warps = gridDim.x * kThreads / 32;
@@ -53,7 +52,6 @@ __device__ void for_each_tile_of_large(const BatchArgs& a, const F& f) {
 template <class F>
 __device__ void for_each_tile_of_windows(const BatchArgs& a, const SplatKey& splat,
                                          const TileWindow& window, const F& f) {
-  constexpr unsigned kAll = 0xffffffffu;
   share_in_warp(static_cast<std::uint32_t>(__popc(window.tiles)), [&](unsigned owner, std::uint32_t k) {
     const unsigned from = owner % 32;
     const TileWindow shared{__shfl_sync(kAll, window.corner, from),
@@ -202,7 +200,7 @@ __device__ void measure_lists(const BatchArgs& a, std::uint32_t* of_length) {
 /// Places lists in bins, in no particular order, with one warp per tile. Also lists the work for
 /// order_kernel.
 __device__ void place_bins(const BatchArgs& a, std::uint32_t* of_length) {
-  constexpr unsigned kAll = 0xffffffffu, kMost = (1u << policy::Bin::kMaxDepthBits) / 64;
+  constexpr unsigned kMost = (1u << policy::Bin::kMaxDepthBits) / 64;
   const unsigned lane = threadIdx.x % 32,
                  mine = a.depth_bins.count() / 64;  // Pairs of adjacent bins per lane.
   for (std::uint32_t tile = (blockIdx.x * kThreads + threadIdx.x) / 32; tile < a.tiles;

@@ -19,7 +19,6 @@ constexpr int kThreads = kTile * kTile / kPixels;
 constexpr int kRowsApart = kBlock / kPixels;  ///< Distance in rows between a thread's pixels.
 constexpr std::uint32_t kChunk = Policy::kChunk;
 constexpr std::uint32_t kNothing = kChunk;  ///< Index of a staged splat that covers no pixel.
-constexpr unsigned kAll = 0xffffffffu;
 static_assert(kThreads == policy::Order::kThreads && 4 * kBlock * kBlock == 32 * kPixels &&
               kOrderBatch % kChunk == 0);
 

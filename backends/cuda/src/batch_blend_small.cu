@@ -14,7 +14,6 @@ constexpr int kThreads = Policy::kThreads, kWarps = kThreads / 32;  ///< Per hal
 constexpr std::uint32_t kOfThread = Policy::kOfThread;
 constexpr std::uint32_t kChunk = kOfThread * kThreads;  ///< Splats staged at a time.
 constexpr std::uint32_t kOfWarp = kChunk / kWarps;      ///< Splats of these per warp, adjacent.
-constexpr unsigned kAll = 0xffffffffu;
 static_assert(kTile == 2 * kBlock && kWarps == 4);
 
 /// A chunk of a list in the form that is drawn.

@@ -9,7 +9,6 @@ namespace gsnav::cuda {
 namespace {
 
 constexpr unsigned kThreads = policy::Cull::kThreads, kWarps = kThreads / 32;
-constexpr unsigned kAll = 0xffffffffu;
 
 /// Whether part `part` of the chunk may have visible Gaussians, by the bounds of the part, or by those
 /// of the chunk if parts have none.

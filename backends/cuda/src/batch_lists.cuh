@@ -32,8 +32,6 @@ class WarpPairs {
   }
 
  private:
-  static constexpr unsigned kAll = 0xffffffffu;
-
   /// Queues the pairs of the lanes `late`. Not inlined, because it is rare and must not slow down the
   /// common case. It must not take the address of a kernel's arguments.
   static __device__ __noinline__ void queue(unsigned long long* counter, BeyondPair* to,

@@ -12,7 +12,6 @@ namespace {
 
 using Policy = policy::Order;
 constexpr unsigned kThreads = Policy::kThreads, kWarps = kThreads / 32;
-constexpr unsigned kAll = 0xffffffffu;
 
 /// Swaps two values if they are not in the requested order.
 __device__ inline void put_in_order(std::uint64_t& first, std::uint64_t& second, bool up) {

@@ -10,7 +10,6 @@ namespace {
 
 using Policy = policy::Project;
 constexpr unsigned kWarpsPerPart = kChunkPart / 32;
-constexpr unsigned kAll = 0xffffffffu;
 
 /// Mask of the 32 rows from `first` on: 1 if a set of `size` rows has that row.
 __device__ unsigned rows_there(std::size_t size, std::size_t first) {

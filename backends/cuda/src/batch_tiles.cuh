@@ -76,7 +76,6 @@ __device__ inline unsigned long long take_places(unsigned long long* counter, st
 /// owner 32.
 template <class F>
 __device__ inline void share_in_warp(std::uint32_t count, const F& f) {
-  constexpr unsigned kAll = 0xffffffffu;
   const unsigned lane = threadIdx.x % 32;
   const std::uint32_t end = sum_to_lane(count);  // End of the lane's calls among those of the warp.
   const std::uint32_t total = __shfl_sync(kAll, end, 31);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "gsnav/backends/cuda/gl_image.hpp"
+#include "gsnav/backends/cuda/policy.hpp"
 #include "gsnav/core/buffer.hpp"
 
 namespace gsnav {
@@ -33,7 +34,7 @@ __global__ void turned_round(const float* values, float* to, int width, int heig
       values[static_cast<std::size_t>(height - 1 - y) * line + column];
 }
 
-constexpr unsigned kThreads = 128;
+constexpr unsigned kThreads = cuda::policy::GlImage::kThreads;
 
 Status failed(const char* what, cudaError_t e) {
   cudaGetLastError();

@@ -135,4 +135,9 @@ struct Upload {
   static constexpr std::size_t kBlocks = 8;
 };
 
+/// Conversion of an image to a texture of OpenGL.
+struct GlImage {
+  static constexpr unsigned kThreads = 128;
+};
+
 }  // namespace gsnav::cuda::policy
