@@ -108,18 +108,7 @@ int main(int argc, char** argv) try {
       ->check(CLI::Range(1, 100000));
   app.add_option("--out", o.out, "folder for everything that is written; made if it does not exist")
       ->capture_default_str();
-  app.add_option("--width", o.width, "image width, pixels")
-      ->capture_default_str()
-      ->check(CLI::Range(16, 4096));
-  app.add_option("--height", o.height, "image height, pixels")
-      ->capture_default_str()
-      ->check(CLI::Range(16, 4096));
-  app.add_option("--hfov", o.hfov, "horizontal field of view, degrees")
-      ->capture_default_str()
-      ->check(CLI::Range(10.0, 170.0));
-  app.add_option("--eye-height", o.eye_height, "height of the camera above the floor, metres")
-      ->capture_default_str()
-      ->check(CLI::Range(0.05, 3.0));
+  gsnav_tools::add_view_options(app, o);
   app.add_option("--frames-every", o.frame_every, "write every Nth RGB and depth frame; 0 writes none")
       ->capture_default_str()
       ->check(CLI::Range(0, 100000));

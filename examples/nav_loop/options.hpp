@@ -8,12 +8,9 @@
 namespace nav_loop {
 
 /// Options of the command line.
-struct Options : gsnav_tools::SceneOptions {
+struct Options : gsnav_tools::SceneOptions, gsnav_tools::ViewOptions {
   int episodes = 10;
   std::string out = "out";
-  int width = 256, height = 256;
-  double hfov = 90.0;
-  double eye_height = 1.5;
   int frame_every = 10;    ///< write every Nth frame; 0 writes none
   int shown_episode = -1;  ///< episode of strip and map; -1: closest encounter
   int max_steps = 500;

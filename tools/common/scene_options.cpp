@@ -108,6 +108,21 @@ void add_people_options(CLI::App& app, SceneOptions& o) {
 
 }  // namespace
 
+void add_view_options(CLI::App& app, ViewOptions& o) {
+  app.add_option("--width", o.width, "image width, pixels")
+      ->capture_default_str()
+      ->check(CLI::Range(16, 4096));
+  app.add_option("--height", o.height, "image height, pixels")
+      ->capture_default_str()
+      ->check(CLI::Range(16, 4096));
+  app.add_option("--hfov", o.hfov, "horizontal field of view, degrees")
+      ->capture_default_str()
+      ->check(CLI::Range(10.0, 170.0));
+  app.add_option("--eye-height", o.eye_height, "height of the camera above the floor, metres")
+      ->capture_default_str()
+      ->check(CLI::Range(0.05, 3.0));
+}
+
 void add_scene_file_options(CLI::App& app, SceneOptions& o) {
   add_file_options(app, o);
   add_density_option(app, o, "density of Gaussians in the embedded flat, relative to the default");

@@ -39,6 +39,15 @@ struct SceneOptions {
   gsnav::Device device;
 };
 
+/// The camera of an agent.
+struct ViewOptions {
+  int width = 256, height = 256;  ///< Pixels.
+  double hfov = 90.0;             ///< Degrees.
+  double eye_height = 1.5;        ///< Metres above the floor.
+};
+
+/// Adds --width, --height, --hfov and --eye-height, with the values of `o` as defaults.
+void add_view_options(CLI::App& app, ViewOptions& o);
 /// Adds the options that name the scene: --scene (or its name alone), --up, --time and --density.
 void add_scene_file_options(CLI::App& app, SceneOptions& o);
 /// Adds --mesh: triangles next to the Gaussians.

@@ -116,18 +116,7 @@ void add_scene_options(CLI::App& app, Options& o) {
                  "charges contact with people)")
       ->capture_default_str()
       ->check(CLI::IsMember({"v1", "v2", "avatar"}));
-  app.add_option("--width", o.width, "image width, pixels")
-      ->capture_default_str()
-      ->check(CLI::Range(16, 4096));
-  app.add_option("--height", o.height, "image height, pixels")
-      ->capture_default_str()
-      ->check(CLI::Range(16, 4096));
-  app.add_option("--hfov", o.hfov, "horizontal field of view, degrees")
-      ->capture_default_str()
-      ->check(CLI::Range(10.0, 170.0));
-  app.add_option("--eye-height", o.eye_height, "height of the camera above the floor, metres")
-      ->capture_default_str()
-      ->check(CLI::Range(0.05, 3.0));
+  gsnav_tools::add_view_options(app, o);
   gsnav_tools::add_scene_options(app, o);
 }
 

@@ -10,12 +10,9 @@
 namespace gsnav_eval {
 
 /// Options shared by the programs and the viewer.
-struct Options : gsnav_tools::SceneOptions {
+struct Options : gsnav_tools::SceneOptions, gsnav_tools::ViewOptions {
   int episodes = 10;
   std::string out = "out";
-  int width = 256, height = 256;
-  double hfov = 90.0;
-  double eye_height = 1.5;
   int max_steps = 500;
   std::string policy = "follower";  ///< One of follower, greedy, random.
   std::string episode_file;         ///< Empty: generate episodes.
