@@ -268,4 +268,20 @@ void closest_approach(std::span<const WalkPoint> path, double radius, double hei
   }
 }
 
+void merge_distances(std::span<const double> approach, const CapsuleSet& bodies,
+                     std::vector<std::uint32_t>& avatars, std::vector<double>& distances) {
+  for (std::size_t g = 0; g < approach.size(); ++g) {
+    const std::uint32_t avatar = bodies.capsules_of(bodies.groups()[g])[0].avatar;
+    const auto at = std::lower_bound(avatars.begin(), avatars.end(), avatar);
+    const auto i = at - avatars.begin();
+    if (at != avatars.end() && *at == avatar) {
+      double& least = distances[static_cast<std::size_t>(i)];
+      least = min(least, approach[g]);
+    } else {
+      avatars.insert(at, avatar);
+      distances.insert(distances.begin() + i, approach[g]);
+    }
+  }
+}
+
 }  // namespace gsnav

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/sim/world.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -253,7 +252,7 @@ StepInfo World::move(const Motion& motion, std::span<const CapsuleSet* const> bo
     if (motion.side != 0) wish += Vec3d{-std::cos(along.yaw), 0, std::sin(along.yaw)} * motion.side;
     const StepResult r = gsnav::step(*navmesh_, agent_state(), wish, *set, options);
     closest_approach(r.path, config_.agent_radius, config_.agent_height, *set, approach_);
-    merge_distances(*set);
+    merge_distances(approach_, *set, avatars_, distances_);
     info.wall_collision = info.wall_collision || r.hit_wall;
     info.capsule_blocked = info.capsule_blocked || r.blocked_by == BlockedBy::capsule;
     info.pushed_into = info.pushed_into || r.pushed_into;
@@ -279,21 +278,6 @@ StepInfo World::move(const Motion& motion, std::span<const CapsuleSet* const> bo
   s_.done = ++s_.steps >= config_.max_steps;
   s_.last = info;
   return info;
-}
-
-void World::merge_distances(const CapsuleSet& bodies) {
-  for (std::size_t g = 0; g < approach_.size(); ++g) {
-    const std::uint32_t avatar = bodies.capsules_of(bodies.groups()[g])[0].avatar;
-    const auto at = std::lower_bound(avatars_.begin(), avatars_.end(), avatar);
-    const auto i = at - avatars_.begin();
-    if (at != avatars_.end() && *at == avatar) {
-      distances_[static_cast<std::size_t>(i)] =
-          min(distances_[static_cast<std::size_t>(i)], approach_[g]);
-    } else {
-      avatars_.insert(at, avatar);
-      distances_.insert(distances_.begin() + i, approach_[g]);
-    }
-  }
 }
 
 void World::measure_distance() {

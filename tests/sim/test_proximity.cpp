@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "gsnav/core/rng.hpp"
 #include "gsnav/detail/sim/proximity.hpp"
@@ -90,6 +91,38 @@ TEST_CASE("nobody there") {
   std::vector<double> out(3);
   closest_approach({}, 0.1, 1.5, CapsuleSet(), out);
   CHECK(out.empty());
+}
+
+TEST_CASE("the smallest distance to each avatar is kept over ticks with other avatars") {
+  Rng rng(13);
+  std::map<std::uint32_t, double> truth;
+  std::vector<std::uint32_t> avatars;
+  std::vector<double> distances;
+  for (int tick = 0; tick < 40; ++tick) {
+    std::vector<DynamicCapsule> bodies;
+    for (std::uint32_t avatar = 0; avatar < 12; ++avatar) {
+      if (rng.below(3) == 0) continue;
+      const Capsule<double> body{{1.0 * avatar, 0, 0}, {1.0 * avatar, 1, 0}, 0.2};
+      bodies.push_back({{body, body}, avatar, 0});
+    }
+    const CapsuleSet set = CapsuleSet::create(bodies).value();
+    std::vector<double> approach(set.groups().size());
+    for (std::size_t g = 0; g < approach.size(); ++g) {
+      approach[g] = rng.uniform(-1, 5);
+      const auto avatar = set.capsules_of(set.groups()[g])[0].avatar;
+      const auto [at, fresh] = truth.try_emplace(avatar, approach[g]);
+      if (!fresh) at->second = std::min(at->second, approach[g]);
+    }
+    merge_distances(approach, set, avatars, distances);
+    CHECK(avatars.size() == truth.size());
+    CHECK(distances.size() == truth.size());
+    std::size_t i = 0;
+    for (const auto& [avatar, distance] : truth) {
+      CHECK(avatars[i] == avatar);
+      CHECK(distances[i++] == distance);
+    }
+  }
+  CHECK(truth.size() == 12);
 }
 
 TEST_CASE("the least distance to the fastest bodies is found, too") {

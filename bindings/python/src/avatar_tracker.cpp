@@ -2,8 +2,8 @@
 // Moves and metrics among people for the distribution gsnav-habitat, whose agents and clock are free.
 #include <nanobind/stl/shared_ptr.h>
 
+#include <cstdint>
 #include <limits>
-#include <map>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -38,7 +38,7 @@ class AvatarTracker {
     if (begun_) tracker_.add(record());
     begun_ = true;
     action_ = {};
-    nearest_.clear();
+    avatars_.clear();
     distances_.clear();
   }
 
@@ -51,12 +51,8 @@ class AvatarTracker {
     const StepResult r = step(mesh, agent, end - from->position, bodies, {.slide = slide});
     if (r.blocked_by == BlockedBy::invalid) return start;
     closest_approach(r.path, radius_, height_, bodies, near_now_);
-    for (std::size_t g = 0; g < near_now_.size(); ++g) {
-      const auto avatar = bodies.capsules_of(bodies.groups()[g])[0].avatar;
-      const auto [at, fresh] = nearest_.try_emplace(avatar, near_now_[g]);
-      if (!fresh) at->second = min(at->second, near_now_[g]);
-      if (near_now_[g] <= 0) action_.avatar_contact = true;
-    }
+    merge_distances(near_now_, bodies, avatars_, distances_);
+    for (const double d : near_now_) action_.avatar_contact = action_.avatar_contact || d <= 0;
     action_.moved += norm(r.position - start);
     action_.wall_collision = action_.wall_collision || r.hit_wall;
     action_.capsule_blocked = action_.capsule_blocked || r.blocked_by == BlockedBy::capsule;
@@ -81,7 +77,7 @@ class AvatarTracker {
     return r.blocked_by == BlockedBy::capsule;
   }
 
-  EpisodeMetrics metrics() {
+  EpisodeMetrics metrics() const {
     EpisodeTracker now = tracker_;
     if (begun_) now.add(record());
     return now.finish(false, 0.0, 0.0, 0.0);
@@ -89,7 +85,7 @@ class AvatarTracker {
 
   double action_clearance() const {
     double least = std::numeric_limits<double>::infinity();
-    for (const auto& [avatar, d] : nearest_) least = min(least, d);
+    for (const double d : distances_) least = min(least, d);
     return least;
   }
 
@@ -101,9 +97,7 @@ class AvatarTracker {
     throw std::logic_error(what);
   }
 
-  StepRecord record() {
-    distances_.clear();
-    for (const auto& [avatar, d] : nearest_) distances_.push_back(d);
+  StepRecord record() const {
     StepRecord made = action_;
     made.avatar_distances = distances_;
     return made;
@@ -119,8 +113,9 @@ class AvatarTracker {
   double radius_, height_;
   EpisodeTracker tracker_;
   bool begun_ = false;
-  StepRecord action_{};                      // Without distances.
-  std::map<std::uint32_t, double> nearest_;  // Smallest distance to each avatar in this action, metres.
+  StepRecord action_{};  // Without distances.
+  // Smallest distance to each avatar in this action, metres, sorted by avatar number.
+  std::vector<std::uint32_t> avatars_;
   std::vector<double> distances_, near_now_;
 };
 

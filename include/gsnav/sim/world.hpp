@@ -179,7 +179,6 @@ class World {
   Result<StepInfo> stop();
   Result<StepInfo> make_bodies_and_move(const Motion& motion);
   StepInfo move(const Motion& motion, std::span<const CapsuleSet* const> bodies);
-  void merge_distances(const CapsuleSet& bodies);
   void measure_distance();
 
   std::shared_ptr<const NavMesh> navmesh_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -20,5 +21,13 @@ namespace gsnav {
 /// @param out Resized to bodies.groups().size(). Element k belongs to group k.
 void closest_approach(std::span<const WalkPoint> path, double radius, double height,
                       const CapsuleSet& bodies, std::vector<double>& out);
+
+/// Keeps the smallest distance to each avatar over several ticks.
+/// @param approach Distances of one tick, of closest_approach.
+/// @param bodies The bodies of that tick. Avatars may differ from tick to tick.
+/// @param avatars Numbers of the avatars so far, ascending. Both lists are empty before the first tick.
+/// @param distances Smallest distance to each of `avatars`, metres.
+void merge_distances(std::span<const double> approach, const CapsuleSet& bodies,
+                     std::vector<std::uint32_t>& avatars, std::vector<double>& distances);
 
 }  // namespace gsnav
