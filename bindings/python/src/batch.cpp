@@ -224,22 +224,19 @@ void bind_counts(nb::class_<PythonBatch>& c) {
   c.def_prop_ro(
        "render_count",
        [](P& p) {
-         const Busy::Hold hold(p.core->busy, "BatchSimulator.render_count");
-         return p.core->sim.render_count();
+         return locked(*p.core, "BatchSimulator.render_count", [](auto& s) { return s.render_count(); });
        },
        "Number of renders so far.")
       .def_prop_ro(
           "pose_count",
           [](P& p) {
-            const Busy::Hold hold(p.core->busy, "BatchSimulator.pose_count");
-            return p.core->sim.pose_count();
+            return locked(*p.core, "BatchSimulator.pose_count", [](auto& s) { return s.pose_count(); });
           },
           "Number of times that an avatar was skinned for rendering.")
       .def(
           "set_rendering",
           [](P& p, bool on) {
-            const Busy::Hold hold(p.core->busy, "BatchSimulator.set_rendering");
-            p.core->sim.set_rendering(on);
+            locked(*p.core, "BatchSimulator.set_rendering", [on](auto& s) { s.set_rendering(on); });
           },
           nb::arg("on"), "Turns rendering on or off, from the next action on.")
       .def_prop_ro(
@@ -298,9 +295,10 @@ void bind_batch(nb::module_& m) {
       .def(
           "scene_of",
           [](P& p, std::size_t environment) {
-            const Busy::Hold hold(p.core->busy, "BatchSimulator.scene_of");
-            check_environment(*p.core, environment);
-            return p.core->sim.scene_of(environment);
+            return locked(*p.core, "BatchSimulator.scene_of", [&](auto& s) {
+              check_environment(*p.core, environment);
+              return s.scene_of(environment);
+            });
           },
           nb::arg("environment"), "Index of the scene that an environment is in.")
       .def_prop_ro(

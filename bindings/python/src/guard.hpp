@@ -53,4 +53,11 @@ class Busy {
   std::atomic<bool> flag_{false};
 };
 
+/// Calls f(s.sim) while the flag `s.busy` is held.
+template <class S, class F>
+auto locked(S& s, const char* what, const F& f) {
+  const Busy::Hold hold(s.busy, what);
+  return f(s.sim);
+}
+
 }  // namespace gsnav::python

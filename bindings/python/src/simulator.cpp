@@ -53,13 +53,6 @@ PythonObservations observe(nb::handle self, const char* what, const F& f) {
   return {seen, seen.point_goal, seen.time, image_views(seen.images, self)};
 }
 
-/// Runs f(simulator) with the GIL.
-template <class F>
-auto quick(PythonSimulator& s, const char* what, const F& f) {
-  const Busy::Hold hold(s.busy, what);
-  return f(s.sim);
-}
-
 void make(PythonSimulator* self, const DeviceArg& device, const SceneArg& scene,
           const SimulatorConfig& config) {
   const Device chosen = device.value();
@@ -143,39 +136,39 @@ void bind_episode_calls(nb::class_<PythonSimulator>& c) {
 void bind_state(nb::class_<PythonSimulator>& c) {
   using P = PythonSimulator;
   c.def_prop_ro(
-       "done", [](P& p) { return quick(p, "Simulator.done", [](Simulator& s) { return s.done(); }); },
+       "done", [](P& p) { return locked(p, "Simulator.done", [](Simulator& s) { return s.done(); }); },
        "True if the episode has ended.")
       .def(
           "metrics",
-          [](P& p) { return quick(p, "Simulator.metrics", [](Simulator& s) { return s.metrics(); }); },
+          [](P& p) { return locked(p, "Simulator.metrics", [](Simulator& s) { return s.metrics(); }); },
           "Metrics of the episode so far.")
       .def_prop_ro(
           "clock",
-          [](P& p) { return quick(p, "Simulator.clock", [](Simulator& s) { return s.clock(); }); },
+          [](P& p) { return locked(p, "Simulator.clock", [](Simulator& s) { return s.clock(); }); },
           "Time on the scene's clock, seconds.")
       .def_prop_ro(
           "agent",
           [](P& p) {
-            return quick(p, "Simulator.agent", [](Simulator& s) { return AgentPose(s.agent()); });
+            return locked(p, "Simulator.agent", [](Simulator& s) { return AgentPose(s.agent()); });
           },
           "A copy of the agent's pose.")
       .def(
           "state",
           [](P& p) {
-            return quick(p, "Simulator.state", [](Simulator& s) { return WorldState(s.state()); });
+            return locked(p, "Simulator.state", [](Simulator& s) { return WorldState(s.state()); });
           },
           "A copy of all state that changes during an episode. set_state returns to this moment.")
       .def(
           "set_state",
           [](P& p, const WorldState& state) {
-            quick(p, "Simulator.set_state", [&](Simulator& s) { s.set_state(state).throw_if_error(); });
+            locked(p, "Simulator.set_state", [&](Simulator& s) { s.set_state(state).throw_if_error(); });
           },
           nb::arg("state"), "Restores a state that state() returned.")
       .def(
           "set_agent",
           [](P& p, const Vec3d& position, double yaw, double pitch) {
-            quick(p, "Simulator.set_agent",
-                  [&](Simulator& s) { s.set_agent(position, yaw, pitch).throw_if_error(); });
+            locked(p, "Simulator.set_agent",
+                   [&](Simulator& s) { s.set_agent(position, yaw, pitch).throw_if_error(); });
           },
           nb::arg("position"), nb::arg("yaw"), nb::arg("pitch") = 0.0,
           "Moves the agent. Position in metres, angles in radians. Raises NothingNavigable if the "
@@ -184,19 +177,19 @@ void bind_state(nb::class_<PythonSimulator>& c) {
       .def(
           "set_seed",
           [](P& p, std::uint64_t seed) {
-            quick(p, "Simulator.set_seed", [&](Simulator& s) { s.set_seed(seed); });
+            locked(p, "Simulator.set_seed", [&](Simulator& s) { s.set_seed(seed); });
           },
           nb::arg("seed"), "Seeds the sensors' noise from now on.")
       .def(
           "set_rendering",
           [](P& p, bool on) {
-            quick(p, "Simulator.set_rendering", [&](Simulator& s) { s.set_rendering(on); });
+            locked(p, "Simulator.set_rendering", [&](Simulator& s) { s.set_rendering(on); });
           },
           nb::arg("on"), "Turns rendering on or off, from the next action on.")
       .def_prop_ro(
           "render_count",
           [](P& p) {
-            return quick(p, "Simulator.render_count", [](Simulator& s) { return s.render_count(); });
+            return locked(p, "Simulator.render_count", [](Simulator& s) { return s.render_count(); });
           },
           "Number of renders so far.");
 }
