@@ -52,7 +52,8 @@ class Env(BaseEnv):
         render_mode: None, or "rgb_array" for the image of the first RGB sensor in 8 bit.
         """
         config = SimulatorConfig() if config is None else config
-        self.observation_space = _task.observation_space(config)
+        with _task.memory_for_spaces(config, 1):
+            self.observation_space = _task.observation_space(config)
         self.action_space = _task.action_space()
         self._rgb = _task.rgb_sensor(config, render_mode)
         self.render_mode = render_mode

@@ -3,15 +3,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
-from ._errors import InvalidArgument
+from ._errors import InvalidArgument, OutOfMemory
 from ._gsnav import (
     BatchEpisode,
     EpisodeMetrics,
@@ -87,6 +88,17 @@ def sensor_space(sensor: SensorSpec) -> Box:
     return Box(0.0, high, (height, width, 1), np.float32)
 
 
+@contextlib.contextmanager
+def memory_for_spaces(config: SimulatorConfig, environments: int) -> Iterator[None]:
+    """Names the sensors if there is no memory for the spaces of their images."""
+    try:
+        yield
+    except MemoryError as e:
+        sizes = ", ".join(f"{s.uuid!r}: resolution = {list(s.resolution)}" for s in config.sensors)
+        raise OutOfMemory(f"config.sensors: no memory for the spaces of {environments} environments ({sizes}): "
+                          f"{e}") from e
+
+
 def observation_space(config: SimulatorConfig) -> Dict:
     """Space of observations: an image per sensor, and the goal as distance (metres) and angle (radians)."""
     if not config.rendering:
@@ -95,6 +107,7 @@ def observation_space(config: SimulatorConfig) -> Dict:
     for sensor in config.sensors:
         if sensor.uuid == POINT_GOAL:
             raise InvalidArgument(f"config.sensors: the name {POINT_GOAL!r} is taken by the goal; use another uuid")
+        sensor.validate()  # its size too, before there is an array of it
         spaces[sensor.uuid] = sensor_space(sensor)
     low, high = np.array([0, -math.pi], np.float32), np.array([LARGEST, math.pi], np.float32)
     spaces[POINT_GOAL] = Box(low, high, dtype=np.float32)

@@ -85,9 +85,10 @@ class VectorEnv(BaseVectorEnv):
         self.num_envs = int(num_envs)
         if self.num_envs < 1:
             raise InvalidArgument(f"num_envs = {num_envs}: must be positive")
-        self.single_observation_space = _task.observation_space(config)
         self.single_action_space = _task.action_space()
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        with _task.memory_for_spaces(config, self.num_envs):
+            self.single_observation_space = _task.observation_space(config)
+            self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._rgb = _task.rgb_sensor(config, render_mode)
         self.render_mode = render_mode

@@ -122,7 +122,10 @@ void bind_sensors(nb::module_& m) {
       .field("fisheye", &S::fisheye, "Lens of SensorModel.fisheye.")
       .field("cube_size", &S::cube_size,
              "Pixels of the cube that other models are resampled from; 0: auto.")
-      .done();
+      .done()
+      .def(
+          "validate", [](const S& s) { validate(s).throw_if_error(); },
+          "Raises InvalidArgument naming the field that is out of range.");
   m.def("rgbd_sensors", &rgbd_sensors, nb::arg("height") = 256, nb::arg("width") = 256,
         nb::arg("hfov") = 90.0, nb::arg("position") = Vec3d{0.0, 1.5, 0.0},
         "An RGB and a depth sensor (\"rgb\", \"depth\") at the same position. They share one render.");

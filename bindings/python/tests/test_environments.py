@@ -165,6 +165,23 @@ def test_wrong_arguments(people, small, square):
         gsnav.Env("nowhere.ply")
 
 
+@pytest.mark.parametrize("sides", [(2**15, 2**15), (2**30, 1), (0, 8)])
+def test_sizes_that_no_sensor_can_have(people, sides):
+    sensors = gsnav.rgbd_sensors(8, 8)
+    sensors[1].resolution = sides
+    wrong = next(side for side in sides if not 1 <= side <= 16384)
+    config = gsnav.SimulatorConfig(sensors=sensors)
+    for make in (sensors[1].validate, lambda: gsnav.Env(people, config=config),
+                 lambda: gsnav.VectorEnv(2, people, config=config), lambda: gsnav.Simulator("cpu", people, config)):
+        with pytest.raises(gsnav.InvalidArgument, match=f'SensorSpec "depth": resolution = {wrong}: '):
+            make()
+
+
+def test_spaces_without_memory_name_the_sensors(people, small):
+    with pytest.raises(gsnav.OutOfMemory, match=r"2147483648 environments \('rgb': resolution = \[16, 24\]"):
+        gsnav.VectorEnv(2**31, people, config=small)
+
+
 def test_given_episodes_and_several_scenes(people, opened, small):
     episodes = gsnav.generate_episodes(people.navmesh, 3, 7)
     env = gsnav.Env(people, config=small, episodes=episodes)
