@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "gsnav/detail/eval/oracle_photo.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
 #include "gsnav/device/renderer.hpp"
+#include "gsnav/eval/oracle.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 #if defined(GSNAV_DEVICE_OPENMP)
 #include "gsnav/backends/openmp.hpp"
@@ -33,6 +35,18 @@ Result<VisibleSets> build_visible_sets(const Device& device, const GaussianCloud
                                        const Similarity& world_from_asset) {
   auto backend = host_of(device);
   return build_visible_sets(backend, cloud, viewpoints, settings, world_from_asset);
+}
+
+Result<eval::OracleFrames> eval::oracle_render(const Device& device, std::span<const GaussianSet> sets,
+                                               const Camera& camera, const OracleConfig& config) {
+  auto backend = host_of(device);
+  return oracle_render(backend, sets, camera, config);
+}
+
+Result<eval::OracleFrames> eval::oracle_photo(const Device& device, std::span<const GaussianSet> sets,
+                                              const Camera& camera, int k, const OracleConfig& config) {
+  auto backend = host_of(device);
+  return oracle_photo(backend, sets, camera, k, config);
 }
 
 }  // namespace gsnav

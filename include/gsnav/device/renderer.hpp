@@ -98,4 +98,22 @@ Result<VisibleSets> build_visible_sets(const Device& device, const GaussianCloud
                                        const VisibleSettings& settings,
                                        const Similarity& world_from_asset = {});
 
+namespace eval {
+
+struct OracleConfig;
+struct OracleFrames;
+
+/// Renders the float64 reference image of sets of Gaussians: oracle_render (eval/oracle.hpp), compiled.
+/// It runs on the device's threads; for a GPU, on the threads of the CPU.
+/// @return the errors of oracle_render.
+Result<OracleFrames> oracle_render(const Device& device, std::span<const GaussianSet> sets,
+                                   const Camera& camera, const OracleConfig& config);
+/// Renders the reference image with k times the resolution and averages it: oracle_photo, compiled. It
+/// runs where oracle_render does.
+/// @return the errors of oracle_photo.
+Result<OracleFrames> oracle_photo(const Device& device, std::span<const GaussianSet> sets,
+                                  const Camera& camera, int k, const OracleConfig& config);
+
+}  // namespace eval
+
 }  // namespace gsnav

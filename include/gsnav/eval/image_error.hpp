@@ -31,7 +31,7 @@ struct ImageError {
 /// @param channels Values per pixel.
 /// @param excluded Shape [pixels] or empty. Pixels with a nonzero value are excluded from everything
 /// except `psnr`. Fractions refer to the remaining pixels.
-/// @return invalid_argument if sizes disagree or no pixel remains.
+/// @return invalid_argument if sizes disagree or are 0. If no pixel remains, all but `psnr` is 0.
 Result<ImageError> image_error(Samples reference, Samples test, std::size_t channels,
                                std::span<const std::uint8_t> excluded = {});
 
