@@ -4,6 +4,8 @@
 #include <nanobind/nanobind.h>
 #include <unistd.h>
 
+#include <exception>
+
 namespace gsnav::python {
 
 /// Calls f, which takes the GIL. Python before 3.14 ends a thread that asks for the GIL at exit, by
@@ -13,6 +15,20 @@ template <class F>
 void take_gil(const F& f) noexcept {
   try {
     f();
+  } catch (...) {
+    for (;;) pause();
+  }
+}
+
+/// Calls a Python function from a function of C++ that called back, while the GIL is held. A thread that
+/// Python ends at exit inside the function sleeps, as in take_gil. Such an end is no std::exception,
+/// while all exceptions of the call are.
+template <class... Args>
+nanobind::object call_python(const nanobind::object& function, const Args&... args) {
+  try {
+    return function(args...);
+  } catch (const std::exception&) {
+    throw;
   } catch (...) {
     for (;;) pause();
   }

@@ -67,7 +67,7 @@ OpenedScene open(nb::handle named, OpenOptions options, const nb::object& progre
     options.progress = [&progress](const std::string& task, double share) {
       HoldGil gil;
       try {
-        progress(task, share);
+        call_python(progress, task, share);
       } catch (nb::python_error& e) {
         e.discard_as_unraisable("gsnav.open_scene: progress");
       }

@@ -100,3 +100,37 @@ def test_nothing_is_printed_at_exit(daemon):
     run = subprocess.run([sys.executable, "-c", AT_EXIT.replace("DAEMON", str(daemon))], capture_output=True, text=True,
                          env=environment)
     assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
+
+
+IN_A_CALLBACK = """
+import threading
+import time
+import gsnav
+inside = threading.Event()
+def stay(*arguments):
+    inside.set()
+    while True:
+        time.sleep(0.001)
+scene = gsnav.open_scene("default", gsnav.OpenOptions(navmesh="auto", density=0.05))
+episode = gsnav.generate_episodes(scene.scene.navmesh, 1, 1)[0]
+config = gsnav.BatchConfig(sensors=gsnav.rgbd_sensors(4, 6))
+def work():
+    WORK
+threading.Thread(target=work, daemon=True).start()
+assert inside.wait(60)
+"""
+
+CALLBACKS = {
+    "episode": 'gsnav.BatchSimulator("cpu", [scene], config, 2, stay).reset()',
+    "image": 'gsnav.BatchSimulator("cpu", [scene], config, 2, lambda e, k: episode, image_source=stay).reset()',
+    "levels": 'gsnav.build_lod("cpu", scene.scene.assets[0].cloud, progress=stay)',
+    "progress": 'gsnav.open_scene("default", gsnav.OpenOptions(navmesh="gaussians", density=0.05), stay)',
+}
+
+
+@pytest.mark.parametrize("name", CALLBACKS)
+def test_a_daemon_thread_inside_a_callback_ends_with_the_process(name):
+    """Python unwinds the stack of such a thread at exit. That must not reach a function of C++ that cannot throw."""
+    program = IN_A_CALLBACK.replace("WORK", CALLBACKS[name])
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=100)
+    assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
