@@ -64,6 +64,13 @@ nb::object array_view(const T* data, const std::vector<std::size_t>& shape, nb::
   return nb::cast(nb::ndarray<nb::numpy, const T>(data, shape.size(), shape.data(), owner));
 }
 
+/// The numpy array of an argument. It shares memory where it can.
+inline nb::object numpy_array(nb::handle source) {
+  // Objects that are seen by DLPack only are not arrays to asarray.
+  const bool foreign = !nb::hasattr(source, "__array__") && nb::hasattr(source, "__dlpack__");
+  return nb::module_::import_("numpy").attr(foreign ? "from_dlpack" : "asarray")(source);
+}
+
 /// Points as an array of shape [points][3].
 inline nb::object point_array(std::span<const Vec3d> points) {
   std::vector<double> numbers;

@@ -18,8 +18,12 @@ NB_MODULE(_gsnav, m) {
   bind_device(m);
   bind_camera(m);
   bind_navmesh(m);
-  bind_scene(m);
   bind_render_settings(m);
+  bind_cloud(m);
+  bind_scene(m);
+  bind_scene_files(m);
+  bind_levels(m);
+  bind_eval(m);
   bind_renderer(m);
   bind_task(m);
   bind_episodes(m);

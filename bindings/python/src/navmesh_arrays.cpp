@@ -18,10 +18,7 @@ nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu> rows_of_three(n
                                                                                const char* name,
                                                                                const char* kinds,
                                                                                const char* type) {
-  const nb::object numpy = nb::module_::import_("numpy");
-  // Objects that are seen by DLPack only are not arrays to asarray.
-  const bool foreign = !nb::hasattr(source, "__array__") && nb::hasattr(source, "__dlpack__");
-  const nb::object array = numpy.attr(foreign ? "from_dlpack" : "asarray")(source);
+  const nb::object array = numpy_array(source);
   const nb::object dtype = array.attr("dtype"), shape = array.attr("shape");
   const std::string where = "NavMesh.build: " + std::string(name) + " have ";
   if (std::string(kinds).find(text_of(dtype.attr("kind"))) == std::string::npos) {
@@ -39,7 +36,7 @@ nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu> rows_of_three(n
     }
   }
   return nb::cast<nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu>>(
-      numpy.attr("require")(array, type, "CA"));
+      nb::module_::import_("numpy").attr("require")(array, type, "CA"));
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 #include "bind.hpp"
 #include "fields.hpp"
 #include "gsnav/open.hpp"
+#include "gsnav/scene/lod_tree.hpp"
+#include "gsnav/scene/visible_sets.hpp"
 
 namespace gsnav::python {
 namespace {
@@ -88,12 +90,18 @@ void bind_scene(nb::module_& m) {
                              "simulators share it.")
       .def(
           "__init__",
-          [](SimulatorScene* self, const SceneArg& scene, std::shared_ptr<const NavMesh> navmesh) {
-            new (self) SimulatorScene(*scene.scene);
-            if (navmesh != nullptr) self->navmesh = std::move(navmesh);
+          [](SimulatorScene* self, const std::optional<SceneArg>& scene,
+             std::shared_ptr<const NavMesh> navmesh, std::optional<std::vector<SceneAsset>> assets) {
+            SimulatorScene made = scene ? *scene->scene : SimulatorScene{};
+            if (navmesh != nullptr) made.navmesh = std::move(navmesh);
+            if (assets) made.assets = std::move(*assets);
+            new (self) SimulatorScene(std::move(made));
           },
-          nb::arg("scene"), nb::arg("navmesh") = nb::none(),
-          "A scene that shares the parts of `scene`, with another NavMesh if one is given.")
+          nb::arg("scene") = nb::none(), nb::arg("navmesh") = nb::none(), nb::arg("assets") = nb::none(),
+          "A scene that shares the parts of `scene` (None: nothing), with another NavMesh or other sets "
+          "of Gaussians if they are given.")
+      .def_ro("assets", &SimulatorScene::assets, nb::rv_policy::copy,
+              "Sets of static Gaussians: a new list of copies that share their parts.")
       .def_ro("navmesh", &SimulatorScene::navmesh, "Surface that agents walk on, or None.")
       .def("__copy__", itself, nb::sig("def __copy__(self) -> SimulatorScene"), "Returns this object.")
       .def("__deepcopy__", itself_with_memo,

@@ -9,7 +9,8 @@ import pytest
 
 EXAMPLES = pathlib.Path(__file__).parents[3] / "examples" / "python"
 NEEDS = {"vector_env.py": "gymnasium", "plot.py": "matplotlib", "on_ray.py": "ray", "on_jax.py": "jax"}
-WRITES = {"render_scan.py": "scan.npz", "plot.py": "plot.png", "on_ray.py": "journal.jsonl"}
+WRITES = {"render_scan.py": "scan.npz", "plot.py": "plot.png", "on_ray.py": "journal.jsonl",
+          "convert_scene.py": "scene.spz"}
 
 
 # These have tests of their own (test_train_pointnav.py), and need torch.

@@ -140,6 +140,9 @@ class Things:
         self.closed = [gsnav.Env(scene, config=self.config), gsnav.VectorEnv(2, scene, config=self.config)]
         [env.close() for env in self.closed]
         self.camera = gsnav.Camera.look_at((5, 1.5, 4), (5, 1, 3), (0, 1, 0), 6, 4, 90)
+        self.cloud = scene.assets[0].cloud
+        self.sets = gsnav.build_visible_sets("cpu", self.cloud, [(5, 1.5, 4)], gsnav.VisibleSettings(face=16))
+        self.still = gsnav.SimulatorScene(assets=scene.assets)
         self.first = self.bits()
 
     def bits(self):
@@ -209,6 +212,20 @@ def calls(t, a):
         lambda: gsnav.TaskConfig(**{a.one_of(["max_steps", "turn_angle", "x"]): a.anything()}),
         lambda: gsnav.SensorSpec(resolution=a.anything(), position=a.point()),
         lambda: gsnav.Device.parse(a.scalar()),
+        lambda: gsnav.eval.image_error(a.array((2, 2, 3)), a.array((2, 2, 3)), a.mask(2)),
+        lambda: gsnav.eval.depth_error(a.array((2, 2)), a.array(), a.anything(), a.anything()),
+        lambda: gsnav.eval.oracle_render("cpu", a.one_of([t.still, t.scene, a.anything()]), camera()),
+        lambda: gsnav.build_visible_sets("cpu", t.cloud, [a.point()],
+                                         gsnav.VisibleSettings(face=16, rows=a.one_of([0, 3, 8]), cell=a.number())),
+        lambda: gsnav.build_lod("cpu", a.anything(), progress=a.anything()),
+        lambda: t.sets.count_seen_rows(a.scalar(), a.scalar()),
+        lambda: t.sets.cell_of(camera(), gsnav.Similarity(scale=a.number(), translation=a.point())),
+        lambda: gsnav.navmesh_viewpoints(mesh, [a.number()], a.one_of([0.0, -1, math.nan, 3.0])),
+        lambda: gsnav.SimulatorScene(a.anything(), assets=a.one_of([None, [], t.still.assets, a.anything()])),
+        lambda: gsnav.Renderer("cpu", gsnav.SimulatorScene(assets=[gsnav.SceneAsset(
+            t.cloud, gsnav.Similarity(rotation=[a.number() for _ in range(4)], scale=a.number()))])).render(t.camera),
+        lambda: gsnav.io.save_scene(a.anything(), t.cloud) if a.rng.integers(2) else gsnav.io.count_clamped(
+            "x.splat", a.anything()),
         lambda: a.one_of(t.closed).step(a.anything()),
         lambda: a.one_of(t.closed).reset(seed=a.scalar()),
     ]
