@@ -73,6 +73,8 @@ if [[ $stubs == ON ]]; then
   export GSNAV_TOOLS_DIR=$build/tools GSNAV_PYTHON_REFERENCE=$build/bindings/python/gsnav_python_reference
   echo "Checking the types of the package"
   (cd "$build" && "$venv/bin/python" -m mypy --strict -p gsnav)
+  echo "Comparing docs/reference/python.md with the package"
+  "$venv/bin/python" tools/make_python_page.py --stubs "$build/bindings/python/_gsnav.pyi" --check
 fi
 echo "Testing"
 exec "${run[@]}" "$venv/bin/python" -m pytest "$@"
