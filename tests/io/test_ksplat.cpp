@@ -28,14 +28,14 @@ std::vector<PlyRow> ksplat_rows(std::size_t n, int degree, unsigned seed) {
   return rows;
 }
 
-KsplatFile small_file(int level, int degree = 1) {
+KsplatFile small_ksplat(int level, int degree = 1) {
   KsplatFile file;
   file.level = level;
   file.sections = {{degree, ksplat_rows(6, degree, 51), 0}};
   return file;
 }
 
-void check_fails(const std::string& text, Errc code, const std::string& part) {
+void check_ksplat_fails(const std::string& text, Errc code, const std::string& part) {
   check_refused(io::parse_ksplat(bytes_of(text), "some.ksplat"), code, "some.ksplat", part);
 }
 
@@ -89,7 +89,7 @@ TEST_CASE("ksplat: every field within half a step of what was packed") {
 
 TEST_CASE("ksplat: cut off anywhere") {
   for (const int level : {0, 1, 2}) {
-    const std::string text = small_file(level).text();
+    const std::string text = small_ksplat(level).text();
     for (std::size_t n = 0; n < text.size(); n += n < 4000 ? 500 : n < 6000 ? 50 : 1) {
       REQUIRE(io::parse_ksplat(bytes_of(text.substr(0, n)), "a.ksplat").code() == Errc::invalid_file);
     }
@@ -97,34 +97,39 @@ TEST_CASE("ksplat: cut off anywhere") {
 }
 
 TEST_CASE("ksplat: counts are not trusted with memory") {
-  const std::string text = small_file(1).text();
+  const std::string text = small_ksplat(1).text();
   for (const std::uint32_t count : {7u, 100000u, 0x7fffffffu, 0xffffffffu}) {
     const std::string number = std::to_string(count);
     std::string all = with(with(text, kSection, count), 16, count);
     reset_largest_allocation();
-    check_fails(with(text, 4, count), Errc::invalid_file, number + " section headers");
-    check_fails(with(text, 16, count), Errc::invalid_file, "header's count is " + number);
-    check_fails(all, Errc::invalid_file, number + " Gaussians in room for 6");
-    check_fails(with(all, kSection + 4, count), Errc::invalid_file, number + " Gaussians in 2 buckets");
-    check_fails(with(text, kSection + 12, count), Errc::invalid_file, "in " + number + " buckets need");
-    check_fails(with(text, kSection + 32, count), Errc::invalid_file, number + " full and 1 other");
-    check_fails(with(text, kSection + 36, count), Errc::invalid_file, "need");
+    check_ksplat_fails(with(text, 4, count), Errc::invalid_file, number + " section headers");
+    check_ksplat_fails(with(text, 16, count), Errc::invalid_file, "header's count is " + number);
+    check_ksplat_fails(all, Errc::invalid_file, number + " Gaussians in room for 6");
+    check_ksplat_fails(with(all, kSection + 4, count), Errc::invalid_file,
+                       number + " Gaussians in 2 buckets");
+    check_ksplat_fails(with(text, kSection + 12, count), Errc::invalid_file,
+                       "in " + number + " buckets need");
+    check_ksplat_fails(with(text, kSection + 32, count), Errc::invalid_file,
+                       number + " full and 1 other");
+    check_ksplat_fails(with(text, kSection + 36, count), Errc::invalid_file, "need");
     CHECK(largest_allocation() < 300000);
   }
-  check_fails(with(text, kSection + 8, 1u), Errc::invalid_file, "hold 3 of its 6");
+  check_ksplat_fails(with(text, kSection + 8, 1u), Errc::invalid_file, "hold 3 of its 6");
   const std::size_t sizes = kSection + 2 * KsplatFile::kSectionHeader;
-  check_fails(with(text, sizes, 1u), Errc::invalid_file, "hold 5 of its 6");
+  check_ksplat_fails(with(text, sizes, 1u), Errc::invalid_file, "hold 5 of its 6");
   CHECK(io::parse_ksplat(bytes_of(with(text, sizes, 0xffffffffu)), "a.ksplat").ok());
 }
 
 TEST_CASE("ksplat: headers that make no sense") {
-  const std::string text = small_file(1).text();
-  check_fails("", Errc::invalid_file, "0 bytes");
-  check_fails(with(text, 0, std::uint8_t{1}), Errc::unsupported, "version 1.1");
-  check_fails(with(text, 1, std::uint8_t{0}), Errc::unsupported, "version 0.0");
-  check_fails(with(text, 20, std::uint16_t{3}), Errc::unsupported, "compression level 3");
-  check_fails(with(text, kSection + 40, std::uint16_t{4}), Errc::invalid_file, "section 0: SH degree 4");
-  check_fails(with(text, kSection + 20, std::uint16_t{8}), Errc::invalid_file, "8 bytes to a bucket");
+  const std::string text = small_ksplat(1).text();
+  check_ksplat_fails("", Errc::invalid_file, "0 bytes");
+  check_ksplat_fails(with(text, 0, std::uint8_t{1}), Errc::unsupported, "version 1.1");
+  check_ksplat_fails(with(text, 1, std::uint8_t{0}), Errc::unsupported, "version 0.0");
+  check_ksplat_fails(with(text, 20, std::uint16_t{3}), Errc::unsupported, "compression level 3");
+  check_ksplat_fails(with(text, kSection + 40, std::uint16_t{4}), Errc::invalid_file,
+                     "section 0: SH degree 4");
+  check_ksplat_fails(with(text, kSection + 20, std::uint16_t{8}), Errc::invalid_file,
+                     "8 bytes to a bucket");
   const LoadedCloud loaded = io::parse_ksplat(bytes_of(text + "stray"), "a.ksplat").value();
   REQUIRE(loaded.report.warnings.size() == 1);
   CHECK(contains(loaded.report.warnings[0], "5 stray bytes"));
@@ -132,7 +137,7 @@ TEST_CASE("ksplat: headers that make no sense") {
 
 TEST_CASE("ksplat: what is no drawable Gaussian is counted") {
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  const std::string text = small_file(1).text();
+  const std::string text = small_ksplat(1).text();
   const auto load = [](const std::string& t) {
     LoadedCloud loaded = io::parse_ksplat(bytes_of(t), "a.ksplat").value();
     check_consistent(loaded);
@@ -146,12 +151,12 @@ TEST_CASE("ksplat: what is no drawable Gaussian is counted") {
   CHECK(load(with(text, record + 6, std::uint16_t{0})).kept == 6);                     // flat
   CHECK(load(with(text, record + 12, std::uint64_t{0})).dropped_zero_quat == 1);
   CHECK(load(with(text, record + 23, std::uint8_t{0})).dropped_transparent == 1);
-  CHECK(load(with(small_file(2).text(), 36, nan)).dropped_non_finite == 6);
+  CHECK(load(with(small_ksplat(2).text(), 36, nan)).dropped_non_finite == 6);
 }
 
 TEST_CASE("ksplat: from a file, by its extension") {
   TempFolder folder("ksplat");
-  write_file(folder / "a.ksplat", small_file(2).text());
+  write_file(folder / "a.ksplat", small_ksplat(2).text());
   CHECK(io::load_ksplat(folder / "a.ksplat").value().cloud.size() == 6);
   CHECK(io::load_scene((folder / "a.ksplat").string()).value().cloud.size() == 6);
   CHECK(io::load_ksplat(folder / "none.ksplat").code() == Errc::file_not_found);

@@ -14,15 +14,15 @@ using Triangle = std::array<std::uint32_t, 3>;
 
 namespace {
 
-Result<TriangleMesh> parse(const std::string& name, const std::string& text) {
+Result<TriangleMesh> parse_mesh(const std::string& name, const std::string& text) {
   TempFolder folder("mesh_formats");
   write_file(folder / name, text);
   return io::load_mesh(folder / name);
 }
 
-void check_fails(const std::string& name, const std::string& text, const std::string& part,
-                 Errc code = Errc::invalid_file) {
-  check_refused(parse(name, text), code, name, part);
+void check_mesh_fails(const std::string& name, const std::string& text, const std::string& part,
+                      Errc code = Errc::invalid_file) {
+  check_refused(parse_mesh(name, text), code, name, part);
 }
 
 const std::string kPlyHead =
@@ -94,7 +94,7 @@ Vec3d area(const TriangleMesh& m) {
 TEST_CASE("ply mesh: text and both byte orders, other properties between") {
   for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"}) {
     CAPTURE(format);
-    const TriangleMesh m = parse("a.ply", square_ply(format)).value();
+    const TriangleMesh m = parse_mesh("a.ply", square_ply(format)).value();
     REQUIRE(m.vertices.size() == 4);
     CHECK(m.vertices[3] == Vec3f{0, 1, 0.5f});
     REQUIRE(m.triangles.size() == 3);
@@ -111,31 +111,32 @@ TEST_CASE("ply mesh: what makes no sense") {
     std::string out = good;
     return out.replace(out.find(from, rows), from.size(), to);
   };
-  check_fails("a.ply", with("4 0 1 2 3", "4 0 1 2 4"), "face 0: a corner outside of the 4");
-  check_fails("a.ply", with("4 0 1 2 3", "4 0 1 2 -1"), "face 0: a corner outside");
-  check_fails("a.ply", with("4 0 1 2 3", "4 0 1 2 0.5"), "face 0: a corner outside");
-  check_fails("a.ply", with("3 2 1 0", "2 2 1"), "face 1 has 2 corners");
-  check_fails("a.ply", with("3 2 1 0", "-3 2 1 0"), "'face' promises 2 rows, 1 are there");
-  check_fails("a.ply", with("3 2 1 0", "1e300 2 1 0"), "'face' promises 2 rows, 1 are there");
-  check_fails("a.ply", with("1.000000", "nan"), "is no finite number");
-  check_fails("a.ply", "ply\nformat ascii 1.0\nelement face 0\nend_header\n", "'face' comes before");
-  check_fails("a.ply", "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n", "property 'x'");
+  check_mesh_fails("a.ply", with("4 0 1 2 3", "4 0 1 2 4"), "face 0: a corner outside of the 4");
+  check_mesh_fails("a.ply", with("4 0 1 2 3", "4 0 1 2 -1"), "face 0: a corner outside");
+  check_mesh_fails("a.ply", with("4 0 1 2 3", "4 0 1 2 0.5"), "face 0: a corner outside");
+  check_mesh_fails("a.ply", with("3 2 1 0", "2 2 1"), "face 1 has 2 corners");
+  check_mesh_fails("a.ply", with("3 2 1 0", "-3 2 1 0"), "'face' promises 2 rows, 1 are there");
+  check_mesh_fails("a.ply", with("3 2 1 0", "1e300 2 1 0"), "'face' promises 2 rows, 1 are there");
+  check_mesh_fails("a.ply", with("1.000000", "nan"), "is no finite number");
+  check_mesh_fails("a.ply", "ply\nformat ascii 1.0\nelement face 0\nend_header\n",
+                   "'face' comes before");
+  check_mesh_fails("a.ply", "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n", "property 'x'");
   std::string large = binary;
   large.replace(large.find("face 2"), 6, "face 999999999999");
-  check_fails("a.ply", large, "'face' promises 999999999999 rows, 2 are there");
+  check_mesh_fails("a.ply", large, "'face' promises 999999999999 rows, 2 are there");
   large = binary;
   large.replace(large.find("vertex 4"), 8, "vertex 999999999999");
-  check_fails("a.ply", large, "'vertex' promises 999999999999 rows");
+  check_mesh_fails("a.ply", large, "'vertex' promises 999999999999 rows");
   const std::size_t start = binary.find("end_header\n") + 11;
   for (std::size_t n = start; n < binary.size(); ++n) {
-    REQUIRE(parse("a.ply", binary.substr(0, n)).code() == Errc::invalid_file);
+    REQUIRE(parse_mesh("a.ply", binary.substr(0, n)).code() == Errc::invalid_file);
   }
 }
 
 TEST_CASE("gltf mesh: triangles, strips and fans cover the same square") {
   for (const std::string& text : {square_glb(), square_glb(R"([{"mesh":0}])", "5", {0, 1, 3, 2}),
                                   square_glb(R"([{"mesh":0}])", "6", {0, 1, 2, 3})}) {
-    const TriangleMesh m = parse("a.glb", text).value();
+    const TriangleMesh m = parse_mesh("a.glb", text).value();
     CHECK(m.vertices.size() == 4);
     CHECK(m.triangles.size() == 2);
     CHECK(area(m) == Vec3d{0, 0, 2});
@@ -144,7 +145,7 @@ TEST_CASE("gltf mesh: triangles, strips and fans cover the same square") {
 
 TEST_CASE("gltf mesh: nodes place it; a mirrored one keeps its outside") {
   const TriangleMesh m =
-      parse(
+      parse_mesh(
           "a.glb",
           square_glb(
               R"([{"children":[1],"translation":[0,0,5],"scale":[2,2,2]},{"mesh":0,"translation":[1,0,0]}])"))
@@ -152,19 +153,22 @@ TEST_CASE("gltf mesh: nodes place it; a mirrored one keeps its outside") {
   CHECK(m.vertices[2] == Vec3f{4, 2, 5});
   CHECK(area(m) == Vec3d{0, 0, 8});
   // Mirrored at x = 0 and at z = 0: outsides turn with the second only.
-  CHECK(area(parse("a.glb", square_glb(R"([{"mesh":0,"scale":[-1,1,1]}])")).value()) == Vec3d{0, 0, 2});
-  CHECK(area(parse("a.glb", square_glb(R"([{"mesh":0,"scale":[1,1,-1]}])")).value()) == Vec3d{0, 0, -2});
+  CHECK(area(parse_mesh("a.glb", square_glb(R"([{"mesh":0,"scale":[-1,1,1]}])")).value()) ==
+        Vec3d{0, 0, 2});
+  CHECK(area(parse_mesh("a.glb", square_glb(R"([{"mesh":0,"scale":[1,1,-1]}])")).value()) ==
+        Vec3d{0, 0, -2});
 }
 
 TEST_CASE("gltf mesh: what makes no sense") {
-  check_fails("a.glb", square_glb(R"([{"mesh":0}])", "4", {0, 1, 4}), "corner 4 of 4 vertices");
-  check_fails("a.glb", square_glb(R"([{"mesh":0}])", "4", {0, 1, 2}, "4"), "accessors[1]: 4 elements");
-  check_fails("a.glb", square_glb(R"([{"mesh":0}])", "4", {0, 1, 2}, "4294967295"),
-              "accessors[1]: 4294967295 elements");
-  check_fails("a.glb", square_glb(R"([{"mesh":0}])", "0"), "no triangles");
-  check_fails("a.glb", square_glb(R"([{"mesh":0,"scale":[1e300,1,1]}])"), "is not finite");
-  check_fails("a.glb", square_glb("[]"), "no triangles");
-  check_fails("a.stl", "solid", "not a mesh that is read here", Errc::unsupported);
+  check_mesh_fails("a.glb", square_glb(R"([{"mesh":0}])", "4", {0, 1, 4}), "corner 4 of 4 vertices");
+  check_mesh_fails("a.glb", square_glb(R"([{"mesh":0}])", "4", {0, 1, 2}, "4"),
+                   "accessors[1]: 4 elements");
+  check_mesh_fails("a.glb", square_glb(R"([{"mesh":0}])", "4", {0, 1, 2}, "4294967295"),
+                   "accessors[1]: 4294967295 elements");
+  check_mesh_fails("a.glb", square_glb(R"([{"mesh":0}])", "0"), "no triangles");
+  check_mesh_fails("a.glb", square_glb(R"([{"mesh":0,"scale":[1e300,1,1]}])"), "is not finite");
+  check_mesh_fails("a.glb", square_glb("[]"), "no triangles");
+  check_mesh_fails("a.stl", "solid", "not a mesh that is read here", Errc::unsupported);
   CHECK(io::load_mesh("none.glb").code() == Errc::file_not_found);
 }
 

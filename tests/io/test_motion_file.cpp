@@ -31,7 +31,7 @@ const char* const kArm =
     "MOTION\nFrames: 2\nFrame Time: 0.05\n"
     "0.5 0.25 -1 10 20 30 40 50 60 70\n1 2 3 -10 -200 30 -40 150 -60 7e1\n";
 
-Result<io::LoadedMotion> load(const std::string& text, const io::BvhOptions& options = {}) {
+Result<io::LoadedMotion> load_clip(const std::string& text, const io::BvhOptions& options = {}) {
   TempFolder folder("bvh");
   write_file(folder / "some.bvh", text);
   return io::load_bvh(folder / "some.bvh", options);
@@ -65,7 +65,7 @@ Matrix turned(char axis, Real degrees) {
 }  // namespace
 
 TEST_CASE("bvh: kinematics against matrices in long double") {
-  const io::LoadedMotion m = load(kArm).value();
+  const io::LoadedMotion m = load_clip(kArm).value();
   CHECK(m.skeleton.names == std::vector<std::string>{"hips", "arm", "hand"});
   CHECK(m.skeleton.parents == std::vector<std::int32_t>{-1, 0, 1});
   CHECK(m.clip.frame_rate == doctest::Approx(20.0));
@@ -99,7 +99,7 @@ TEST_CASE("bvh: kinematics against matrices in long double") {
 }
 
 TEST_CASE("bvh: units, Z up, and places that replace the offset") {
-  const io::LoadedMotion plain = load(kArm).value(), other = load(kArm, {0.01, true}).value();
+  const io::LoadedMotion plain = load_clip(kArm).value(), other = load_clip(kArm, {0.01, true}).value();
   for (const double time : {0.0, 0.02, 0.05}) {
     const auto a = pose_at(plain, time), b = pose_at(other, time);
     for (std::size_t j = 0; j < 3; ++j) {
@@ -109,7 +109,7 @@ TEST_CASE("bvh: units, Z up, and places that replace the offset") {
   }
   std::string text = kArm;
   text.replace(text.find("0.5 0.25 -1"), 11, "1.2 2.5 2.2");  // near (1, 2, 3) with its channels X Z Y
-  const io::LoadedMotion replaced = load(text).value();
+  const io::LoadedMotion replaced = load_clip(text).value();
   CHECK(norm(pose_at(replaced, 0)[0].translation - Vec3d{1.2, 2.2, 2.5}) < 1e-12);
   CHECK(norm(pose_at(replaced, 0.05)[0].translation - Vec3d{1, 3, 2}) < 1e-12);
 }
@@ -118,7 +118,7 @@ TEST_CASE("bvh: what is wrong is named with its line") {
   const auto fails = [](const std::string& from, const std::string& to, const std::string& part) {
     std::string text = kArm;
     text.replace(text.find(from), from.size(), to);
-    const Status s = load(text).status();
+    const Status s = load_clip(text).status();
     CAPTURE(s.message());
     CHECK(s.code() == Errc::invalid_file);
     CHECK(contains(s.message(), "some.bvh"));
@@ -136,7 +136,7 @@ TEST_CASE("bvh: what is wrong is named with its line") {
   fails("Frames: 2", "Frames: 1.5", "frames of 10 channels");
   fails("Frames: 2", "Frames: 1e12", "frames of 10 channels");
   fails("Frame Time: 0.05", "Frame Time: 0", "not positive");
-  CHECK(load(kArm, {0.0, false}).code() == Errc::invalid_argument);
+  CHECK(load_clip(kArm, {0.0, false}).code() == Errc::invalid_argument);
   CHECK(io::load_bvh("/none/a.bvh").code() == Errc::file_not_found);
   std::mt19937 generator(3);
   int refused = 0;
@@ -149,7 +149,7 @@ TEST_CASE("bvh: what is wrong is named with its line") {
       text[at] = i % 4 == 1 ? "0123456789-.eE {}\n"[generator() % 18] : static_cast<char>(generator());
     }
     reset_largest_allocation();
-    const auto m = load(text);
+    const auto m = load_clip(text);
     REQUIRE(largest_allocation() < 100000);
     REQUIRE((m.ok() || contains(m.status().message(), "some.bvh")));
     refused += m.ok() ? 0 : 1;
@@ -199,7 +199,7 @@ TEST_CASE("bvh: the rest pose of real files is the sum of their offsets") {
 }
 
 TEST_CASE("retarget: to itself, to another size, and from a T pose to an A pose") {
-  const io::LoadedMotion m = load(kArm).value();
+  const io::LoadedMotion m = load_clip(kArm).value();
   RetargetOptions options;
   for (const std::string& name : m.skeleton.names) options.joints.emplace_back(name, name);
   options.root_scale = 1.0;
@@ -242,7 +242,7 @@ TEST_CASE("retarget: to itself, to another size, and from a T pose to an A pose"
 }
 
 TEST_CASE("retarget: further roots of the target go with the first one, with a pair or without") {
-  const io::LoadedMotion m = load(kArm).value();
+  const io::LoadedMotion m = load_clip(kArm).value();
   Skeleton target;
   target.names = {"a", "b", "c", "loose", "paired", "finger"};
   target.parents = {-1, 0, 1, -1, -1, 3};
@@ -284,7 +284,7 @@ TEST_CASE("retarget: further roots of the target go with the first one, with a p
 }
 
 TEST_CASE("retarget: a clip's own time is kept: its rate, its start, and what comes after its end") {
-  const io::LoadedMotion m = load(kArm).value();  // two keys, 0.05 s apart
+  const io::LoadedMotion m = load_clip(kArm).value();  // two keys, 0.05 s apart
   RetargetOptions options;
   for (const std::string& name : m.skeleton.names) options.joints.emplace_back(name, name);
   options.root_scale = 1.0;

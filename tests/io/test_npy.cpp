@@ -22,7 +22,7 @@ std::string npy(const std::string& dictionary, const std::string& values, char v
   return out + dictionary + values;
 }
 
-Result<io::NpyArray> parse(const std::string& text) {
+Result<io::NpyArray> parse_array(const std::string& text) {
   TempFolder folder("npy_parse");
   write_file(folder / "a.npy", text);
   return io::load_npy(folder / "a.npy");
@@ -83,21 +83,21 @@ TEST_CASE("npy: members in any order, quotes of both kinds") {
   for (const char* dictionary :
        {"{'shape':(2,),'descr':'<f8','fortran_order':False}",
         "{\"fortran_order\": False, \"descr\": \"<f8\", \"shape\": (1, 2) }  \n"}) {
-    CHECK(parse(npy(dictionary, data)).value().values == std::vector<double>{2.5, 3.5});
+    CHECK(parse_array(npy(dictionary, data)).value().values == std::vector<double>{2.5, 3.5});
   }
 }
 
 TEST_CASE("npy: anything else is an error") {
   const std::string data(16, '\0');
   const std::string good = "{'descr': '<f8', 'fortran_order': False, 'shape': (2,), }";
-  REQUIRE(parse(npy(good, data)).ok());
-  CHECK(parse(npy(good, data + "x")).code() == Errc::invalid_file);
-  CHECK(parse(npy(good, data.substr(1))).code() == Errc::invalid_file);
-  CHECK(parse(npy(good, data, 4)).code() == Errc::unsupported);
+  REQUIRE(parse_array(npy(good, data)).ok());
+  CHECK(parse_array(npy(good, data + "x")).code() == Errc::invalid_file);
+  CHECK(parse_array(npy(good, data.substr(1))).code() == Errc::invalid_file);
+  CHECK(parse_array(npy(good, data, 4)).code() == Errc::unsupported);
   const auto with = [&](const std::string& from, const std::string& to) {
     std::string out = good;
     out.replace(out.find(from), from.size(), to);
-    return parse(npy(out, data)).code();
+    return parse_array(npy(out, data)).code();
   };
   CHECK(with("<f8", ">f8") == Errc::unsupported);
   CHECK(with("<f8", "<f4") == Errc::invalid_file);
@@ -119,7 +119,7 @@ TEST_CASE("npy: anything else is an error") {
   CHECK(io::load_npy("/none/a.npy").code() == Errc::file_not_found);
   const std::string whole = npy(good, data);
   for (std::size_t n = 0; n < whole.size(); ++n) {
-    REQUIRE(parse(whole.substr(0, n)).code() != Errc::ok);
+    REQUIRE(parse_array(whole.substr(0, n)).code() != Errc::ok);
   }
 }
 

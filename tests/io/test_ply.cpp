@@ -13,10 +13,10 @@ using namespace gsnav_test;
 
 namespace {
 
-LoadedCloud parse(const std::string& text) { return io::parse_ply(bytes_of(text), "test").value(); }
+LoadedCloud parse_rows(const std::string& text) { return io::parse_ply(bytes_of(text), "test").value(); }
 
 void check_all(const PlyFile& file, int rest, int degree) {
-  const LoadedCloud loaded = parse(file.text());
+  const LoadedCloud loaded = parse_rows(file.text());
   check_consistent(loaded);
   CHECK(loaded.report.warnings.empty());
   CHECK(loaded.cloud.sh_degree == degree);
@@ -38,7 +38,7 @@ TEST_CASE("N36_sh_degree_mismatch") {
       check_all(file, counts[degree], degree);
       continue;
     }
-    const LoadedCloud loaded = parse(file.text());
+    const LoadedCloud loaded = parse_rows(file.text());
     CHECK(loaded.cloud.sh_degree == kMaxShDegree);
     for (std::size_t i = 0; i < 600; ++i) check_gaussian(loaded.cloud, i, file.rows[i], 72);
     REQUIRE(loaded.report.warnings.size() == 1);
@@ -107,7 +107,7 @@ TEST_CASE("ply: doubles keep positions far from zero") {
   file.rows = random_rows(2, 0, 4);
   file.rows[0]["x"] = 500000.123456;
   file.rows[1]["x"] = 500000.123556;
-  const LoadedCloud loaded = parse(file.text());
+  const LoadedCloud loaded = parse_rows(file.text());
   CHECK(std::fabs(loaded.cloud.mean(1).x - loaded.cloud.mean(0).x - 1e-4) < 5e-6);
 }
 
@@ -131,7 +131,7 @@ TEST_CASE("ply: CRLF header, comments that name the filter") {
       file.properties = inria_properties(0);
       file.rows = random_rows(3, 0, 2);
       check_all(file, 0, 0);
-      CHECK(parse(file.text()).cloud.filter == filter);
+      CHECK(parse_rows(file.text()).cloud.filter == filter);
     }
   }
 }
@@ -162,7 +162,7 @@ TEST_CASE("ply: other elements before and after") {
   }
   SUBCASE("an element behind is cut off: the Gaussians are whole") {
     file.after_rows.pop_back();
-    const LoadedCloud loaded = parse(file.text());
+    const LoadedCloud loaded = parse_rows(file.text());
     CHECK(loaded.cloud.size() == 5);
     REQUIRE(loaded.report.warnings.size() == 1);
     CHECK(contains(loaded.report.warnings[0], "'edge' promises 2 rows, 1 are there"));
@@ -186,7 +186,7 @@ TEST_CASE("N35_nan_position_row") {
   };
   std::vector<float> without = values;
   without.erase(without.begin() + 17 * kFloats, without.begin() + 18 * kFloats);
-  const LoadedCloud expected = parse(text_of(without));
+  const LoadedCloud expected = parse_rows(text_of(without));
   REQUIRE(expected.cloud.size() == kRows - 1);
   const float nan = std::numeric_limits<float>::quiet_NaN(),
               inf = std::numeric_limits<float>::infinity();
@@ -194,7 +194,7 @@ TEST_CASE("N35_nan_position_row") {
   for (const auto& [column, bad] : {std::pair<std::size_t, float>{0, nan}, {2, inf}, {9 + 4, nan}}) {
     std::vector<float> rows = values;
     rows[17 * kFloats + column] = bad;
-    const LoadedCloud loaded = parse(text_of(rows));
+    const LoadedCloud loaded = parse_rows(text_of(rows));
     CHECK(loaded.report.read == kRows);
     CHECK(loaded.report.kept == kRows - 1);
     CHECK(loaded.report.dropped_non_finite == 1);
@@ -216,7 +216,7 @@ TEST_CASE("N37_truncated_ply_zero_rows") {
   std::string text = file.text();
   const std::size_t stride = (text.size() - file.header().size()) / 1000;
   std::fill(text.begin() + static_cast<std::ptrdiff_t>(file.header().size() + stride), text.end(), '\0');
-  const LoadedCloud loaded = parse(text);
+  const LoadedCloud loaded = parse_rows(text);
   check_consistent(loaded);
   CHECK(loaded.report.read == 1000);
   CHECK(loaded.report.dropped_zero_quat == 999);
@@ -243,7 +243,7 @@ TEST_CASE("ply: bad rows are counted and their neighbours stay whole") {
   file.rows[10]["opacity"] = inf;  // opaque
   for (const char* format : {"binary_little_endian", "ascii"}) {
     file.format = format;
-    const LoadedCloud loaded = parse(file.text());
+    const LoadedCloud loaded = parse_rows(file.text());
     check_consistent(loaded);
     CHECK(loaded.report.read == 12);
     CHECK(loaded.report.dropped_non_finite == 5);
@@ -264,10 +264,10 @@ TEST_CASE("ply: bad rows are counted and their neighbours stay whole") {
 TEST_CASE("ply: no rows, stray bytes") {
   PlyFile file;
   file.properties = inria_properties(0);
-  CHECK(parse(file.text()).cloud.size() == 0);
+  CHECK(parse_rows(file.text()).cloud.size() == 0);
   file.rows = random_rows(3, 0, 1);
   file.after_rows = "12345";
-  const LoadedCloud loaded = parse(file.text());
+  const LoadedCloud loaded = parse_rows(file.text());
   CHECK(loaded.cloud.size() == 3);
   REQUIRE(loaded.report.warnings.size() == 1);
   CHECK(contains(loaded.report.warnings[0], "5 stray bytes follow the 3 rows"));

@@ -20,7 +20,7 @@ PlyFile ply_of(std::size_t n, int rest, unsigned seed) {
   return file;
 }
 
-void check_fails(const std::string& spec, Errc code, const std::string& part) {
+void check_scene_fails(const std::string& spec, Errc code, const std::string& part) {
   const auto result = io::load_scene(spec);
   CAPTURE(spec);
   CAPTURE(result.message());
@@ -140,15 +140,15 @@ TEST_CASE("scene: what cannot be read") {
   std::filesystem::create_directories(folder / "empty");
   std::filesystem::create_directories(folder / "streamed");
   write_file(folder / "streamed/lod-meta.json", "{}");
-  check_fails(at + "a.lcc", Errc::unsupported, "or a folder");
-  check_fails(at + "plain", Errc::unsupported, "a .ply, ");
-  check_fails(at + "none.lcc", Errc::file_not_found, "a .ply, ");
-  check_fails(at + "none.ply", Errc::file_not_found, "none.ply");
-  check_fails(at + "empty", Errc::file_not_found, "no meta.json");
-  check_fails(at + "streamed", Errc::invalid_file, "lodLevels");
-  check_fails(at + "a.ply,b.ply", Errc::file_not_found, "b.ply");
-  check_fails(at + "a.ply,", Errc::invalid_argument, "empty name");
-  check_fails(at + "a.ply,a.ply", Errc::invalid_argument, "twice");
-  check_fails("", Errc::invalid_argument, "empty name");
-  check_fails(at + "a.ply,mip.ply", Errc::invalid_argument, "filters");
+  check_scene_fails(at + "a.lcc", Errc::unsupported, "or a folder");
+  check_scene_fails(at + "plain", Errc::unsupported, "a .ply, ");
+  check_scene_fails(at + "none.lcc", Errc::file_not_found, "a .ply, ");
+  check_scene_fails(at + "none.ply", Errc::file_not_found, "none.ply");
+  check_scene_fails(at + "empty", Errc::file_not_found, "no meta.json");
+  check_scene_fails(at + "streamed", Errc::invalid_file, "lodLevels");
+  check_scene_fails(at + "a.ply,b.ply", Errc::file_not_found, "b.ply");
+  check_scene_fails(at + "a.ply,", Errc::invalid_argument, "empty name");
+  check_scene_fails(at + "a.ply,a.ply", Errc::invalid_argument, "twice");
+  check_scene_fails("", Errc::invalid_argument, "empty name");
+  check_scene_fails(at + "a.ply,mip.ply", Errc::invalid_argument, "filters");
 }

@@ -21,7 +21,7 @@ std::vector<PlyRow> splat_rows(std::size_t n) {
   return rows;
 }
 
-LoadedCloud parse(const std::string& text) {
+LoadedCloud parse_records(const std::string& text) {
   return io::parse_splat(bytes_of(text), "some.splat").value();
 }
 
@@ -34,7 +34,7 @@ std::string with_float(std::string text, std::size_t offset, float value) {
 
 TEST_CASE("splat: every field within half a step of what was packed") {
   const std::vector<PlyRow> rows = splat_rows(200);
-  const LoadedCloud loaded = parse(splat_text(rows));
+  const LoadedCloud loaded = parse_records(splat_text(rows));
   check_consistent(loaded);
   REQUIRE(loaded.cloud.size() == rows.size());
   CHECK(loaded.cloud.sh_degree == 0);
@@ -53,7 +53,7 @@ TEST_CASE("splat: bytes that are known") {
   std::string text;
   for (const float v : {1.5f, -2.25f, 1000.0f, 0.5f, 0.0f, 2.0f}) put(text, v);
   text += std::string("\xff\x00\x80\xff\x80\xc0\x80\x40", 8);
-  const GaussianCloud c = parse(text).cloud;
+  const GaussianCloud c = parse_records(text).cloud;
   REQUIRE(c.size() == 1);
   CHECK(c.mean(0) == Vec3d{1.5, -2.25, 1000.0});
   CHECK(c.scales[0][0] == 0.5f);
@@ -73,20 +73,20 @@ TEST_CASE("splat: what is no drawable Gaussian is counted") {
   const float nan = std::numeric_limits<float>::quiet_NaN(),
               inf = std::numeric_limits<float>::infinity();
   for (const float v : {nan, inf, -inf}) {
-    CHECK(parse(with_float(text, 0, v)).report.dropped_non_finite == 1);
+    CHECK(parse_records(with_float(text, 0, v)).report.dropped_non_finite == 1);
   }
   for (const float v : {nan, -1.0f, -inf}) {
-    CHECK(parse(with_float(text, 32 + 16, v)).report.dropped_non_finite == 1);
+    CHECK(parse_records(with_float(text, 32 + 16, v)).report.dropped_non_finite == 1);
   }
   for (const float v : {inf, 1e30f, 1e-30f}) {
-    CHECK(parse(with_float(text, 32 + 16, v)).report.clamped_scales == 1);
+    CHECK(parse_records(with_float(text, 32 + 16, v)).report.clamped_scales == 1);
   }
   std::string no_quat = text;
   no_quat.replace(64 + 28, 4, "\x80\x80\x80\x80");
-  CHECK(parse(no_quat).report.dropped_zero_quat == 1);
+  CHECK(parse_records(no_quat).report.dropped_zero_quat == 1);
   std::string clear = text;
   clear[96 + 27] = '\0';
-  const LoadedCloud loaded = parse(clear);
+  const LoadedCloud loaded = parse_records(clear);
   CHECK(loaded.report.dropped_transparent == 1);
   check_consistent(loaded);
 }

@@ -12,14 +12,14 @@ using namespace gsnav_test;
 
 namespace {
 
-SpzFile small_file(int degree = 0) {
+SpzFile small_spz(int degree = 0) {
   SpzFile file;
   file.degree = degree;
   file.rows = random_rows(5, file.rest(), 41);
   return file;
 }
 
-void check_fails(const std::string& text, Errc code, const std::string& part) {
+void check_spz_fails(const std::string& text, Errc code, const std::string& part) {
   check_refused(io::parse_spz(bytes_of(text), "some.spz"), code, "some.spz", part);
 }
 
@@ -33,7 +33,7 @@ std::string bytes4(std::uint32_t v) {
 
 TEST_CASE("spz: cut off anywhere, as it is and before it was compressed") {
   for (const std::uint32_t version : {1u, 2u, 3u}) {
-    SpzFile file = small_file(1);
+    SpzFile file = small_spz(1);
     file.version = version;
     const std::string text = file.text(), payload = file.payload();
     for (std::size_t n = 0; n < text.size(); ++n) {
@@ -48,45 +48,46 @@ TEST_CASE("spz: cut off anywhere, as it is and before it was compressed") {
 }
 
 TEST_CASE("spz: a checksum that does not fit") {
-  std::string text = small_file().text();
+  std::string text = small_spz().text();
   text[text.size() - 6] = static_cast<char>(text[text.size() - 6] ^ 1);
-  check_fails(text, Errc::invalid_file, "does not end well");
+  check_spz_fails(text, Errc::invalid_file, "does not end well");
 }
 
 TEST_CASE("spz: headers that make no sense") {
-  check_fails("", Errc::invalid_file, "no gzip stream");
-  check_fails("no gzip at all", Errc::invalid_file, "no gzip stream");
-  check_fails(gzip("short"), Errc::invalid_file, "no gzip stream");
-  std::string payload = small_file().payload();
+  check_spz_fails("", Errc::invalid_file, "no gzip stream");
+  check_spz_fails("no gzip at all", Errc::invalid_file, "no gzip stream");
+  check_spz_fails(gzip("short"), Errc::invalid_file, "no gzip stream");
+  std::string payload = small_spz().payload();
   payload[0] = 'M';
-  check_fails(gzip(payload), Errc::invalid_file, "SPZ's header");
+  check_spz_fails(gzip(payload), Errc::invalid_file, "SPZ's header");
   for (const std::uint32_t version : {0u, 4u, 0xffffffffu}) {
-    SpzFile file = small_file();
+    SpzFile file = small_spz();
     file.version = version;
-    check_fails(gzip(file.payload()), Errc::unsupported,
-                "version " + std::to_string(version) + " in gzip");
+    check_spz_fails(gzip(file.payload()), Errc::unsupported,
+                    "version " + std::to_string(version) + " in gzip");
   }
   for (const std::uint32_t version : {0u, 3u, 5u, 0xffffffffu}) {
-    SpzFile file = small_file();
+    SpzFile file = small_spz();
     file.version = version;
-    check_fails(file.plain(), Errc::unsupported, "version " + std::to_string(version) + " without gzip");
+    check_spz_fails(file.plain(), Errc::unsupported,
+                    "version " + std::to_string(version) + " without gzip");
   }
-  payload = small_file().payload();
+  payload = small_spz().payload();
   payload[12] = 5;
-  check_fails(gzip(payload), Errc::invalid_file, "SH degree 5");
+  check_spz_fails(gzip(payload), Errc::invalid_file, "SH degree 5");
   payload[12] = 0;
   payload[13] = 31;
-  check_fails(gzip(payload), Errc::invalid_file, "31 fractional bits");
+  check_spz_fails(gzip(payload), Errc::invalid_file, "31 fractional bits");
 }
 
 TEST_CASE("spz: a count in the header is not trusted with memory") {
   for (const std::uint32_t count : {6u, 2000u, 100000u, 0x7fffffffu, 0xffffffffu}) {
-    SpzFile file = small_file(3);
+    SpzFile file = small_spz(3);
     file.count = bytes4(count);
     reset_largest_allocation();
     const std::string text = file.text();
     reset_largest_allocation();
-    check_fails(text, Errc::invalid_file, std::to_string(count) + " Gaussians");
+    check_spz_fails(text, Errc::invalid_file, std::to_string(count) + " Gaussians");
     CHECK(largest_allocation() < 300000);
   }
 }
@@ -97,17 +98,17 @@ TEST_CASE("spz: a gzip bomb is not unpacked") {
   payload += std::string(20000000, '\0');
   const std::string text = gzip(payload);
   reset_largest_allocation();
-  check_fails(text, Errc::invalid_file, "implausible");
+  check_spz_fails(text, Errc::invalid_file, "implausible");
   CHECK(largest_allocation() < 300000);
   // The same behind the Gaussians: read as far as 256 KiB.
-  const std::string tail = gzip(small_file().payload() + std::string(20000000, '\0'));
+  const std::string tail = gzip(small_spz().payload() + std::string(20000000, '\0'));
   reset_largest_allocation();
-  check_fails(tail, Errc::invalid_file, "does not end well");
+  check_spz_fails(tail, Errc::invalid_file, "does not end well");
   CHECK(largest_allocation() < 300000);
 }
 
 TEST_CASE("spz: extensions and stray bytes are told") {
-  SpzFile file = small_file();
+  SpzFile file = small_spz();
   const std::string stray = gzip(file.payload() + "stray");
   const LoadedCloud a = io::parse_spz(bytes_of(stray), "a.spz").value();
   CHECK(a.cloud.size() == 5);
@@ -122,7 +123,7 @@ TEST_CASE("spz: extensions and stray bytes are told") {
 }
 
 TEST_CASE("spz: what is no drawable Gaussian is counted") {
-  SpzFile file = small_file();
+  SpzFile file = small_spz();
   file.rows[3]["opacity"] = -9;
   CHECK(io::parse_spz(bytes_of(file.text()), "a.spz").value().report.dropped_transparent == 1);
   file.version = 1;
@@ -138,7 +139,7 @@ TEST_CASE("spz: what is no drawable Gaussian is counted") {
 namespace {
 
 SpzFile small_v4(int degree = 1) {
-  SpzFile file = small_file(degree);
+  SpzFile file = small_spz(degree);
   file.version = 4;
   return file;
 }
@@ -164,19 +165,19 @@ TEST_CASE("spz 4: cut off anywhere") {
 
 TEST_CASE("spz 4: a table that makes no sense") {
   const std::string text = small_v4().text();
-  check_fails(with(text, 15, "\5"), Errc::invalid_file, "5 streams, must be 6 for SH degree 1");
-  check_fails(with(small_v4(0).text(), 15, "\6"), Errc::invalid_file, "6 streams, must be 5");
+  check_spz_fails(with(text, 15, "\5"), Errc::invalid_file, "5 streams, must be 6 for SH degree 1");
+  check_spz_fails(with(small_v4(0).text(), 15, "\6"), Errc::invalid_file, "6 streams, must be 5");
   for (const std::uint32_t toc : {0u, 31u, static_cast<std::uint32_t>(text.size()), 0xffffffffu}) {
-    check_fails(with(text, 16, bytes4(toc)), Errc::invalid_file,
-                "begins at byte " + std::to_string(toc));
+    check_spz_fails(with(text, 16, bytes4(toc)), Errc::invalid_file,
+                    "begins at byte " + std::to_string(toc));
   }
   for (const std::uint64_t size : {std::uint64_t{44}, std::uint64_t{46}, ~std::uint64_t{0}}) {
-    check_fails(small_v4().plain("", {size}), Errc::invalid_file,
-                "positions has " + std::to_string(size) + " bytes unpacked, 5 Gaussians need 45");
+    check_spz_fails(small_v4().plain("", {size}), Errc::invalid_file,
+                    "positions has " + std::to_string(size) + " bytes unpacked, 5 Gaussians need 45");
   }
   for (const std::uint64_t size : {std::uint64_t{text.size()}, ~std::uint64_t{0}}) {
-    check_fails(with(text, 32, bytes8(size)), Errc::invalid_file,
-                "positions has " + std::to_string(size) + " bytes, ");
+    check_spz_fails(with(text, 32, bytes8(size)), Errc::invalid_file,
+                    "positions has " + std::to_string(size) + " bytes, ");
   }
 }
 
@@ -184,7 +185,8 @@ TEST_CASE("spz 4: a stream that holds something else") {
   SpzFile file = small_v4();
   const std::string text = file.text();
   const std::size_t first = 32 + 6 * 16;
-  check_fails(with(text, first, "XXXX"), Errc::invalid_file, "stream of positions cannot be unpacked");
+  check_spz_fails(with(text, first, "XXXX"), Errc::invalid_file,
+                  "stream of positions cannot be unpacked");
   // Streams of fewer and of more bytes than the table says.
   for (const std::size_t rows : {4u, 6u}) {
     SpzFile other = file;
@@ -194,7 +196,7 @@ TEST_CASE("spz 4: a stream that holds something else") {
     std::string mixed = from;
     mixed.replace(8, 4, bytes4(5));
     for (std::size_t k = 0; k < 6; ++k) mixed.replace(32 + 16 * k + 8, 8, bytes8(sizes[k]));
-    check_fails(mixed, Errc::invalid_file, "stream of SH bands");  // the first to be unpacked
+    check_spz_fails(mixed, Errc::invalid_file, "stream of SH bands");  // the first to be unpacked
   }
 }
 
@@ -205,7 +207,7 @@ TEST_CASE("spz 4: neither count nor streams are trusted with memory") {
     const std::uint64_t n = count;
     const std::string text = file.plain("", {9 * n, n, 3 * n, 3 * n, 4 * n, 45 * n});
     reset_largest_allocation();
-    check_fails(text, Errc::invalid_file, "implausible");
+    check_spz_fails(text, Errc::invalid_file, "implausible");
     CHECK(largest_allocation() < 300000);
   }
   // A million Gaussians of zeros, which zstd takes down to some hundred bytes each plane.
@@ -220,7 +222,7 @@ TEST_CASE("spz 4: neither count nor streams are trusted with memory") {
   bomb.count = bytes4(1000000);
   const std::string text = bomb.head(5) + bytes4(32) + std::string(12, '\0') + toc + streams;
   reset_largest_allocation();
-  check_fails(text, Errc::invalid_file, "implausible");
+  check_spz_fails(text, Errc::invalid_file, "implausible");
   CHECK(largest_allocation() < 300000);
 }
 
@@ -239,6 +241,6 @@ TEST_CASE("spz 4: extensions and stray bytes are told") {
   REQUIRE(b.report.warnings.size() == 2);
   CHECK(contains(b.report.warnings[0], "extensions"));
   CHECK(contains(b.report.warnings[1], "other axes"));
-  check_fails(file.plain(bytes4(7) + bytes4(4) + "abc"), Errc::invalid_file,
-              "an extension of 4 bytes, 3");
+  check_spz_fails(file.plain(bytes4(7) + bytes4(4) + "abc"), Errc::invalid_file,
+                  "an extension of 4 bytes, 3");
 }

@@ -20,7 +20,7 @@ Status read_first(const std::string& archive, const std::string& name = "a.txt")
   return zip->read(name).status();
 }
 
-void check_fails(const std::string& archive, Errc code, const std::string& part) {
+void check_archive_fails(const std::string& archive, Errc code, const std::string& part) {
   check_refused(read_first(archive), code, "some.zip", part);
   CHECK(largest_allocation() < 2000000);
 }
@@ -61,11 +61,11 @@ TEST_CASE("zip: stored and deflated entries, comments, streamed writers") {
 TEST_CASE("zip: names that leave the folder") {
   for (const char* name :
        {"../a.txt", "a/../../b", "/etc/passwd", "..", "a\\b", "c:a.txt", "a\nb", ""}) {
-    check_fails(make_zip({{name, "x"}}), Errc::invalid_file, "leaves the archive's folder");
+    check_archive_fails(make_zip({{name, "x"}}), Errc::invalid_file, "leaves the archive's folder");
   }
   CHECK(read_first(make_zip({{"..a.txt", "x"}}), "..a.txt").ok());
   CHECK(read_first(make_zip({{"a../b", "x"}}), "a../b").ok());
-  check_fails(make_zip({{"a.txt", "x"}, {"a.txt", "y"}}), Errc::invalid_file, "comes twice");
+  check_archive_fails(make_zip({{"a.txt", "x"}, {"a.txt", "y"}}), Errc::invalid_file, "comes twice");
 }
 
 TEST_CASE("zip: sizes and offsets that lie") {
@@ -76,27 +76,29 @@ TEST_CASE("zip: sizes and offsets that lie") {
     return make_zip({copy});
   };
   REQUIRE(read_first(make_zip({e})).ok());
-  check_fails(with([](auto& x) { x.size = 999; }), Errc::invalid_file, "size promised");
-  check_fails(with([](auto& x) { x.size = 1100; }), Errc::invalid_file, "size promised");
-  check_fails(with([](auto& x) { x.size = 0xfffffffe; }), Errc::invalid_file, "implausible");
-  check_fails(with([](auto& x) { x.packed = 100; }), Errc::invalid_file, "size promised");
+  check_archive_fails(with([](auto& x) { x.size = 999; }), Errc::invalid_file, "size promised");
+  check_archive_fails(with([](auto& x) { x.size = 1100; }), Errc::invalid_file, "size promised");
+  check_archive_fails(with([](auto& x) { x.size = 0xfffffffe; }), Errc::invalid_file, "implausible");
+  check_archive_fails(with([](auto& x) { x.packed = 100; }), Errc::invalid_file, "size promised");
   const auto longer = static_cast<std::uint32_t>(deflate_raw(e.content).size() + 4);
-  check_fails(with([&](auto& x) { x.packed = longer; }), Errc::invalid_file, "size promised");
-  check_fails(with([](auto& x) { x.packed = 0xfffffffe; }), Errc::invalid_file, "not inside the file");
-  check_fails(with([](auto& x) { x.offset = 7; }), Errc::invalid_file, "no local header");
-  check_fails(with([](auto& x) { x.offset = 0xfffffffe; }), Errc::invalid_file, "no local header");
-  check_fails(with([](auto& x) { x.bad_crc = true; }), Errc::invalid_file, "checksum");
-  check_fails(with([](auto& x) { x.flags = 1; }), Errc::unsupported, "encrypted");
-  check_fails(with([](auto& x) { x.method = 12; }), Errc::unsupported, "method 12");
-  check_fails(with([](auto& x) { x.method = 0; }), Errc::invalid_file, "implausible");
+  check_archive_fails(with([&](auto& x) { x.packed = longer; }), Errc::invalid_file, "size promised");
+  check_archive_fails(with([](auto& x) { x.packed = 0xfffffffe; }), Errc::invalid_file,
+                      "not inside the file");
+  check_archive_fails(with([](auto& x) { x.offset = 7; }), Errc::invalid_file, "no local header");
+  check_archive_fails(with([](auto& x) { x.offset = 0xfffffffe; }), Errc::invalid_file,
+                      "no local header");
+  check_archive_fails(with([](auto& x) { x.bad_crc = true; }), Errc::invalid_file, "checksum");
+  check_archive_fails(with([](auto& x) { x.flags = 1; }), Errc::unsupported, "encrypted");
+  check_archive_fails(with([](auto& x) { x.method = 12; }), Errc::unsupported, "method 12");
+  check_archive_fails(with([](auto& x) { x.method = 0; }), Errc::invalid_file, "implausible");
   e.deflated = false;
-  check_fails(with([](auto& x) { x.size = 5; }), Errc::invalid_file, "implausible");
-  check_fails(with([](auto& x) { x.method = 8; }), Errc::invalid_file, "size promised");
+  check_archive_fails(with([](auto& x) { x.size = 5; }), Errc::invalid_file, "implausible");
+  check_archive_fails(with([](auto& x) { x.method = 8; }), Errc::invalid_file, "size promised");
 }
 
 TEST_CASE("zip: a bomb is refused before memory is asked for") {
-  check_fails(make_zip({{"a.txt", std::string(50000000, 'x'), true}}), Errc::invalid_file,
-              "implausible");
+  check_archive_fails(make_zip({{"a.txt", std::string(50000000, 'x'), true}}), Errc::invalid_file,
+                      "implausible");
 }
 
 TEST_CASE("zip: cut off anywhere") {
@@ -130,16 +132,16 @@ TEST_CASE("zip: directories that lie") {
       std::string out = archive;
       const auto value = static_cast<std::uint16_t>(length);
       std::memcpy(out.data() + record + field, &value, sizeof value);
-      check_fails(out, Errc::invalid_file, "entry 0 is cut off");
+      check_archive_fails(out, Errc::invalid_file, "entry 0 is cut off");
     }
   }
-  check_fails(both(2), Errc::invalid_file, "entry 1 of 2");
-  check_fails(both(65535), Errc::invalid_file, "zip64");
-  check_fails(with(8, std::uint16_t{7}), Errc::unsupported, "volumes");
-  check_fails(with(4, std::uint16_t{1}), Errc::unsupported, "volumes");
-  check_fails(with(12, std::uint32_t{3}), Errc::invalid_file, "entry 0");
-  check_fails(with(12, std::uint32_t{0x7fffffff}), Errc::invalid_file, "not inside the file");
-  check_fails(with(16, std::uint32_t{0x7fffffff}), Errc::invalid_file, "not inside the file");
-  check_fails(with(16, std::uint32_t{0}), Errc::invalid_file, "entry 0");
-  check_fails(with(20, std::uint16_t{5}), Errc::invalid_file, "no zip archive");
+  check_archive_fails(both(2), Errc::invalid_file, "entry 1 of 2");
+  check_archive_fails(both(65535), Errc::invalid_file, "zip64");
+  check_archive_fails(with(8, std::uint16_t{7}), Errc::unsupported, "volumes");
+  check_archive_fails(with(4, std::uint16_t{1}), Errc::unsupported, "volumes");
+  check_archive_fails(with(12, std::uint32_t{3}), Errc::invalid_file, "entry 0");
+  check_archive_fails(with(12, std::uint32_t{0x7fffffff}), Errc::invalid_file, "not inside the file");
+  check_archive_fails(with(16, std::uint32_t{0x7fffffff}), Errc::invalid_file, "not inside the file");
+  check_archive_fails(with(16, std::uint32_t{0}), Errc::invalid_file, "entry 0");
+  check_archive_fails(with(20, std::uint16_t{5}), Errc::invalid_file, "no zip archive");
 }

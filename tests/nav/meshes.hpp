@@ -38,6 +38,19 @@ struct Soup {
   }
 };
 
+/// The NavMesh of a soup.
+inline gsnav::NavMesh build(const Soup& soup, const gsnav::NavMeshSettings& settings = {},
+                            int threads = 2) {
+  return gsnav::NavMesh::build(settings, soup.vertices, soup.triangles, threads).value();
+}
+/// The same by cells of another size.
+inline gsnav::NavMesh build_cells(const Soup& soup, double cell = 0.1, int tile_size = 0) {
+  gsnav::NavMeshSettings s;
+  s.cell_size = cell;
+  s.tile_size = tile_size;
+  return build(soup, s);
+}
+
 /// A square floor from the origin with boxes of random place and size on it.
 inline Soup random_boxes(std::uint64_t seed, int count, double side) {
   Soup soup;

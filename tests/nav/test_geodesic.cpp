@@ -30,12 +30,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kStep = 0.02;          // metres
 constexpr double kFloatCorners = 1e-5;  // metres: Detour's path has its corners in float
 
-NavMesh build(const Soup& soup, double cell = 0.1) {
-  NavMeshSettings s;
-  s.cell_size = cell;
-  return NavMesh::build(s, soup.vertices, soup.triangles).value();
-}
-
 /// Detour's path, each leg laid on the surface in steps so short that no bump is cut; infinity where a
 /// leg does not stay on it.
 double detour_length(const NavMesh& mesh, const dtNavMeshQuery* query, const NavPoint& a,
@@ -112,7 +106,7 @@ TEST_CASE("geodesic: equals brute force on the visibility graph of random floors
   std::size_t corners = 0, touched = 0, floors = 0;
   for (const std::uint64_t seed :
        {1u, 2u, 3u, 4u, 5u, 6u, 12u, 19u, 20u, 22u}) {  // parts of the last touch in corners
-    const NavMesh mesh = build(random_boxes(seed, 6 + 2 * static_cast<int>(seed), 12));
+    const NavMesh mesh = build_cells(random_boxes(seed, 6 + 2 * static_cast<int>(seed), 12));
     const gsnav_test::VisibilityGraph graph(mesh);
     corners += graph.corner_count();
     touched += graph.touched_count();
@@ -128,7 +122,7 @@ TEST_CASE("geodesic: closed forms") {
   Soup soup;
   soup.floor(0, 0, 10, 10);
   soup.box(3, 3, 7, 7, 0, 2);
-  const NavMesh mesh = build(soup, 0.05);
+  const NavMesh mesh = build_cells(soup, 0.05);
   // The box grown by the agent's radius: two ways around are equally long, each over one corner.
   const auto path = mesh.find_path({2, 0, 2}, {8, 0, 8});
   REQUIRE(path.ok());
@@ -163,7 +157,7 @@ TEST_CASE("geodesic: one floor above another is a floor of its own") {
   soup.floor(0, 0, 16, 8);
   soup.floor(0, 0, 8, 4, 3);  // above
   soup.quad({8, 3, 0}, {8, 3, 4}, {12, 0, 4}, {12, 0, 0});
-  const NavMesh mesh = build(soup);
+  const NavMesh mesh = build_cells(soup);
   // Beside the ramp to its foot, and up.
   const double over = mesh.geodesic_distance({1, 0, 2}, {1, 3, 2});
   CHECK(over > 23);
@@ -173,8 +167,8 @@ TEST_CASE("geodesic: one floor above another is a floor of its own") {
 }
 
 TEST_CASE("geodesic: symmetric, and no detour is shorter") {
-  check_metric(build(random_boxes(3, 30, 20)), cases(100000));
-  check_against_detour(build(random_boxes(3, 30, 20)), 1000, 1e-6);
+  check_metric(build_cells(random_boxes(3, 30, 20)), cases(100000));
+  check_against_detour(build_cells(random_boxes(3, 30, 20)), 1000, 1e-6);
   for (const char* file : {"nav/recast/nav_test.obj", "nav/recast/dungeon.obj"}) {
     if (gsnav_test::data_file(file).empty()) continue;
     const NavMesh mesh = demo(file);
@@ -238,7 +232,7 @@ TEST_CASE("geodesic: thousands of polygons are no limit") {
     const double x = 1 + i % 34, z = 1 + i / 34 + 0.25 * (i % 3);
     soup.box(x, z, x + 0.3, z + 0.3, 0, 2);
   }
-  const NavMesh mesh = build(soup);
+  const NavMesh mesh = build_cells(soup);
   CHECK(mesh.polygon_count() > 2048);
   Rng rng(3);
   for (int i = 0; i < 200; ++i) {
@@ -250,7 +244,7 @@ TEST_CASE("geodesic: thousands of polygons are no limit") {
 }
 
 TEST_CASE("geodesic: many goals, and fields of distance") {
-  const NavMesh mesh = build(random_boxes(9, 30, 16));
+  const NavMesh mesh = build_cells(random_boxes(9, 30, 16));
   Rng rng(1);
   for (int round = 0; round < 5; ++round) {
     std::vector<Vec3d> goals;
@@ -310,7 +304,7 @@ TEST_CASE(
     }
   }
   std::vector<NavMesh> meshes;
-  meshes.push_back(build(waves));
+  meshes.push_back(build_cells(waves));
   for (const char* file : {"nav/recast/nav_test.obj", "nav/recast/undulating.obj"}) {
     if (!gsnav_test::data_file(file).empty()) meshes.push_back(demo(file));
   }
@@ -437,7 +431,8 @@ TEST_CASE(
 
 TEST_CASE("geodesic: a field has the same bits for any number of threads and any order of questions") {
   const std::string file = gsnav_test::data_file("nav/recast/undulating.obj");
-  const NavMesh mesh = file.empty() ? build(random_boxes(5, 20, 14)) : demo("nav/recast/undulating.obj");
+  const NavMesh mesh =
+      file.empty() ? build_cells(random_boxes(5, 20, 14)) : demo("nav/recast/undulating.obj");
   Rng rng(43);
   const Vec3d goal = mesh.random_point(rng, 0).position;
   std::vector<NavPoint> points;

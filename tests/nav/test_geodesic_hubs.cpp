@@ -15,13 +15,6 @@ using namespace gsnav_test;
 
 namespace {
 
-NavMesh build(const Soup& soup, double cell, int tile_size = 0) {
-  NavMeshSettings s;
-  s.cell_size = cell;
-  s.tile_size = tile_size;
-  return NavMesh::build(s, soup.vertices, soup.triangles).value();
-}
-
 /// Distances by corners and hubs against the search over windows, and paths that are as long as they
 /// say.
 void check(const NavMesh& mesh, int pairs, double tolerance) {
@@ -56,29 +49,29 @@ void check(const NavMesh& mesh, int pairs, double tolerance) {
 
 TEST_CASE("geodesic: by hubs the distances of the search") {
   for (const std::uint64_t seed : {3u, 4u})
-    check(build(random_boxes(seed, 30, 20), 0.1), cases(50000), 0.02);
+    check(build_cells(random_boxes(seed, 30, 20), 0.1), cases(50000), 0.02);
   for (const char* file : {"nav/recast/nav_test.obj", "nav/recast/dungeon.obj"}) {
     const std::string path = data_file(file);
     if (path.empty()) continue;
     const Soup soup = read_obj(path);
-    check(build(soup, 0.3), cases(5000), 0.3);
+    check(build_cells(soup, 0.3), cases(5000), 0.3);
   }
 }
 
 TEST_CASE("geodesic: by hubs the distances of the search where edges of many tiles lie in line") {
   for (const std::uint64_t seed : {5u, 6u})
-    check(build(random_boxes(seed, 12, 12), 0.1, 16), cases(20000), 0.02);
+    check(build_cells(random_boxes(seed, 12, 12), 0.1, 16), cases(20000), 0.02);
   Soup slopes = random_boxes(7, 8, 10);
   slopes.quad({10, 0, 2}, {10, 0, 6}, {14, 1.5, 6}, {14, 1.5, 2});
   slopes.quad({14, 1.5, 2}, {14, 1.5, 6}, {18, 0.5, 7}, {18, 0.5, 1});
   slopes.box(14.5, 3.5, 15, 4.5, 0, 4);
-  check(build(slopes, 0.1, 24), cases(20000), 0.02);
+  check(build_cells(slopes, 0.1, 24), cases(20000), 0.02);
 }
 
 TEST_CASE(
     "geodesic: by hubs the distances of the search where corners are too many for a table of all "
     "pairs") {
-  const NavMesh mesh = build(random_boxes(8, 300, 45), 0.1);
+  const NavMesh mesh = build_cells(random_boxes(8, 300, 45), 0.1);
   REQUIRE(mesh.impl().hubs().corners() > detail::CornerHubs::kMostTable);
   check(mesh, cases(5000), 0.02);
 }
@@ -87,7 +80,7 @@ TEST_CASE("geodesic: an open floor in tiles is seen from end to end") {
   // Lines may touch corners where four tiles meet; those that turned around one were followed for ever.
   Soup soup;
   soup.floor(0, 0, 6, 6);
-  const NavMesh mesh = build(soup, 0.1, 16);
+  const NavMesh mesh = build_cells(soup, 0.1, 16);
   REQUIRE(mesh.impl().hubs().corners() == 0);
   const detail::UnfoldedMesh& faces = mesh.impl().unfolded();
   for (std::uint32_t e = 0; e < faces.edges.size(); ++e) {
@@ -139,7 +132,7 @@ TEST_CASE("geodesic: a mesh of too many sights keeps the search") {
     const double x = 1 + i % 34, z = 1 + i / 34 + 0.25 * (i % 3);
     soup.box(x, z, x + 0.3, z + 0.3, 0, 2);
   }
-  const NavMesh mesh = build(soup, 0.1);
+  const NavMesh mesh = build_cells(soup, 0.1);
   REQUIRE(mesh.impl().hubs().empty());
   Rng rng(33);
   for (int i = 0; i < cases(100); ++i) {
@@ -161,7 +154,7 @@ TEST_CASE(
     const double z = 2.0 * i - 0.1;
     soup.box(i % 2 == 0 ? 0 : 1, z, i % 2 == 0 ? 19 : 20, z + 0.2, 0, 2);
   }
-  const NavMesh mesh = build(soup, 0.1);
+  const NavMesh mesh = build_cells(soup, 0.1);
   CHECK(mesh.polygon_count() > 256);
   Rng rng(32);
   const int n = cases(100000);

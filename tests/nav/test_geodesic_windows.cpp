@@ -27,7 +27,7 @@ using detail::UnfoldedMesh;
 
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnreached = std::numeric_limits<double>::infinity();
 using Triangle = std::array<std::uint32_t, 3>;
 
 struct Surface {
@@ -114,7 +114,7 @@ class PathsOverEdges {
 
   /// From a point of a triangle to all points of the graph.
   std::vector<double> from(std::size_t triangle, const Vec3d& p) const {
-    std::vector<double> d(points_.size(), kInfinity);
+    std::vector<double> d(points_.size(), kUnreached);
     std::priority_queue<std::pair<double, std::size_t>, std::vector<std::pair<double, std::size_t>>,
                         std::greater<>>
         heap;
@@ -136,7 +136,7 @@ class PathsOverEdges {
   }
   /// To a point of another triangle.
   double to(const std::vector<double>& d, std::size_t triangle, const Vec3d& p) const {
-    double best = kInfinity;
+    double best = kUnreached;
     for (const std::size_t i : of_triangle_[triangle])
       best = std::min(best, d[i] + norm(points_[i] - p));
     return best;
@@ -183,7 +183,7 @@ TEST_CASE(
     const PathsOverEdges paths(c.surface, kParts);
     GeodesicSearch search;
     Rng rng(5);
-    double longer = -kInfinity, shorter = 0, turned = 0;
+    double longer = -kUnreached, shorter = 0, turned = 0;
     const auto any_face = [&] {
       return min(static_cast<std::uint32_t>(rng.uniform(0, 1) * static_cast<double>(mesh.faces.size())),
                  static_cast<std::uint32_t>(mesh.faces.size() - 1));
@@ -234,7 +234,8 @@ TEST_CASE("landmarks: bounds are none too high, searches by them exact, or withi
     REQUIRE(marks.size() == 24);
     GeodesicSearch search;
     Rng rng(9);
-    double high = -kInfinity, low = 0, exact = 0, above = 0, beyond = -kInfinity, short_of = -kInfinity;
+    double high = -kUnreached, low = 0, exact = 0, above = 0, beyond = -kUnreached,
+           short_of = -kUnreached;
     int found = 0, at_once = 0, all = 0;
     const auto any = [&] {
       const auto n = static_cast<std::uint32_t>(mesh.faces.size());
@@ -249,14 +250,14 @@ TEST_CASE("landmarks: bounds are none too high, searches by them exact, or withi
       const Site start = any(), goal = any();
       if (start.face == goal.face) continue;
       const double truth = search.run(mesh, start, goal);
-      REQUIRE(truth < kInfinity);
+      REQUIRE(truth < kUnreached);
       ++all;
       const detail::LandmarkLead lead(marks, mesh, start, goal);
       high = max(high, lead.least() - truth);
       low += lead.least() / truth;
       // Of each edge of the start's face, too: no way from there is shorter than what leads through it.
       const UnfoldedMesh::Face& face = mesh.faces[start.face];
-      double through = kInfinity;
+      double through = kUnreached;
       for (std::uint32_t e = face.first; e < face.first + face.count; ++e) {
         if (mesh.edges[e].twin == UnfoldedMesh::kNone) continue;
         const detail::Flat a = mesh.edges[e].at, side = mesh.edges[mesh.next(e)].at - a;
@@ -267,7 +268,7 @@ TEST_CASE("landmarks: bounds are none too high, searches by them exact, or withi
       high = max(high, through - truth);
       exact = max(exact, std::abs(search.run_led(mesh, start, goal, lead) - truth));
       const double way = detail::corridor_length(mesh, lead, start, goal);
-      found += way < kInfinity ? 1 : 0;
+      found += way < kUnreached ? 1 : 0;
       short_of = max(short_of, truth - way);
       for (const double slack : {2e-4, 2e-3, 0.2}) {
         const double most = search.run_led(mesh, start, goal, lead, way, slack);

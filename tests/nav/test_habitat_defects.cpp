@@ -23,12 +23,6 @@ using gsnav_test::Soup;
 
 namespace {
 
-NavMesh build(const Soup& soup, double cell = 0.1) {
-  NavMeshSettings s;
-  s.cell_size = cell;
-  return NavMesh::build(s, soup.vertices, soup.triangles).value();
-}
-
 /// How far Habitat's step without sliding gets, as a share of the step: of the solid edges of all
 /// polygons that a sliding walk visits it takes the crossing nearest to the END; without any it keeps
 /// the slid end.
@@ -78,7 +72,7 @@ Soup serpentine(int rows) {
 }  // namespace
 
 TEST_CASE("defect 1: without sliding a step stops at the first wall, which is where a ray meets it") {
-  const NavMesh mesh = build(random_boxes(4, 60, 20), 0.05);
+  const NavMesh mesh = build_cells(random_boxes(4, 60, 20), 0.05);
   const DetourQuery query = detour_query(mesh);
   Rng rng(1);
   int stopped = 0, habitat_beyond = 0;
@@ -111,7 +105,7 @@ TEST_CASE("defect 1: without sliding a step stops at the first wall, which is wh
 }
 
 TEST_CASE("defect 2: paths of more than 256 polygons are found") {
-  const NavMesh mesh = build(serpentine(150));
+  const NavMesh mesh = build_cells(serpentine(150));
   const NavPoint a = *mesh.snap_point({1, 0, 1}), b = *mesh.snap_point({1, 0, 299});
   const auto path = mesh.path_between(a, b);
   REQUIRE(path.ok());
@@ -128,7 +122,7 @@ TEST_CASE("defect 2: paths of more than 256 polygons are found") {
 }
 
 TEST_CASE("defect 3: distances are symmetric") {
-  const NavMesh mesh = build(random_boxes(3, 30, 20));
+  const NavMesh mesh = build_cells(random_boxes(3, 30, 20));
   const DetourQuery query = detour_query(mesh, 2048);
   const auto detour = [&](const NavPoint& a, const NavPoint& b) {
     const auto from = detour_position(mesh, a.position), to = detour_position(mesh, b.position);
@@ -190,7 +184,7 @@ TEST_CASE("defect 4: no silent snapping, paths lie on the surface, long steps go
 }
 
 TEST_CASE("defect 5: random points are the caller's generator's own") {
-  const NavMesh mesh = build(random_boxes(5, 10, 10));
+  const NavMesh mesh = build_cells(random_boxes(5, 10, 10));
   Rng a(9), b(9);
   for (int i = 0; i < 100; ++i) {
     std::srand(static_cast<unsigned>(i));  // NOLINT: what others do with the global generator
@@ -204,7 +198,7 @@ TEST_CASE("defect 6: a disc within one polygon, or across polygons of many corne
   Soup soup;
   soup.floor(0, 0, 20, 20);
   soup.box(9, 9, 11, 11, 0, 1.4);
-  const NavMesh mesh = build(soup);
+  const NavMesh mesh = build_cells(soup);
   Rng rng(3);
   for (int i = 0; i < 2000; ++i) {
     const NavPoint centre = mesh.random_point(rng);
@@ -216,7 +210,7 @@ TEST_CASE("defect 6: a disc within one polygon, or across polygons of many corne
 }
 
 TEST_CASE("defect 7: goals asked for before leave nothing behind") {
-  const NavMesh mesh = build(random_boxes(6, 20, 16));
+  const NavMesh mesh = build_cells(random_boxes(6, 20, 16));
   const Vec3d bad{std::numeric_limits<double>::quiet_NaN(), 0, 0}, far{900, 0, 0};
   Rng rng(4);
   for (int i = 0; i < 300; ++i) {
@@ -258,7 +252,7 @@ TEST_CASE("defect 8: settings that differ in any field differ") {
 TEST_CASE("defect 9: a map's last row and column are there, and its far cells where they should be") {
   Soup soup;
   soup.floor(0, 0, 200, 3);
-  const NavMesh mesh = build(soup);
+  const NavMesh mesh = build_cells(soup);
   const double cell = 0.0137;
   const TopDownMap map = mesh.top_down_map(0, cell).value();
   const Aabb<double> box = mesh.bounds();
@@ -273,7 +267,7 @@ TEST_CASE("defect 9: a map's last row and column are there, and its far cells wh
 TEST_CASE("defect 10: queries that restrict to islands run beside all others") {
   Soup soup = random_boxes(7, 20, 14);
   soup.floor(30, 0, 36, 6);
-  const NavMesh mesh = build(soup);
+  const NavMesh mesh = build_cells(soup);
   REQUIRE(mesh.island_count() >= 2);
   const auto run = [&](std::size_t island) {
     Rng rng(6);

@@ -15,14 +15,6 @@ using namespace gsnav;
 using gsnav_test::check_walks;
 using gsnav_test::Soup;
 
-namespace {
-
-NavMesh build(const Soup& soup, NavMeshSettings s = {}) {
-  return NavMesh::build(s, soup.vertices, soup.triangles).value();
-}
-
-}  // namespace
-
 TEST_CASE("navmesh: a square floor has the area left by the agent's radius") {
   Soup soup;
   soup.floor(0, 0, 10, 6);

@@ -30,7 +30,7 @@ namespace {
   return true;
 }();
 
-std::vector<std::byte> bytes_of(const std::string& path) {
+std::vector<std::byte> content_of(const std::string& path) {
   const std::string text = gsnav_test::read_file(path);
   const auto bytes = gsnav_test::bytes_of(text);
   return {bytes.begin(), bytes.end()};
@@ -52,7 +52,7 @@ NavMesh boxes(const Vec3d& at = {}) {
 std::vector<std::byte> saved(const NavMesh& mesh, int version = 2) {
   const gsnav_test::TempFolder folder("navmesh_file");
   save_navmesh(mesh, (folder / "a.navmesh").string(), version).throw_if_error();
-  return bytes_of((folder / "a.navmesh").string());
+  return content_of((folder / "a.navmesh").string());
 }
 
 /// Boxes on a floor with a ramp, in tiles of 16 cells.
@@ -560,7 +560,7 @@ TEST_CASE("navmesh file: polygons that lie on one another have paths, each edge 
 TEST_CASE("navmesh file: mutated and truncated files do no harm") {
   std::vector<std::vector<std::byte>> seeds{saved(boxes()), tiled()};
   const std::string tiles = gsnav_test::data_file("nav/dotrecast/all_tiles_navmesh.bin");
-  if (!tiles.empty()) seeds.push_back(bytes_of(tiles));
+  if (!tiles.empty()) seeds.push_back(content_of(tiles));
   Rng rng(11);
   int read = 0, refused = 0;
   double most = 0;

@@ -18,10 +18,6 @@ using gsnav_test::Soup;
 
 namespace {
 
-NavMesh build(const Soup& soup, NavMeshSettings s = {}) {
-  return NavMesh::build(s, soup.vertices, soup.triangles).value();
-}
-
 /// Three storeys, the lower two joined by a ramp, and a dais in the lowest.
 Soup tower() {
   Soup soup;

@@ -40,10 +40,6 @@ NavMeshSettings settings_of(int tile_size, double cell = 0.1) {
   return s;
 }
 
-NavMesh build(const Soup& soup, const NavMeshSettings& s, int threads = 2) {
-  return NavMesh::build(s, soup.vertices, soup.triangles, threads).value();
-}
-
 /// RecastDemo's settings; no triangles where the data is not there.
 NavMeshSettings demo(int tile_size) {
   NavMeshSettings s = settings_of(tile_size, 0.3);
@@ -57,7 +53,7 @@ Soup scene(const char* name) {
   return file.empty() ? Soup{} : gsnav_test::read_obj(file);
 }
 
-std::string saved(const NavMesh& mesh) {
+std::string file_of(const NavMesh& mesh) {
   const gsnav_test::TempFolder folder("navmesh_tiles");
   save_navmesh(mesh, (folder / "a.navmesh").string()).throw_if_error();
   return gsnav_test::read_file((folder / "a.navmesh").string());
@@ -155,12 +151,12 @@ Borders check_same_floor(const NavMesh& one, const NavMesh& tiled, double area, 
 TEST_CASE("tiles: the same bits for any number of threads") {
   const Soup boxes = random_boxes(3, 30, 20), hills = scene("nav_test.obj");
   for (const int size : {16, 50, 128}) {
-    const std::string expected = saved(build(boxes, settings_of(size), 1));
+    const std::string expected = file_of(build(boxes, settings_of(size), 1));
     for (const int threads : {0, 2, 3, 7})
-      CHECK(saved(build(boxes, settings_of(size), threads)) == expected);
+      CHECK(file_of(build(boxes, settings_of(size), threads)) == expected);
   }
   if (hills.triangles.empty()) return;
-  CHECK(saved(build(hills, demo(32), 1)) == saved(build(hills, demo(32), 4)));
+  CHECK(file_of(build(hills, demo(32), 1)) == file_of(build(hills, demo(32), 4)));
 }
 
 TEST_CASE("tiles: the surface and the islands of one tile, without a gap or step at the borders") {
@@ -252,7 +248,7 @@ TEST_CASE("tiles: a file keeps them, and what is asked of them") {
   if (const Soup hills = scene("nav_test.obj"); !hills.triangles.empty())
     meshes.push_back(build(hills, demo(32)));
   for (const NavMesh& mesh : meshes) {
-    const std::string text = saved(mesh);
+    const std::string text = file_of(mesh);
     const NavMesh back = parse_navmesh(gsnav_test::bytes_of(text), "tiles").value();
     CHECK(back.settings().tile_size == mesh.settings().tile_size);
     CHECK(back.polygon_count() == mesh.polygon_count());
@@ -260,7 +256,7 @@ TEST_CASE("tiles: a file keeps them, and what is asked of them") {
     CHECK(back.navigable_area() == doctest::Approx(mesh.navigable_area()).epsilon(1e-5));
     CHECK(borders_of(back).edges == borders_of(mesh).edges);
     CHECK(borders_of(back).step < kPlanar);
-    CHECK(saved(back) == text);
+    CHECK(file_of(back) == text);
     Rng rng(3);
     double worst = 0;
     for (int i = 0; i < 2000; ++i) {

@@ -18,7 +18,7 @@ using namespace gsnav_test;
 
 namespace {
 
-NavMesh build(const Soup& soup, double radius = 0.25) {
+NavMesh build_for(const Soup& soup, double radius = 0.25) {
   NavMeshSettings settings;
   settings.agent_radius = radius;
   settings.edge_max_error = 0.5;
@@ -78,7 +78,7 @@ double least_clearance(const NavMesh& mesh, const NavPath& path, double ends) {
 TEST_CASE("a path through a door goes through its middle, or as far from its posts as wanted") {
   for (const double width : {0.8, 1.0, 1.6, 2.4}) {
     CAPTURE(width);
-    const NavMesh mesh = build(two_rooms(width));
+    const NavMesh mesh = build_for(two_rooms(width));
     // The shortest path touches a post of the door.
     const NavPath shortest = mesh.find_path({1, 0, 0.6}, {7, 0, 0.6}).value();
     CHECK(least_clearance(mesh, shortest, 0.5) < 1e-6);
@@ -102,7 +102,7 @@ TEST_CASE("a path through a door goes through its middle, or as far from its pos
 TEST_CASE("a path that has room stays as it is") {
   Soup soup;
   soup.floor(0, 0, 8, 8);
-  const NavMesh mesh = build(soup);
+  const NavMesh mesh = build_for(soup);
   const NavPath shortest = mesh.find_path({1, 0, 1}, {7, 0, 6}).value();
   const ClearPath clear = keep_clear(mesh, shortest.points).value();
   CHECK(clear.path.length == doctest::Approx(shortest.length).epsilon(1e-9));
@@ -114,7 +114,7 @@ TEST_CASE("round boxes, paths stay on the surface, gain room and are little long
   std::size_t paths = 0;
   double before = 0, after = 0;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    const NavMesh mesh = build(random_boxes(seed, 25, 14));
+    const NavMesh mesh = build_for(random_boxes(seed, 25, 14));
     for (int k = 0; k < 12; ++k) {
       const NavPoint a = mesh.random_point(rng, 0), b = mesh.random_point(rng, 0);
       const auto shortest = mesh.path_between(a, b);
@@ -163,7 +163,7 @@ TEST_CASE("bad input is refused by name") {
   Soup soup;
   soup.floor(0, 0, 4, 4);
   soup.floor(10, 0, 14, 4);
-  const NavMesh mesh = build(soup);
+  const NavMesh mesh = build_for(soup);
   const std::vector<Vec3d> good{{1, 0, 1}, {3, 0, 3}};
   ClearanceOptions options;
   options.clearance = -1;

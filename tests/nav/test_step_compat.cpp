@@ -13,7 +13,7 @@ namespace {
 
 const StepOptions kCompat{.slide = true, .compat = StepCompat::habitat_gs};
 
-CapsuleSet post(double x, double z, double radius, const Vec3d& moved = {}) {
+CapsuleSet moved_post(double x, double z, double radius, const Vec3d& moved = {}) {
   const Capsule<double> c{{x, 0.2, z}, {x, 1.6, z}, radius};
   return CapsuleSet::create({{{c, {c.p0 + moved, c.p1 + moved, radius}}, 7, 3}}).value();
 }
@@ -49,7 +49,7 @@ TEST_CASE("step as habitat_gs: stops before a standing body, by at most what six
     // Straight ahead, met within the step.
     const double gap = rng.uniform(0.001, 0.9) * length;
     const Vec3d at = agent.position + ahead * (gap + reach);
-    const StepResult r = step(mesh, agent, d, post(at.x, at.z, radius), kCompat);
+    const StepResult r = step(mesh, agent, d, moved_post(at.x, at.z, radius), kCompat);
     REQUIRE(r.blocked_by == BlockedBy::capsule);
     REQUIRE(r.avatar == 7);
     REQUIRE(r.bone == 3);
@@ -57,7 +57,7 @@ TEST_CASE("step as habitat_gs: stops before a standing body, by at most what six
     const double walked = norm(r.position - agent.position), kept = gap - walked;
     REQUIRE(kept >= 0);
     REQUIRE(kept <= length / samples / 64 + 1e-4 * length + 1e-9);
-    REQUIRE(is_step_blocked(mesh, agent, d, post(at.x, at.z, radius), kCompat));
+    REQUIRE(is_step_blocked(mesh, agent, d, moved_post(at.x, at.z, radius), kCompat));
   }
 }
 
@@ -68,23 +68,23 @@ TEST_CASE("step as habitat_gs: it misses what Habitat-GS misses and step() does 
     return std::pair{step(mesh, a, d, set, kCompat), step(mesh, a, d, set, {.slide = false})};
   };
   // A body that walks into the way during the tick: it is frozen beside it.
-  const auto [frozen, met] = both({1, 0, 0}, post(0.5, 0.6, 0.2, {0, 0, -1}), agent);
+  const auto [frozen, met] = both({1, 0, 0}, moved_post(0.5, 0.6, 0.2, {0, 0, -1}), agent);
   CHECK_FALSE(frozen.blocked());
   CHECK(met.blocked_by == BlockedBy::capsule);
   // Ten samples of 8 m: a thin body stands between two of them.
-  const auto [through, stopped] = both({8, 0, 0}, post(0.4, 0, 0.1), agent);
+  const auto [through, stopped] = both({8, 0, 0}, moved_post(0.4, 0, 0.1), agent);
   CHECK_FALSE(through.blocked());
   CHECK(through.position.x == doctest::Approx(8));
   CHECK(stopped.position.x < 0.21);
   // Deep in a body, even straight out: the first sample is in it too.
   AgentState inside = agent_at(0.1, 0);
-  const auto [stuck, out] = both({0.25, 0, 0}, post(0, 0, 0.3), inside);
+  const auto [stuck, out] = both({0.25, 0, 0}, moved_post(0, 0, 0.3), inside);
   CHECK(norm(stuck.position - inside.position) < 1e-3);
   CHECK(out.position.x > 0.3);
   // An agent without a radius meets nobody.
   AgentState point = agent;
   point.radius = 0;
-  const auto [ghost, solid] = both({1, 0, 0}, post(0.5, 0, 0.2), point);
+  const auto [ghost, solid] = both({1, 0, 0}, moved_post(0.5, 0, 0.2), point);
   CHECK_FALSE(ghost.blocked());
   CHECK(solid.blocked_by == BlockedBy::capsule);
 }

@@ -12,7 +12,7 @@ using gsnav_test::Soup;
 
 namespace {
 
-NavMesh room() {
+NavMesh plain_room() {
   Soup soup;
   soup.floor(0, 0, 10, 6);
   return NavMesh::build({}, soup.vertices, soup.triangles).value();
@@ -23,7 +23,7 @@ bool near(const Vec3d& a, const Vec3d& b, double tolerance) { return norm(a - b)
 }  // namespace
 
 TEST_CASE("try_step: inside a rectangle the ground position is that of the end, from any height") {
-  const NavMesh mesh = room();
+  const NavMesh mesh = plain_room();
   const double y = mesh.bounds().low.y;
   Rng rng(3);
   for (int i = 0; i < 200; ++i) {
@@ -39,7 +39,7 @@ TEST_CASE("try_step: inside a rectangle the ground position is that of the end, 
 }
 
 TEST_CASE("try_step: a wall clamps a sliding step and cuts one that does not slide") {
-  const NavMesh mesh = room();
+  const NavMesh mesh = plain_room();
   const Aabb<double> box = mesh.bounds();
   Rng rng(4);
   for (int i = 0; i < 200; ++i) {
@@ -56,7 +56,7 @@ TEST_CASE("try_step: a wall clamps a sliding step and cuts one that does not sli
 }
 
 TEST_CASE("try_step: a start beside the surface is snapped, and then walks straight to the end") {
-  const NavMesh mesh = room();
+  const NavMesh mesh = plain_room();
   const Aabb<double> box = mesh.bounds();
   const auto end = try_step(mesh, {box.low.x - 1.5, 0, 3}, {5, 0, 4}, true);
   REQUIRE(end);
@@ -64,7 +64,7 @@ TEST_CASE("try_step: a start beside the surface is snapped, and then walks strai
 }
 
 TEST_CASE("try_step: nothing where the start is out of reach or a coordinate is not finite") {
-  const NavMesh mesh = room();
+  const NavMesh mesh = plain_room();
   const double nan = std::numeric_limits<double>::quiet_NaN();
   CHECK_FALSE(try_step(mesh, {-3, 0, 3}, {1, 0, 3}, true));
   CHECK_FALSE(try_step(mesh, {5, 5, 3}, {5, 0, 4}, true));
