@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // gsnav-eval: plays episodes with a policy, records each in a journal, and makes a page of the results.
+#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
 #include <exception>

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
 
 #include "../common/scene_options.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace gsnav_eval {
 

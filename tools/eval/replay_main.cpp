@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // gsnav-replay: shows an episode of an evaluation again, from any camera.
+#include <CLI/CLI.hpp>
 #include <array>
 #include <cmath>
 #include <cstdio>

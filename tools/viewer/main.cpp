@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // gsnav-viewer: shows a scene in the browser and lets the user walk through it.
+#include <CLI/CLI.hpp>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
