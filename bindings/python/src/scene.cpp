@@ -82,6 +82,32 @@ OpenedScene open(nb::handle named, OpenOptions options, const nb::object& progre
 nb::object itself(nb::handle self) { return nb::borrow(self); }
 nb::object itself_with_memo(nb::handle self, nb::handle) { return nb::borrow(self); }
 
+void bind_opened_scene(nb::module_& m) {
+  nb::class_<OpenedScene>(
+      m, "OpenedScene",
+      "A scene with everything that was found or asked for. World frame: metres, Y up.")
+      .def("__copy__", itself, nb::sig("def __copy__(self) -> OpenedScene"), "Returns this object.")
+      .def("__deepcopy__", itself_with_memo, nb::arg("memo"),
+           nb::sig("def __deepcopy__(self, memo: dict[int, object]) -> OpenedScene"),
+           "Returns this object.")
+      .def_ro("name", &OpenedScene::name, "The name that was opened.")
+      .def_ro("scene", &OpenedScene::scene, "The scene, for renderers and simulators.")
+      .def_prop_ro(
+          "gaussian_count", [](const OpenedScene& s) { return s.report.kept; },
+          "Number of Gaussians that were read.")
+      .def_prop_ro(
+          "bounds", [](const OpenedScene& s) { return s.report.bounds; },
+          "Box of the Gaussians' means in the frame of the file, metres.")
+      .def_ro("up", &OpenedScene::up, "The file's up axis.")
+      .def_ro("up_guessed", &OpenedScene::up_guessed, "Whether `up` was guessed from the ground.")
+      .def_ro("navmesh_source", &OpenedScene::navmesh_source,
+              "Origin of the NavMesh; empty without one.")
+      .def_ro("notes", &OpenedScene::notes, "A line for each thing that was found or built.")
+      .def_ro("warnings", &OpenedScene::warnings, "A line for each thing that was left out.")
+      .def_ro("load_seconds", &OpenedScene::load_seconds, "Seconds that reading took.")
+      .def_ro("navmesh_seconds", &OpenedScene::navmesh_seconds, "Seconds that the NavMesh took.");
+}
+
 }  // namespace
 
 void bind_scene(nb::module_& m) {
@@ -115,30 +141,7 @@ void bind_scene(nb::module_& m) {
           "Number of sets of static Gaussians.");
   bind_options(m);
 
-  nb::class_<OpenedScene>(
-      m, "OpenedScene",
-      "A scene with everything that was found or asked for. World frame: metres, Y up.")
-      .def("__copy__", itself, nb::sig("def __copy__(self) -> OpenedScene"), "Returns this object.")
-      .def("__deepcopy__", itself_with_memo, nb::arg("memo"),
-           nb::sig("def __deepcopy__(self, memo: dict[int, object]) -> OpenedScene"),
-           "Returns this object.")
-      .def_ro("name", &OpenedScene::name, "The name that was opened.")
-      .def_ro("scene", &OpenedScene::scene, "The scene, for renderers and simulators.")
-      .def_prop_ro(
-          "gaussian_count", [](const OpenedScene& s) { return s.report.kept; },
-          "Number of Gaussians that were read.")
-      .def_prop_ro(
-          "bounds", [](const OpenedScene& s) { return s.report.bounds; },
-          "Box of the Gaussians' means in the frame of the file, metres.")
-      .def_ro("up", &OpenedScene::up, "The file's up axis.")
-      .def_ro("up_guessed", &OpenedScene::up_guessed, "Whether `up` was guessed from the ground.")
-      .def_ro("navmesh_source", &OpenedScene::navmesh_source,
-              "Origin of the NavMesh; empty without one.")
-      .def_ro("notes", &OpenedScene::notes, "A line for each thing that was found or built.")
-      .def_ro("warnings", &OpenedScene::warnings, "A line for each thing that was left out.")
-      .def_ro("load_seconds", &OpenedScene::load_seconds, "Seconds that reading took.")
-      .def_ro("navmesh_seconds", &OpenedScene::navmesh_seconds, "Seconds that the NavMesh took.");
-
+  bind_opened_scene(m);
   m.def(
       "open_scene", open, nb::arg("name").none(), nb::arg("options") = OpenOptions{},
       nb::arg("progress") = nb::none(),
