@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <exception>
 #include <thread>
 #include <vector>
 
@@ -22,12 +21,11 @@ struct MyBackend {
   void deallocate(void* p, std::size_t) noexcept { std::free(p); }
   void copy(void* to, const void* from, std::size_t n, gsnav::CopyKind) { std::memcpy(to, from, n); }
   void fill(void* p, unsigned char byte, std::size_t bytes) { std::memset(p, byte, bytes); }
-  template <class F>
-  void parallel_for(std::size_t n, const F& f) {
-    std::vector<std::jthread> threads;
+  void parallel_for(std::size_t n, const auto& f) {
     const auto share = [&f, n](std::size_t t) {
       for (std::size_t i = t; i < n; i += 4) f(i);
     };
+    std::vector<std::jthread> threads;
     for (std::size_t t = 0; t < 4; ++t) threads.emplace_back(share, t);
   }
   gsnav::Status synchronize() { return {}; }
@@ -47,8 +45,7 @@ int main() try {
   const bool same = renderer.render(scene.cloud.set(), camera).value().rgb ==
                     reference.render(scene.cloud.set(), camera).value().rgb;
   // [/snippet]
-  std::puts(same ? "the same bits" : "other bits");
-  return same ? 0 : 1;
+  return std::puts(same ? "the same bits" : "other bits"), same ? 0 : 1;
 } catch (const std::exception& e) {
   return std::fprintf(stderr, "%s\n", e.what()), 1;
 }

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Checks sizes of sources: at most 350 lines per file and 80 per function or macro. In tests/ a file has
-at most 650 lines and a TEST_CASE at most 120.
+at most 650 lines and a TEST_CASE at most 120. A program examples/*.cpp has at most 40 lines of code.
 
 usage: check_sizes.py              check this source tree
        check_sizes.py --self-test  check that long functions are found
@@ -14,6 +14,7 @@ import tempfile
 ROOT = pathlib.Path(__file__).parents[1]
 MOST_LINES, MOST_OF_FUNCTION = 350, 80
 MOST_LINES_OF_TESTS, MOST_OF_TEST_CASE = 650, 120
+MOST_OF_EXAMPLE = 40
 FOLDERS = ("include", "src", "backends", "bindings", "tools", "bench", "examples", "tests")
 SOURCES = {".hpp", ".cpp", ".cu", ".cuh", ".h", ".inl"}
 NO_CODE = re.compile(r'//[^\n]*|/\*.*?\*/|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])+\'', re.DOTALL)
@@ -109,6 +110,9 @@ def too_long(name, text):
     of_tests = name.startswith("tests/")
     most, lines = MOST_LINES_OF_TESTS if of_tests else MOST_LINES, text.count("\n")
     wrong = [f"{name}: {lines} lines, more than {most}"] if lines > most else []
+    code = sum(1 for line in text.split("\n") if line.strip() and not line.strip().startswith("//"))
+    if re.fullmatch(r"examples/[^/]+\.cpp", name) and code > MOST_OF_EXAMPLE:
+        wrong.append(f"{name}: {code} lines of code, more than {MOST_OF_EXAMPLE}")
     for first, n, head in functions(text):
         most = MOST_OF_TEST_CASE if of_tests and re.match(r"(?:TEST|SCENARIO)_?\w*\(", head) else MOST_OF_FUNCTION
         if n > most:
@@ -157,7 +161,9 @@ def self_test():
     lines, helper = "int a;\n" * 400, "int f() {\n" + body + "}\n"
     case = "TEST_CASE(\"a\") {\n" + "  f();\n" * 100 + "}\n"
     for name, text, expected in (("src/a.cpp", lines, 1), ("tests/a.cpp", lines, 0), ("tests/a.cpp", 2 * lines, 1),
-                                 ("src/a.cpp", case, 1), ("tests/a.cpp", case, 0), ("tests/a.cpp", helper, 1)):
+                                 ("src/a.cpp", case, 1), ("tests/a.cpp", case, 0), ("tests/a.cpp", helper, 1),
+                                 ("examples/a.cpp", "int a;  //\n" * 41, 1),
+                                 ("examples/a.cpp", "int a;\n\n// a\n" * 40, 0)):
         if len(too_long(name, text)) != expected:
             sys.exit(f"{name}: not {expected} places")
     with tempfile.TemporaryDirectory() as folder:

@@ -32,7 +32,7 @@ bool is_there(const std::filesystem::path& p) {
 Result<std::vector<ViewPoint>> orbit(const OpenedScene& scene, const GaussianCloud& cloud,
                                      const std::string& up) {
   Vec3d axis = scene.report.up;
-  if (up != "auto") {
+  if (up != "auto" && up != "keep") {
     const auto turned = upright(up);
     if (!turned) return Status(turned.code(), "--up: " + turned.message());
     axis = inverse(*turned) * Vec3d{0, 1, 0};

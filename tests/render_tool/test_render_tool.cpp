@@ -158,10 +158,13 @@ TEST_CASE("render tool: a folder that cannot be is said before the scene is read
   CHECK_FALSE(cameras.says("absent.ply"));
 }
 
-TEST_CASE("render tool: a scene without anything in it and an eye that is no point are said") {
+TEST_CASE("render tool: cameras that cannot be made are said, and --orbit holds for every scene") {
   const TempFolder folder("render_nothing");
   write_file(folder / "empty.obj", "");
   CHECK(run(folder, "--scene empty.obj --out o").says("nothing to look at"));
+  const Outcome one =
+      run(folder, "default --density 0.05 --orbit 1 --width 32 --height 32 --png --out one");
+  CHECK(one.says("1/1 views"));
   CHECK(run(folder, "--eye nan 0 0 --target 1 0 0 --out o").says("--eye: must be finite"));
   CHECK(run(folder, "--eye 0 0 0 --target 1 0 inf --out o").says("--target: must be finite"));
 }

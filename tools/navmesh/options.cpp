@@ -57,7 +57,6 @@ struct Given {
 
 void add_input(CLI::App& app, Options& o, Given& given) {
   gsnav_tools::add_scene_file_options(app, o);
-  app.get_option("--scene")->required();
   app.add_option(
          "--navmesh", o.navmesh,
          "what to build from: gaussians, with the triangles of --mesh; mesh, the triangles of the "

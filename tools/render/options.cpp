@@ -48,9 +48,11 @@ void add_cameras(CLI::App& app, Options& o) {
       ->check(CLI::Range(1.0, 170.0))
       ->capture_default_str()
       ->group(group);
-  app.add_option("--orbit", o.orbit, "number of views around the scene, without --cameras and --eye")
+  app.add_option(
+         "--orbit", o.orbit,
+         "number of views around the scene, without --cameras and --eye; default: 4, and views of "
+         "the rooms for the embedded flat")
       ->check(CLI::Range(1, 1000))
-      ->capture_default_str()
       ->group(group);
   app.add_option("--width", o.width,
                  "image width, pixels; default: that of the cameras, else 640; with --height it scales "

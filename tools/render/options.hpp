@@ -22,7 +22,7 @@ struct Options : gsnav_tools::SceneOptions {
   std::vector<double> eye, target;  ///< Positions x y z.
   bool float64 = false;             ///< Use the float64 reference, on any device.
   DepthChoice depth_choice;
-  int width = 0, height = 0, orbit = 4;
+  int width = 0, height = 0, orbit = 0;
   double hfov = 60, near_plane = 0.2, max_alpha = 0.99, depth_near = 0, depth_far = 0;
   bool npy = false, png = false, ledger = false;
 };

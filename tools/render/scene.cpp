@@ -20,15 +20,15 @@ Camera in_world(Camera camera, const Similarity& world_from_file) {
   return camera;
 }
 
-/// Views around a scene, or into the rooms of the default flat.
+/// Views around a scene, or views of the rooms if it is the embedded flat and --orbit is not given.
 Result<std::vector<Camera>> views_of(const Options& o, const OpenedScene& scene, int width, int height) {
   std::vector<Camera> out;
-  if (o.scene == "default") {
+  if (o.scene == "default" && o.orbit == 0) {
     for (const DefaultView& v : default_scene_views())
       out.push_back(Camera::look_at(v.eye, v.target, {0, 1, 0}, width, height, o.hfov));
     return out;
   }
-  return views_around(scene, o.orbit, width, height, o.hfov);
+  return views_around(scene, o.orbit > 0 ? o.orbit : 4, width, height, o.hfov);
 }
 
 /// Cameras of the file, in the axes of the scene file. Empty if none is named.
