@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 #if defined(__SSE2__)
-#include <immintrin.h>
+#include <xmmintrin.h>
 #endif
 
 #include "ops/backends.hpp"

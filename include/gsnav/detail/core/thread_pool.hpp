@@ -15,9 +15,6 @@
 #if __has_include(<unistd.h>)
 #include <unistd.h>
 #endif
-#if defined(__x86_64__) || defined(__i386__)
-#include <immintrin.h>
-#endif
 
 namespace gsnav {
 
@@ -82,7 +79,7 @@ class ThreadPool {
 
   static void pause() noexcept {
 #if defined(__x86_64__) || defined(__i386__)
-    _mm_pause();
+    __builtin_ia32_pause();  // as _mm_pause, whose header is two megabytes for every file
 #elif defined(__aarch64__)
     asm volatile("yield");
 #endif

@@ -7,7 +7,7 @@
 
 #include <cstdint>
 
-#if defined(__SSE2__)
+#if defined(__AVX512F__)
 #include <immintrin.h>
 #endif
 
