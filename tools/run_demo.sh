@@ -15,7 +15,23 @@ preset=${GSNAV_PRESET:-demo}
 build=$root/build/$preset
 help=$root/examples/nav_loop/help.txt  # what nav_loop --help prints; a test compares them
 
-# Answer --help and unknown options before anything is built.
+usage_error() {
+  echo "run_demo.sh: $1; tools/run_demo.sh --help lists the options" >&2
+  exit 2
+}
+
+# Refuses a value that is not of the kind that the help text names for the option.
+check_value() {
+  local option=$1 value=$2 pattern=
+  case $(sed -nE "s/^  $option ([A-Z]+).*/\1/p" "$help") in
+    INT | UINT) pattern='^[+-]?[0-9]+$' ;;
+    FLOAT) pattern='^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?$' ;;
+  esac
+  [[ $option == --device ]] && pattern='^(best|cpu|cuda|serial(64)?)(:[0-9]+)?$'
+  [[ $value =~ $pattern ]] || usage_error "$option $value: nav_loop does not take this value"
+}
+
+# Answer --help, --version and what nav_loop does not know before anything is built.
 device=
 previous=
 for argument in "$@"; do
@@ -24,14 +40,20 @@ for argument in "$@"; do
       cat "$help"
       exit 0
       ;;
-    --device=*) device=${argument#*=} ;;
+    --version)
+      sed -nE 's/.*GSNAV_VERSION_(MAJOR|MINOR|PATCH) ([0-9]+).*/\2/p' "$root/include/gsnav/version.hpp" |
+        paste -sd. | sed 's/^/nav_loop /'
+      exit 0
+      ;;
     --*)
       option=${argument%%=*}
-      if ! grep -Eq -- "(^| |,)$option( |,|\$)" "$help"; then
-        echo "run_demo.sh: nav_loop has no option $option; tools/run_demo.sh --help lists them" >&2
-        exit 2
+      grep -Eq -- "(^| |,)$option( |,|\$)" "$help" || usage_error "nav_loop has no option $option"
+      if [[ $argument == *=* ]]; then
+        check_value "$option" "${argument#*=}"
+        [[ $option == --device ]] && device=${argument#*=}
       fi
       ;;
+    *) [[ $previous == --* && $previous != *=* ]] && check_value "$previous" "$argument" ;;
   esac
   [[ $previous == --device ]] && device=$argument
   previous=$argument

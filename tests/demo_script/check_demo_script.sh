@@ -37,6 +37,13 @@ for help in --help -h "--episodes 3 --help"; do
 done
 demo --episode 3
 [[ $status -eq 2 ]] && grep -q -- "no option --episode;" "$work/err.txt" || fail "run_demo.sh --episode: status $status"
+for value in "--episodes abc" --episodes=1.5 "--hfov 1e2x" --device=bogus "--device cpu:x"; do
+  # shellcheck disable=SC2086
+  demo $value
+  [[ $status -eq 2 ]] && grep -q "does not take this value" "$work/err.txt" || fail "run_demo.sh $value: status $status"
+done
+demo --version
+[[ $status -eq 0 && $(cat "$work/out.txt") == $(exec -a nav_loop "$program" --version) ]] || fail "run_demo.sh --version"
 demo --out=folder --device=cuda:1
 [[ $status -eq 2 ]] && grep -q "no GPU" "$work/err.txt" || fail "run_demo.sh --device=cuda:1: status $status"
 demo --device cuda
