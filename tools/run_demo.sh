@@ -31,7 +31,7 @@ check_value() {
   [[ $value =~ $pattern ]] || usage_error "$option $value: nav_loop does not take this value"
 }
 
-# Answer --help, --version and what nav_loop does not know before anything is built.
+# Nothing is built for --help, for --version, and for options and values that nav_loop does not take.
 device=
 previous=
 for argument in "$@"; do
