@@ -40,7 +40,7 @@ demo --episode 3
 for value in "--episodes abc" --episodes=1.5 "--hfov 1e2x" --device=bogus "--device cpu:x"; do
   # shellcheck disable=SC2086
   demo $value
-  [[ $status -eq 2 ]] && grep -q "does not take this" "$work/err.txt" || fail "run_demo.sh $value: status $status"
+  [[ $status -eq 2 ]] && grep -q "does not take this" "$work/err.txt" || fail "run_demo.sh $value: $status"
 done
 demo --version
 [[ $status -eq 0 && $(cat "$work/out.txt") == $(exec -a nav_loop "$program" --version) ]] || fail "run_demo.sh --version"
