@@ -13,11 +13,10 @@
 # GSNAV_JOBS=N        compile N files and run N tests at a time (default: see tools/build_jobs.sh)
 # GSNAV_WERROR=ON     treat warnings as errors (default: as in the preset)
 # GSNAV_DATA_DIR=DIR  folder of real scenes; tests that need them are skipped without it
-# GSNAV_FLAT_GENERATOR=FILE  source of the generator that test_flat draws; it is skipped without it
 set -euo pipefail
 
 if [[ ${1:-} == --help || ${1:-} == -h ]]; then
-  sed -n '4,16s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
+  sed -n '4,15s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
   exit 0
 fi
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -32,7 +31,6 @@ jobs=${GSNAV_JOBS:-$("$root/tools/build_jobs.sh")}
 options=()
 [[ -n ${GSNAV_WERROR:-} ]] && options+=("-DGSNAV_WERROR=$GSNAV_WERROR")
 [[ -n ${GSNAV_DATA_DIR:-} ]] && options+=("-DGSNAV_DATA_DIR=$GSNAV_DATA_DIR")
-[[ -n ${GSNAV_FLAT_GENERATOR:-} ]] && options+=("-DGSNAV_FLAT_GENERATOR=$GSNAV_FLAT_GENERATOR")
 if [[ $preset != asan-ubsan && $preset != cuda ]]; then
   cuda=${GSNAV_CUDA:-}
   if [[ ${1:-} == --cuda ]]; then

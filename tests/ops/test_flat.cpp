@@ -2,14 +2,12 @@
 // The benchmark flat: 300,000 Gaussians, four poses at 256x256, float32 against float64.
 #include <doctest/doctest.h>
 
-#include <cstdio>
-#include <cstdlib>
-#include <string>
+#include <algorithm>
+#include <cmath>
+#include <vector>
 
-#include "gsnav/detail/io/cameras_file.hpp"
-#include "gsnav/detail/io/ply.hpp"
+#include "gsnav/demo.hpp"
 #include "ops/backends.hpp"
-#include "support/files.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;
@@ -18,7 +16,7 @@ using namespace gsnav_test;
 namespace {
 
 /// Error in metres below which 99 % of the pixels with alpha over 0.9 lie.
-[[maybe_unused]] double depth_error_p99(const Frames<float>& f, const Frames<double>& reference) {
+double depth_error_p99(const Frames<float>& f, const Frames<double>& reference) {
   std::vector<double> errors;
   for (std::size_t p = 0; p < f.alpha.size(); ++p) {
     if (reference.alpha[p] > 0.9) {
@@ -33,20 +31,17 @@ namespace {
 }  // namespace
 
 TEST_CASE("the benchmark flat at 300K") {
-#if !defined(GSNAV_BENCH_SCENE_GENERATOR)
-  std::printf("SKIP: the generator of the benchmark flat is not there (GSNAV_FLAT_GENERATOR)\n");
-#else
-  const TempFolder dir("test_flat");
-  const std::string ply = (dir / "flat.ply").string(), cameras_path = (dir / "cameras.json").string();
-  const std::string generator = GSNAV_BENCH_SCENE_GENERATOR;
-  REQUIRE(std::system(("\"" + generator + "\" ply 300000 \"" + ply + "\" 2> /dev/null").c_str()) == 0);
-  REQUIRE(std::system(("\"" + generator + "\" cameras 64 256 256 \"" + cameras_path + "\"").c_str()) ==
-          0);
-  const LoadedCloud loaded = io::load_ply(ply).value();
-  const std::vector<Camera> cameras = io::load_cameras(cameras_path).value();
-  CHECK(loaded.report.read == 300000);
+  SceneSampling sampling;
+  sampling.gaussians = 300000;
+  sampling.sh_degree = 3;
+  const DefaultScene flat = make_default_scene(sampling).value();
+  IndoorViewOptions views;
+  views.count = 64;
+  views.width = views.height = 256;
+  const std::vector<Camera> cameras = indoor_views(flat, views).value();
+  CHECK(flat.cloud.size() == 300000);
   REQUIRE(cameras.size() == 64);
-  const std::vector<GaussianSet> sets{loaded.cloud.set()};
+  const std::vector<GaussianSet> sets{flat.cloud.set()};
 
   SerialBackend serial;
   for (const std::size_t c : {std::size_t{0}, std::size_t{16}, std::size_t{32}, std::size_t{48}}) {
@@ -81,5 +76,4 @@ TEST_CASE("the benchmark flat at 300K") {
     CHECK(e.max <= 6.0 / 255);
 #endif
   }
-#endif
 }
