@@ -9,6 +9,7 @@
 // Without the variables, the scene is the embedded flat from its four viewpoints. A batch larger than
 // the number of views repeats the views from slightly different places. Times are measured on the
 // device, between events on the stream. `host us` is the duration of the call that enqueues the work.
+// Errors are of judged_views(), taken together; `least` is the PSNR of the worst view.
 //
 // --balls N: N meshes of 4000 triangles stand in front of the first cameras, and all cameras see them.
 // --rgb: colours alone, without depth (its error is nan) and alpha, as most renderers measure.
@@ -40,10 +41,9 @@ using namespace gsnav;
 namespace {
 
 constexpr int kRepeats = 9;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 int g_width = 256, g_height = 256;
-bool g_rgb = true, g_depth = true;  ///< images that are drawn: both with alpha
-/// Number of views that are compared with float64.
-std::size_t reference_views() { return g_width * g_height <= 128 * 128 ? 16 : 4; }
+bool g_rgb = true, g_depth = true;   ///< images that are drawn: both with alpha
 std::vector<MeshInstance> g_meshes;  ///< on the device
 VisibleSets g_visible;               ///< empty: every camera draws the whole scene
 
@@ -82,6 +82,16 @@ std::vector<BatchCamera> cameras_of(std::size_t first, std::size_t count) {
   return batch;
 }
 
+/// The cameras of the judged views.
+std::vector<BatchCamera> judged_cameras() {
+  std::vector<BatchCamera> cameras;
+  for (const Camera& view : gsnav_bench::judged_views(gsnav_bench::sized(g_width, g_height))) {
+    cameras.push_back({view, {}});
+    cameras.back().meshes.instances = g_meshes;
+  }
+  return cameras;
+}
+
 /// Visible sets of the cameras' cells, on the device.
 struct Seen {
   explicit Seen(CudaBackend& cuda) : bits(cuda) {
@@ -111,6 +121,52 @@ struct DeviceImages {
   Buffer<float, CudaBackend> memory;
   BatchImages images;
 };
+
+/// Errors of the images of the judged views; NaN for images that are not drawn.
+struct Judged {
+  gsnav_bench::Error rgb{kNan, kNan, kNan, kNan};  ///< of all views together
+  double least = kNan;                             ///< PSNR of the worst view, dB
+  double depth_p99 = kNan;                         ///< metres, where alpha exceeds 0.9
+};
+
+/// Draws the judged views in calls of at most `count` cameras and compares them with `truth`.
+Judged judge(CudaBackend& cuda, CudaBatchRenderer& renderer, const std::vector<GaussianSet>& sets,
+             const Frames<double>& truth, std::size_t count, Seen& seen, const BatchImages& images) {
+  const std::vector<BatchCamera> cameras = judged_cameras();
+  const std::size_t pixels = static_cast<std::size_t>(g_width) * static_cast<std::size_t>(g_height);
+  std::vector<float> rgb(3 * cameras.size() * pixels), depth(cameras.size() * pixels), depth_seen;
+  for (std::size_t first = 0; first < cameras.size(); first += count) {
+    const std::size_t n = std::min(count, cameras.size() - first);
+    std::vector<BatchCamera> part(&cameras[first], &cameras[first] + n);
+    seen.choose(part);
+    renderer.render(sets, part, images).throw_if_error();
+    renderer.finish().throw_if_error();
+    const std::size_t at = first * pixels, bytes = n * pixels * sizeof(float);
+    constexpr CopyKind kDown = CopyKind::device_to_host;
+    if (g_rgb) cuda.copy(rgb.data() + 3 * at, images.floats.rgb, 3 * bytes, kDown);
+    if (g_depth) cuda.copy(depth.data() + at, images.floats.median_depth, bytes, kDown);
+    cuda.synchronize().throw_if_error();
+  }
+  std::vector<double> depth_truth;
+  Judged judged;
+  if (g_rgb) {
+    judged.rgb = gsnav_bench::error_of(rgb, truth.rgb);
+    for (std::size_t v = 0; v < cameras.size(); ++v) {
+      const auto part = [&](const auto& image) {
+        const auto from = image.begin() + static_cast<std::ptrdiff_t>(3 * v * pixels);
+        return std::vector(from, from + static_cast<std::ptrdiff_t>(3 * pixels));
+      };
+      judged.least = std::fmin(judged.least, gsnav_bench::error_of(part(rgb), part(truth.rgb)).psnr);
+    }
+  }
+  for (std::size_t i = 0; i < depth.size(); ++i) {
+    if (!g_depth || truth.alpha[i] <= 0.9) continue;
+    depth_seen.push_back(depth[i]);
+    depth_truth.push_back(truth.median_depth[i]);
+  }
+  if (g_depth) judged.depth_p99 = gsnav_bench::error_of(depth_seen, depth_truth).p99;
+  return judged;
+}
 
 void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Frames<double>& truth,
          std::size_t count, Quality quality) {
@@ -147,43 +203,11 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
       pairs += static_cast<double>(renderer.stats().tile_intersections);
     }
   }
-  const std::size_t compared = std::min(count, truth.cameras);
-  std::vector<BatchCamera> first = cameras_of(0, compared);
-  seen.choose(first);
-  renderer.render(sets, first, out.images).throw_if_error();
-  renderer.finish().throw_if_error();
-  std::vector<float> rgb(3 * compared * pixels), depth(compared * pixels), depth_seen;
-  std::vector<double> depth_truth;
-  if (g_rgb)
-    cuda.copy(rgb.data(), out.images.floats.rgb, rgb.size() * sizeof(float), CopyKind::device_to_host);
-  if (g_depth)
-    cuda.copy(depth.data(), out.images.floats.median_depth, depth.size() * sizeof(float),
-              CopyKind::device_to_host);
-  cuda.synchronize().throw_if_error();
-  for (std::size_t i = 0; i < depth.size(); ++i) {
-    if (!g_depth || truth.alpha[i] <= 0.9) continue;
-    depth_seen.push_back(depth[i]);
-    depth_truth.push_back(truth.median_depth[i]);
-  }
-  const std::vector<double> rgb_truth(truth.rgb.begin(),
-                                      truth.rgb.begin() + static_cast<std::ptrdiff_t>(rgb.size()));
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  gsnav_bench::Error e{kNan, kNan, kNan, kNan};
-  double least = kNan;  // PSNR of the worst view.
-  if (g_rgb) {
-    e = gsnav_bench::error_of(rgb, rgb_truth);
-    for (std::size_t v = 0; v < compared; ++v) {
-      const auto part = [&](const auto& image) {
-        const auto from = image.begin() + static_cast<std::ptrdiff_t>(3 * v * pixels);
-        return std::vector(from, from + static_cast<std::ptrdiff_t>(3 * pixels));
-      };
-      least = std::fmin(least, gsnav_bench::error_of(part(rgb), part(rgb_truth)).psnr);
-    }
-  }
+  const Judged judged = judge(cuda, renderer, sets, truth, count, seen, out.images);
   std::printf("%-6s %5zu  %9.4f %9.4f %9.0f   %.1e  %.1e  %6.1f %6.1f  %.1e  %9.0f  %8.1f  %7.1f\n",
               quality == Quality::fast() ? "fast" : "exact", count, gsnav_bench::median(ms),
-              gsnav_bench::quantile(ms, 0.9), 1000.0 / gsnav_bench::median(ms), e.max, e.p999, e.psnr,
-              least, g_depth ? gsnav_bench::error_of(depth_seen, depth_truth).p99 : kNan,
+              gsnav_bench::quantile(ms, 0.9), 1000.0 / gsnav_bench::median(ms), judged.rgb.max,
+              judged.rgb.p999, judged.rgb.psnr, judged.least, judged.depth_p99,
               pairs / static_cast<double>(ms.size() * count),
               static_cast<double>(renderer.stats().scratch_bytes) / 1e6, gsnav_bench::median(host_us));
   std::fflush(stdout);
@@ -296,8 +320,7 @@ int main(int argc, char** argv) {
   if (visible) g_visible = gsnav_bench::workload_visible_sets(sets_of);
   OpenMPBackend cpu;
   BasicRenderer<double, OpenMPBackend> reference(cpu);
-  std::vector<Camera> cameras;
-  for (const BatchCamera& c : cameras_of(0, reference_views())) cameras.push_back(c.camera);
+  const auto cameras = gsnav_bench::judged_views(gsnav_bench::sized(g_width, g_height));
   const std::vector<GaussianSet> sets{gsnav_bench::workload().cloud.set()};
   MeshScene scene;
   scene.add(ball()).value();

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "reference.hpp"
 
-#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <map>
@@ -15,13 +14,6 @@
 using namespace gsnav;
 
 namespace gsnav_bench {
-
-std::vector<Camera> judged_views(const std::vector<Camera>& cameras) {
-  const std::size_t n = std::min(kJudgedViews, cameras.size());
-  std::vector<Camera> out;
-  for (std::size_t i = 0; i < n; ++i) out.push_back(cameras[i * cameras.size() / n]);
-  return out;
-}
 
 const std::vector<gsnav_report::Reference>& references(const GaussianCloud& cloud,
                                                        const std::vector<Camera>& cameras) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "workload.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "gsnav/detail/demo/default_scene.hpp"
@@ -53,6 +54,13 @@ std::vector<Camera> sized(int width, int height) {
     c.cy = 0.5 * height;
   }
   return cameras;
+}
+
+std::vector<Camera> judged_views(const std::vector<Camera>& cameras) {
+  const std::size_t n = std::min(kJudgedViews, cameras.size());
+  std::vector<Camera> out;
+  for (std::size_t i = 0; i < n; ++i) out.push_back(cameras[i * cameras.size() / n]);
+  return out;
 }
 
 }  // namespace gsnav_bench

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "gsnav/image/camera.hpp"
@@ -22,5 +23,12 @@ const gsnav::GaussianCloud& base_color_cloud();
 
 /// The cameras at another size, centred, with the same horizontal field of view.
 std::vector<gsnav::Camera> sized(int width, int height);
+
+/// Most views of a workload whose images are compared with float64.
+inline constexpr std::size_t kJudgedViews = 4;
+
+/// The views of `cameras` that every program compares with float64, evenly spread: 0, 16, 32 and 48
+/// of 64.
+std::vector<gsnav::Camera> judged_views(const std::vector<gsnav::Camera>& cameras);
 
 }  // namespace gsnav_bench

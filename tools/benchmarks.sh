@@ -78,11 +78,11 @@ done
 "$root/tools/cpu_table.py" --build "$build" --sizes "$sizes" --rounds "$rounds" --cache "$out/cpu" \
   --out "$out/cpu.md" "${scenes[@]}"
 
-# A row of bench_batch: profile batch ms p90 frames/s rgb_max p99.9 psnr depth_p99 pairs scratch host_us
+# A row of bench_batch: profile batch ms p90 frames/s rgb_max p99.9 psnr least depth_p99 pairs scratch host_us
 rows_of_gpu() {
   awk -v scene="$1" -v size="$2" '
     $1 == "fast" || $1 == "exact" {
-      printf "| %s | %s | %s | %s | %s | %s | %s | %s | %s | %s |\n", scene, size, $2, $1, $3, $4, $8, $6, $9, $11
+      printf "| %s | %s | %s | %s | %s | %s | %s | %s | %s | %s |\n", scene, size, $2, $1, $3, $4, $9, $6, $10, $12
     }'
 }
 if [[ $gpu == 1 ]]; then
@@ -116,7 +116,8 @@ fi
   cat "$out/cpu.md"
   if [[ $gpu == 1 ]]; then
     printf '\n## %s\n\n' "$device"
-    printf 'RGB, alpha and median depth. Errors are of the first four views, of one view with one camera.\n\n'
+    printf 'RGB, alpha and median depth. '
+    printf 'PSNR is the worst of four evenly spread views (0, 16, 32 and 48 of 64).\n\n'
     cat "$out/gpu.md"
   else
     printf '\nNo rows of a GPU: bench_batch is not built (-DGSNAV_CUDA=ON), or --no-gpu was given.\n'

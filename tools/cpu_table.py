@@ -10,7 +10,8 @@ A scene is any file that gsnav-convert reads; all renderers get the same PLY. A 
 C++ source. It is called as `CAMERAS=cameras.json BINARY SCENE.ply WIDTH HEIGHT THREADS REPEATS`, and
 prints `total X ms` (median over views) and `RSS X MB`. Baselines and gsnav take turns for each size.
 Scenes, binaries and float64 references are kept in --cache. Times are medians over all views of the
-fastest turn; errors are those of the worst of four views.
+fastest turn; errors are those of the worst of four evenly spread
+views.
 """
 import argparse
 import collections
@@ -223,7 +224,8 @@ def caption(options, baselines):
             f"{model.group(1) if model else 'a processor'}"
             f" where nothing else is said; of two numbers the first is `{PROFILES[0]}`, the second `{PROFILES[1]}`."
             " The floor is what a frame's work would take at the measured bandwidth and clock and the best unit costs"
-            " known (`bench/floor.hpp`). PSNR: the worst of four views, against float64. Memory: scene and scratch.")
+            " known (`bench/floor.hpp`). PSNR: the worst of four evenly spread views, against float64."
+            " Memory: scene and scratch.")
     if baselines:
         text += (f" {' and '.join(baselines).capitalize()}: throwaway AVX-512 baselines with the same near plane,"
                  " guard band, cuts and stop.")

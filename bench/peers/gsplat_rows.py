@@ -10,8 +10,8 @@ With one camera per call, times are those of the views of --cameras, one after a
 are those of nine calls; the views repeat 2 cm apart. CUDA events stand around the whole call. Both
 layouts of gsplat, dense and packed, are measured; the row is that of the faster one.
 
-The reference is a folder of NNNN.rgb.npy by `gsnav-render --device serial64 --up keep --npy`, with
-the first views of the same cameras file; one per view that is to be judged.
+The reference is a folder of NNNN.rgb.npy by `gsnav-render --device serial64 --up keep --npy`. Its N images
+are of N views evenly spread over the cameras file, as bench_batch compares them: views 0, 16, 32 and 48 of 64.
 
   gsplat_rows.py --scene flat.ply --cameras cameras.json --size 256x256 --batch 1,256 --reference DIR
 """
@@ -103,11 +103,11 @@ def measure(draw, cameras, batch):
             torch.cuda.max_memory_allocated() / 2**20)
 
 
-def psnr(images, folder):
-    """PSNR of the worst view against the references of a folder; nan without any."""
-    worst = float("nan")
-    for i, file in enumerate(sorted(pathlib.Path(folder).glob("*.rgb.npy")) if folder else []):
-        error = np.mean((np.load(file).astype(np.float64) - images(i)) ** 2)
+def psnr(images, views, folder):
+    """PSNR of the worst view against the references of a folder; nan without any. images(i): image of view i."""
+    worst, files = float("nan"), sorted(pathlib.Path(folder).glob("*.rgb.npy")) if folder else []
+    for i, file in enumerate(files):
+        error = np.mean((np.load(file).astype(np.float64) - images(i * views // len(files))) ** 2)
         worst = np.fmin(worst, -10 * np.log10(max(error, 1e-30)))
     return worst
 
@@ -143,7 +143,8 @@ def rows_of_rasterization(scene, views, intrinsics, width, height, batch, refere
             print(f"| gsplat, {name} | {width}x{height} | {batch} | out of memory | | | |", flush=True)
             continue
         quality = float("nan") if mode == "ED" else psnr(
-            lambda i, packed=which == "packed": draw(i, 1, packed)[0, :, :, :3].double().cpu().numpy(), reference)
+            lambda i, packed=which == "packed": draw(i, 1, packed)[0, :, :, :3].double().cpu().numpy(),
+            len(views), reference)
         print(f"| gsplat, {name} ({which}) | {width}x{height} | {batch} | {best[0]:.4f} | {best[1]:.4f} "
               f"| {quality:.1f} | {best[2]:.0f} |", flush=True)
 
@@ -165,7 +166,7 @@ def rows_of_inference(scene, views, intrinsics, width, height, reference):
 
         row = measure(draw, len(views), 1)
         print(f"| gsplat for inference, RGB (tiles of {tile}) | {width}x{height} | 1 | {row[0]:.4f} | {row[1]:.4f} "
-              f"| {psnr(image, reference):.1f} | {row[2]:.0f} |", flush=True)
+              f"| {psnr(image, len(views), reference):.1f} | {row[2]:.0f} |", flush=True)
         renderer.release()
 
 
@@ -175,7 +176,7 @@ def main():
     parser.add_argument("--cameras", required=True, help="INRIA cameras.json, in the axes of the scene")
     parser.add_argument("--size", default="256x256", help="image size (default: %(default)s)")
     parser.add_argument("--batch", default="1,256", help="cameras per call (default: %(default)s)")
-    parser.add_argument("--reference", help="folder of NNNN.rgb.npy; without it, PSNR is nan")
+    parser.add_argument("--reference", help="folder of NNNN.rgb.npy of evenly spread views; without it, PSNR is nan")
     parser.add_argument("--inference", action="store_true", help="also gsplat's renderer for inference")
     options = parser.parse_args()
     if missing:
