@@ -73,7 +73,8 @@ ASKS = (r"(?:sa(?:y|ys|id)|tells?|told|prints?|shows?|shown|knows?|sees?|asks?|d
         r"note[sd]?|matters?)")
 VERB = (r"(?:is|are|was|were|has|have|had|does|do|can|cannot|may|must|will|would|should|lies?|comes?|goes|stands?|"
         r"remains?|follows|needs?|makes|holds?|differs?|belongs?|changes|moves|falls|begins|ends|takes|costs|gives)")
-WHAT_SUBJECT = r"(?:an?|the|its?|they|this|these|those|each|every|one|no|all|earlier|later|others?|you|we|Q+)"
+WHAT_SUBJECT = (r"(?:an?|the|its?|they|this|these|those|each|every|one|no|all|earlier|later|others?|you|we|their|our|"
+                r"your|both|some|such|most|many|Q+)")
 BEFORE_NOUN = r"(?:of|from|with|by|for|to|in|on|than|behind|beyond|into|as|at|over|under|and|or|but|that)"
 
 SMALL = r"(?:for|of|in|by|as|than|or|and|on|to|with|at|from|per|if|when|where|is|are|into|against|is|has|have|without)"
@@ -98,12 +99,14 @@ DEVICES = {
     "per": [rf"{NUMBER}(?: (?!{SMALL}\b)[\w-]+)? an? {UNIT}\b{NO_VERB}",
             rf"\b{SIZE_OR_TIME} an? (?!few\b|little\b)[a-zA-Z][\w-]*{NO_VERB}",
             rf"\b{COUNTED} an? {UNIT}\b{NO_VERB}", r"\bframes a (?:second|minute|hour)\b",
-            rf"\b(?:one|once|twice|two|three|four)(?: (?!{SMALL}\b)[\w-]+)? an? {UNIT}(?=[.,;:)]|$)"],
+            rf"\b(?:one|once|twice|two|three|four)(?: (?!{SMALL}\b)[\w-]+)? an? {UNIT}(?=[.,;:)]|$)",
+            rf"^(?:An?|One|Two|Three|Four) (?!{SMALL}\b)[\w-]+ an? {UNIT} (?:is|are|was|were|runs?)\b"],
     "many": [r"\b[Ss]o (?:many|much)\b(?!.*\bthat\b)", r"\b[Aa]s (?:many|much)(?= as\b|[.,;:)]|$| of\b| at\b)",
              r"\b[Aa]s (?:many|much) (?!.* as\b)"],
     "same": [r"\b[Tt]he same (?:holds?|is true|goes|applies|here|there)\b(?! (?:for|of|to|with|in) )",
              rf"^(?!.*{ALIKE}).*\b[Tt]he same(?=[.,;:)]|$| again\b)", r"\ball the same(?! \w)",
-             r"^[Tt]he same [\w-]+[.;]?$"],
+             r"^[Tt]he same [\w-]+[.;]?$",
+             r"^[Tt]he same [\w-]+ (?:comes?|returns?|results?|follows?|appears?)(?: back| out)?[.;]?$"],
     "possessive": [r"\w's(?=[.;:,)]|$)", r"\b(?:[Oo]urs|[Tt]heirs)\b"],
     "beside": [r"\b(?:fast|slow|small|large|cheap|good|better|worse)(?:er)?\b[\w ,]{0,20} beside\b",
                r"\b[Bb]eside (?:(?:the )?(?:CPUs?|GPUs?|best|fast|exact)|without|those of|Detour|gsplat|Habitat|itself|"
@@ -115,8 +118,10 @@ DEVICES = {
     "history": [r"\btried (?:and|but) (?:not|dropped|given)", r"\b(?:was|were|is) formerly\b",
                 r"(?<!is )(?<!are )\bused to (?:be|have|take|do|give|go|make)\b", r"\bin earlier versions\b",
                 r"\b[Pp]reviously\b", r"\b(?:was|were) [\w-]+ once\b", r"\b[Ff]ormerly\b", r"\bonce (?:was|were|had)\b",
-               r"\b(?:was|were) once\b", r"\b[Ww]e (?:tried|dropped)\b", r"^(?:This|It|They|The [\w-]+) no longer\b",
-               r"\b(?:[Ii]n|[Bb]efore|[Uu]ntil) version \d[\d.]*,? (?:.* )?(?:was|were|had)\b"],
+               r"\b(?:was|were) once\b", r"\b[Ww]e (?:tried|dropped)\b", r"^(?:This|It|They|We|The [\w-]+|[A-Z]\w+s) no longer\b",
+               r"\b(?:[Ii]n|[Bb]efore|[Uu]ntil) version \d[\d.]*,? (?:.* )?(?:was|were|had)\b",
+                r"\b(?:was|were|had)\b.* in (?:version|release) \d", r"\b(?:was|were) \d[\d.]*(?:, \d[\d.]*)* and \d",
+                r"^(?:It|They) (?:was|were) (?!(?:\w+(?:ed|en|t|n|nd|de|ld|id)|read)\b)\w+[.;]?$"],
 }
 DEVICES = {rule: [re.compile(p) for p in patterns] for rule, patterns in DEVICES.items()}
 ABBREVIATION = re.compile(r"(?:\b(?:e\.g|i\.e|vs|etc|cf|Fig|Eq|Sec|No|approx|al|resp|incl|max|min)|^\W*\d+|\b[A-Z])$")
