@@ -118,9 +118,11 @@ DEVICES = {
     "history": [r"\btried (?:and|but) (?:not|dropped|given)", r"\b(?:was|were|is) formerly\b",
                 r"(?<!is )(?<!are )\bused to (?:be|have|take|do|give|go|make)\b", r"\bin earlier versions\b",
                 r"\b[Pp]reviously\b", r"\b(?:was|were) [\w-]+ once\b", r"\b[Ff]ormerly\b", r"\bonce (?:was|were|had)\b",
-               r"\b(?:was|were) once\b", r"\b[Ww]e (?:tried|dropped)\b", r"^(?:This|It|They|We|The [\w-]+|[A-Z]\w+s) no longer\b",
+               r"\b(?:was|were) once\b", r"\b[Ww]e (?:tried|dropped)\b",
+                r"^(?:This|It|They|We|The [\w-]+|[A-Z]\w+s) no longer\b",
                r"\b(?:[Ii]n|[Bb]efore|[Uu]ntil) version \d[\d.]*,? (?:.* )?(?:was|were|had)\b",
-                r"\b(?:was|were|had)\b.* in (?:version|release) \d", r"\b(?:was|were) \d[\d.]*(?:, \d[\d.]*)* and \d",
+                r"\b(?:was|were|had)\b.* in (?:version|release) \d",
+                r"\b(?:was|were) \d[\d.]*(?:, \d[\d.]*)* and \d",
                 r"^(?:It|They) (?:was|were) (?!(?:\w+(?:ed|en|t|n|nd|de|ld|id)|read)\b)\w+[.;]?$"],
 }
 DEVICES = {rule: [re.compile(p) for p in patterns] for rule, patterns in DEVICES.items()}
