@@ -15,7 +15,7 @@ int main(int argc, char** argv) try {
   gsnav::OpenOptions options{.navmesh = "gaussians", .agent_radius = 0.2};
   auto scene = gsnav::open_scene(argc > 1 ? argv[1] : "default", options).value();
   const gsnav::NavMesh& mesh = *scene.scene->navmesh;
-  std::printf("%.1f square metres in %zu islands\n", mesh.navigable_area(), mesh.island_count());
+  std::printf("%.1f square metres, islands: %zu\n", mesh.navigable_area(), mesh.island_count());
   gsnav::save_navmesh(mesh, "scan.navmesh").throw_if_error();
   // [/snippet]
 

@@ -3,11 +3,15 @@
 
 import sys
 
-import numpy as np
-import numpy.typing as npt
+try:
+    import numpy as np
+    import numpy.typing as npt
+    import ray  # noqa: F401
 
-import gsnav
-import gsnav.ray
+    import gsnav
+    import gsnav.ray
+except ImportError as error:
+    sys.exit(f'on_ray.py needs {error.name}; pip install ".[ray]" in the repository installs all that it needs')
 
 
 def make_policy(envs: gsnav.VectorEnv) -> gsnav.ray.Policy:

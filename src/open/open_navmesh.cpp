@@ -132,8 +132,8 @@ Status open_navmesh(OpeningScene& s) {
                            : c.triangles   ? "from the mesh"
                                            : "from the Gaussians";
     char text[160];
-    std::snprintf(text, sizeof text, ": %zu polygons, %.1f m2, %zu islands", mesh->polygon_count(),
-                  mesh->navigable_area(), mesh->island_count());
+    std::snprintf(text, sizeof text, ": %zu polygons, %.1f m2, %zu island%s", mesh->polygon_count(),
+                  mesh->navigable_area(), mesh->island_count(), mesh->island_count() == 1 ? "" : "s");
     s.note("NavMesh " + s.out.navmesh_source + text);
     s.scene.navmesh = std::make_shared<const NavMesh>(std::move(*mesh));
   }

@@ -193,7 +193,7 @@ void print(const NavMesh& mesh, const std::vector<NavLevel>& levels) {
     std::printf("island %zu: %.2f m2, radius %.2f m\n", i, mesh.island_area(i), mesh.island_radius(i));
   }
   if (mesh.island_count() > kShown)
-    std::printf("and %zu smaller islands\n", mesh.island_count() - kShown);
+    std::printf("smaller islands: %zu more\n", mesh.island_count() - kShown);
   for (std::size_t i = 0; i < levels.size(); ++i) {
     std::printf("level %zu: at %.2f m, %.2f m2\n", i, levels[i].height, levels[i].area);
   }
