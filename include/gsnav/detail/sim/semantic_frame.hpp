@@ -22,9 +22,10 @@ struct SemanticFrame {
                                ///< 0 if the label is 0.
 };
 
-/// Renders semantic images of meshes among Gaussians. Each pass draws three sets with one colour channel
-/// each and the others black. The weights are therefore those with which the colours of the image are
-/// blended. Labels are never interpolated.
+/// Renders semantic images of meshes among Gaussians. Each pass measures three sets: the first is drawn
+/// in pure red, the second in green, the third in blue, and all others in black. Each colour channel of
+/// the result is then the share of its set in a pixel, with the weights that the image blends by. Labels
+/// are never interpolated.
 template <class S, Backend B>
 class SemanticFrames {
  public:
