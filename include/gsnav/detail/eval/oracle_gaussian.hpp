@@ -249,7 +249,8 @@ struct EwaModel {
       per_rest;  ///< 1 / var(x), cov / var(x), and 1 / (var(y) - cov^2 / var(x)), in pixels.
   double log2_opacity;
   Vec3d mean_ray;              ///< Ray through the mean. The third component is 1.
-  std::array<Vec3d, 3> areas;  ///< Cross products of the columns of M, divided by the longest.
+  std::array<Vec3d, 3> areas;  ///< Cross products m1 x m2, m2 x m0, m0 x m1 of the columns of M, divided
+                               ///< by the length of the longest of the three.
   double fx, fy, z, reach;     ///< Focal lengths in pixels; depth of the mean and limit of the depth
                                ///< offset in metres.
 

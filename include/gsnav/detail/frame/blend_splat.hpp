@@ -260,8 +260,8 @@ struct WholeSplat {
 };
 
 /// Blends one splat onto pixels with centres (px, py).
-/// @param visible callable that returns the remaining alpha of visible(alpha); 0 where the splat is
-///   hidden
+/// @param visible callable that takes the splat's alpha and returns the part of it that is blended: 0
+///   where the splat is hidden
 /// @return mask of the open pixels in its footprint
 template <bool Color, DepthMode D, Exp2 M, bool General, class L, class S, class Visible = WholeSplat>
 GSNAV_HD mask_of<L> blend_splat(BlendState<L, D>& state, const BlendRules<S>& rules,

@@ -76,7 +76,8 @@ struct MeshLight {
   bool unlit = true;               ///< True: all colours are shown as they are.
   Vec3d ambient{0.4, 0.4, 0.4};    ///< Light from everywhere.
   Vec3d direction{0.4, 0.8, 0.4};  ///< direction towards the light, world axes, of any length
-  Vec3d diffuse{0.6, 0.6, 0.6};    ///< multiplied with the cosine to the normal
+  Vec3d diffuse{0.6, 0.6, 0.6};    ///< Light from `direction`, times the cosine between it
+                                   ///< and the normal.
 };
 
 /// Rule by which Gaussians and meshes become one image.

@@ -23,7 +23,8 @@ struct LocalPlannerOptions {
 struct PlannedVelocity {
   Vec3d velocity{};  ///< Velocity on the ground plane, m/s.
   bool safe = true;  ///< True if, as predicted, no body comes within the margin during the horizon.
-  double contact_after = 0;  ///< Predicted time until a body does, seconds. The horizon if none does.
+  double contact_after = 0;  ///< Predicted time until a body comes within the margin, seconds. The
+                             ///< horizon if none does.
   std::size_t bodies = 0;    ///< Number of avatars that were near enough to matter.
 };
 

@@ -56,7 +56,8 @@ std::vector<FootMove> foot_moves(const Foot& foot,
 /// Measures sliding over frames of joints in the world, by foot_moves.
 class FootSlideMeter {
  public:
-  /// Measures these feet; `clearance` is that of foot_moves, metres.
+  /// Measures the sliding of `feet`. A foot is down if foot_moves() with this `clearance`, in metres,
+  /// says so.
   FootSlideMeter(std::vector<Foot> feet, double clearance = 0.02)
       : feet_(std::move(feet)), clearance_(clearance) {}
 

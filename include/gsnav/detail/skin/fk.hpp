@@ -19,8 +19,8 @@ GSNAV_HD Affine3<S> joint_global(const Affine3<S>* globals, std::int32_t parent,
   return parent < 0 ? local : globals[static_cast<std::size_t>(parent)] * local;
 }
 
-/// The reverse: takes a joint's frame to the frame of its parent. The parent's `globals` are there, and
-/// rigid.
+/// Reverse of joint_global: the transform from a joint's frame to its parent's frame, where `global`
+/// maps the joint's frame to the root frame. `globals[parent]` must have been computed and be rigid.
 template <class S>
 GSNAV_HD Affine3<S> joint_local(const Affine3<S>* globals, std::int32_t parent,
                                 const Affine3<S>& global) noexcept {
