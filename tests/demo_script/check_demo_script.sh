@@ -43,7 +43,8 @@ for value in "--episodes abc" --episodes=1.5 "--hfov 1e2x" --device=bogus "--dev
   [[ $status -eq 2 ]] && grep -q "does not take this" "$work/err.txt" || fail "run_demo.sh $value: $status"
 done
 demo --version
-[[ $status -eq 0 && $(cat "$work/out.txt") == $(exec -a nav_loop "$program" --version) ]] || fail "run_demo.sh --version"
+version=$(exec -a nav_loop "$program" --version)
+[[ $status -eq 0 && $(cat "$work/out.txt") == "$version" ]] || fail "run_demo.sh --version"
 demo --out=folder --device=cuda:1
 [[ $status -eq 2 ]] && grep -q "no GPU" "$work/err.txt" || fail "run_demo.sh --device=cuda:1: status $status"
 demo --device cuda
