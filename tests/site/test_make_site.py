@@ -87,6 +87,15 @@ class Tree(unittest.TestCase):
                          ["a.hpp: error: Kind: no documentation of one"])
         self.assertEqual(bare("class A {\n private:\n  enum Kind {\n    one,\n  };\n};\n"), [])
 
+    def test_concepts_need_comments(self):
+        bare = lambda text: make_site.bare_concepts(text, "a.hpp")  # noqa: E731
+        concept = "template <class A,\n          class B>\nconcept Both = requires(A a) { a.b; };\n"
+        self.assertEqual(bare("/// A kind of both.\n" + concept), [])
+        self.assertEqual(bare("int a;  ///< A number.\n" + concept),
+                         ["a.hpp: error: concept Both: no documentation"])
+        self.assertEqual(bare("\ntemplate <class A> concept One = true;\n"),
+                         ["a.hpp: error: concept One: no documentation"])
+
     @unittest.skipUnless(shutil.which("doxygen"), "no doxygen here")
     def test_the_search_finds_each_word_of_a_heading(self):
         self.write("docs/a.md", "# Page\n\n## Two words\n\n## On a [GPU](../README.md)\n")
