@@ -346,8 +346,11 @@ def headings(name):
 
 
 def searchable():
-    """Text, address and page of each heading, for the search field."""
+    """Text, address and page of each heading and term, for the search field."""
     for name in pages():
+        lines = (ROOT / name).read_text(encoding="utf-8").splitlines()
+        for term, text in site_search.terms(lines if name != "CHANGELOG.md" else []):
+            yield term, f"../{html_of(name)}" + (f"#{label(name, text)}" if text else ""), title_of(name)
         for k, text in enumerate(headings(name)):
             plain = LINK.sub(r"\1", text).replace("`", "")
             yield plain, f"../{html_of(name)}" + (f"#{label(name, text)}" if k else ""), title_of(name)

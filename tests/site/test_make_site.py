@@ -98,11 +98,17 @@ class Tree(unittest.TestCase):
 
     @unittest.skipUnless(shutil.which("doxygen"), "no doxygen here")
     def test_the_search_finds_each_word_of_a_heading(self):
-        self.write("docs/a.md", "# Page\n\n## Two words\n\n## On a [GPU](../README.md)\n")
+        self.write("docs/a.md", "# Page\n\nRun `render_scan` on a `Box<S>`.\n\n## Two words\n\n"
+                                "| name | what |\n|---|---|\n"
+                                "| **median depth** | of `x` |\n\n    pip install a\n\n## On a [GPU](../README.md)\n")
         self.assertEqual(self.run_doxygen().returncode, 0)
         found = "".join(p.read_text() for p in (self.root / "out/html/search").glob("all_*.js"))
         self.assertIn("""['gpu_""", found)
         self.assertIn("""["On a GPU",["../page_docs_a.html#page_docs_a__on-a-gpu",1,"Page"]]""", found)
+        self.assertIn("""["render_scan",["../page_docs_a.html",1,"Page"]]""", found)
+        self.assertIn("""["median depth",["../page_docs_a.html#page_docs_a__two-words",1,"Page"]]""", found)
+        self.assertIn("""['pip_20install_""", found)
+        self.assertIn("""["Box&lt;S&gt;",""", found)
         self.assertIn("""['here_""", found)  # names of the library stay
         self.assertIn("""['on_20a_20gpu_""", found)
         self.assertNotIn("""['a_20gpu_""", found)
