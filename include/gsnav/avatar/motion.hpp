@@ -119,7 +119,9 @@ double smooth_wrap_time(const Skeleton& skeleton, const MotionClip& clip, bool f
 /// Makes a clip from matrices. Each is split into a rotation (its polar factor) and a translation
 /// relative to the parent, so that frames can be interpolated by slerp. The path of the first root joint
 /// becomes `root_translation`.
-/// @param matrices [T][J], joint to root frame; with `skinning` that times the skeleton's inverse bind.
+/// @param matrices [T][J] transforms from joints to the root frame, metres.
+/// @param skinning whether the matrices are skinning matrices: those transforms, each multiplied on the
+///   right by the inverse bind matrix of its joint.
 /// @return the result, or invalid_argument naming the argument.
 Result<MotionClip> clip_from_matrices(const Skeleton& skeleton, double frame_rate,
                                       const std::vector<Affine3<double>>& matrices, bool skinning);
