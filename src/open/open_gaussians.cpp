@@ -63,7 +63,14 @@ Result<Gaussians> make_flat(OpeningScene& s) {
   s.out.report.read = s.out.report.kept = flat->cloud.size();
   s.out.report.bounds = flat->bounds;
   s.out.report.up = {0, 1, 0};
-  return Gaussians{std::move(flat->cloud), {}, {}};
+  Gaussians made;
+  if (s.options.storage == CloudStorage::packed) {
+    made.packed = pack_cloud(std::move(flat->cloud));
+    return made;
+  }
+  if (s.options.storage == CloudStorage::compact) compact_sh(flat->cloud);
+  made.cloud = std::move(flat->cloud);
+  return made;
 }
 
 /// Decides which axis is up.

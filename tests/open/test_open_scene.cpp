@@ -247,6 +247,21 @@ TEST_CASE("open: levels of detail and visible sets are kept beside the scene's f
   CHECK(open_scene(file, o).message().find("OpenOptions.storage") != std::string::npos);
 }
 
+TEST_CASE("open: the embedded flat is stored as asked") {
+  OpenOptions o;
+  o.density = 0.05;
+  const OpenedScene full = open_scene("default", o).value();
+  o.storage = CloudStorage::packed;
+  const OpenedScene packed = open_scene("default", o).value();
+  REQUIRE(packed.scene->assets[0].packed != nullptr);
+  CHECK(packed.scene->assets[0].cloud == nullptr);
+  CHECK(packed.scene->assets[0].packed->size() == full.scene->assets[0].cloud->size());
+  CHECK(packed.scene->assets[0].packed->bytes() < full.scene->assets[0].cloud->bytes());
+  o.storage = CloudStorage::compact;
+  CHECK(open_scene("default", o).value().scene->assets[0].cloud->size() ==
+        full.scene->assets[0].cloud->size());
+}
+
 TEST_CASE("open: names and options that cannot be are said, and nothing crashes") {
   const TempFolder folder("open_bad");
   write_file(folder / "text.ply", "no header");
