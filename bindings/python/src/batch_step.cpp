@@ -5,6 +5,8 @@
 
 #include <string>
 
+#include "fields.hpp"
+
 namespace gsnav::python {
 
 void bind_step(nb::module_& m) {
@@ -14,10 +16,7 @@ void bind_step(nb::module_& m) {
                   "environment are read-only views; the simulator's next call overwrites them. "
                   "With BatchSimulator(copy=True), images are new arrays.");
   const auto array = [&](const char* name, nb::object S::*member, const char* type, const char* doc) {
-    const std::string signature =
-        std::string("def ") + name + "(self) -> numpy.typing.NDArray[numpy." + type + "]";
-    c.def_prop_ro(
-        name, [member](const S& s) { return s.*member; }, nb::sig(signature.c_str()), doc);
+    array_property(c, name, type, doc, [member](const S& s) { return s.*member; });
   };
   array("rewards", &S::rewards, "float64", "Reward of the action, [N].");
   array("terminated", &S::terminated, "bool_", "True if `stop` ended the episode, [N].");

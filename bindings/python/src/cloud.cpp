@@ -2,6 +2,7 @@
 // Clouds of Gaussians, their placement in scenes, and the files that they are written to.
 #include <nanobind/stl/filesystem.h>
 
+#include <algorithm>
 #include <numeric>
 
 #include "arrays.hpp"
@@ -44,18 +45,20 @@ nb::object means(const Cloud& c) {
 }
 
 nb::object higher_bands(const Cloud& c) {
-  std::vector<float> made = c.shN;
-  for (const std::uint16_t half : c.shN_half) made.push_back(half_to_float(half));
   const auto bands = static_cast<std::size_t>(sh_coefficient_count(c.sh_degree) - 1);
+  if (c.shN_half.empty()) return array_copy(std::span<const float>(c.shN), {c.size(), bands, 3});
+  std::vector<float> made(c.shN_half.size());
+  {
+    const ReleaseGil release;
+    std::transform(c.shN_half.begin(), c.shN_half.end(), made.begin(), half_to_float);
+  }
   return array_from(std::move(made), {c.size(), bands, 3});
 }
 
 nb::object reading_order(const Cloud& c) {
-  std::vector<std::uint32_t> made = c.row_ids;
-  if (made.empty()) {
-    made.resize(c.size());
-    std::iota(made.begin(), made.end(), 0u);
-  }
+  if (!c.row_ids.empty()) return array_copy(std::span<const std::uint32_t>(c.row_ids), {c.size()});
+  std::vector<std::uint32_t> made(c.size());
+  std::iota(made.begin(), made.end(), 0u);
   return array_from(std::move(made), {c.size()});
 }
 
@@ -71,32 +74,21 @@ void bind_cloud_class(nb::module_& m) {
       .def_ro("sort_order", &Cloud::sort_order, "Order in which Gaussians are blended.")
       .def_ro("color_space", &Cloud::color_space, "Space in which colours are blended.")
       .def_prop_ro("bytes", &Cloud::bytes, "Bytes of the arrays in memory.");
-  const auto array = [&c](const char* name, nb::object (*get)(const Cloud&), const char* type,
-                          const char* doc) {
-    const std::string signature =
-        std::string("def ") + name + "(self) -> numpy.typing.NDArray[numpy." + type + "]";
-    c.def_prop_ro(name, get, nb::sig(signature.c_str()), doc);
-  };
-  array("means", means, "float64", "Centres in the asset's frame, metres, [N][3].");
-  array(
-      "quats", [](const Cloud& g) { return columns(g.quats); }, "float32",
-      "Unit quaternions w, x, y, z, [N][4].");
-  array(
-      "scales", [](const Cloud& g) { return columns(g.scales); }, "float32",
-      "Standard deviations along the axes, metres, [N][3].");
-  array(
-      "opacities",
-      [](const Cloud& g) { return array_from(std::vector<float>(g.opacities), {g.size()}); }, "float32",
-      "Opacities, [N], 0 to 1.");
-  array(
-      "sh0",
-      [](const Cloud& g) {
-        return array_from(std::vector<float>(g.sh0), {g.size(), 3});
-      },
-      "float32", "SH coefficients of degree 0, [N][3].");
-  array("shN", higher_bands, "float32",
-        "SH coefficients of higher degrees, [N][(sh_degree + 1)^2 - 1][3].");
-  array("row_ids", reading_order, "uint32", "Place of each row in the order of its file, [N].");
+  array_property(c, "means", "float64", "Centres in the asset's frame, metres, [N][3].", means);
+  array_property(c, "quats", "float32", "Unit quaternions w, x, y, z, [N][4].",
+                 [](const Cloud& g) { return columns(g.quats); });
+  array_property(c, "scales", "float32", "Standard deviations along the axes, metres, [N][3].",
+                 [](const Cloud& g) { return columns(g.scales); });
+  array_property(c, "opacities", "float32", "Opacities, [N], 0 to 1.", [](const Cloud& g) {
+    return array_copy(std::span<const float>(g.opacities), {g.size()});
+  });
+  array_property(c, "sh0", "float32", "SH coefficients of degree 0, [N][3].", [](const Cloud& g) {
+    return array_copy(std::span<const float>(g.sh0), {g.size(), 3});
+  });
+  array_property(c, "shN", "float32",
+                 "SH coefficients of higher degrees, [N][(sh_degree + 1)^2 - 1][3].", higher_bands);
+  array_property(c, "row_ids", "uint32", "Place of each row in the order of its file, [N].",
+                 reading_order);
 }
 
 void bind_placement(nb::module_& m) {

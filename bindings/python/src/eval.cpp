@@ -211,10 +211,7 @@ void bind_oracle_frames(nb::module_& m) {
   c.def_ro("height", &F::height, "Rows, H.").def_ro("width", &F::width, "Columns, W.");
   c.def_ro("counts", &F::counts, "Work that the images took.");
   const auto array = [&c](const char* name, nb::object F::*member, const char* type, const char* doc) {
-    const std::string signature =
-        std::string("def ") + name + "(self) -> numpy.typing.NDArray[numpy." + type + "]";
-    c.def_prop_ro(
-        name, [member](const F& f) { return f.*member; }, nb::sig(signature.c_str()), doc);
+    array_property(c, name, type, doc, [member](const F& f) { return f.*member; });
   };
   array("rgb", &F::rgb, "float64", "Colours over the background, not clamped, [H][W][3].");
   array("alpha", &F::alpha, "float64", "1 - transmittance.");

@@ -46,6 +46,15 @@ struct TypeName<std::array<V, N>> {
   static std::string get() { return "collections.abc.Sequence[" + TypeName<V>::get() + "]"; }
 };
 
+/// Adds a read-only property that is a numpy array with numbers of `type`. get(object) returns it.
+template <class C, class Get>
+void array_property(nb::class_<C>& c, const char* name, const char* type, const char* doc,
+                    const Get& get) {
+  const std::string signature =
+      std::string("def ") + name + "(self) -> numpy.typing.NDArray[numpy." + type + "]";
+  c.def_prop_ro(name, get, nb::sig(signature.c_str()), doc);
+}
+
 /// Name of the type of a Python object.
 inline std::string type_of(nb::handle object) {
   return nb::cast<std::string>(object.type().attr("__name__"));

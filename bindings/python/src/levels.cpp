@@ -86,16 +86,11 @@ void bind_lod_tree(nb::module_& m) {
       .def_ro("level_begin", &T::level_begin,
               "First node of each level, leaves first, and the number of nodes.");
   const auto array = [&c](const char* name, float LodNode::*member, const char* doc) {
-    const std::string signature =
-        std::string("def ") + name + "(self) -> numpy.typing.NDArray[numpy.float32]";
-    c.def_prop_ro(
-        name,
-        [member](const T& t) {
-          std::vector<float> made;
-          for (const LodNode& node : t.nodes) made.push_back(node.*member);
-          return array_from(std::move(made), {t.nodes.size()});
-        },
-        nb::sig(signature.c_str()), doc);
+    array_property(c, name, "float32", doc, [member](const T& t) {
+      std::vector<float> made;
+      for (const LodNode& node : t.nodes) made.push_back(node.*member);
+      return array_from(std::move(made), {t.nodes.size()});
+    });
   };
   array("errors", &LodNode::error,
         "Distance between each node's Gaussians and those of the cloud that they stand for, metres "

@@ -121,9 +121,7 @@ def test_trees_are_written_and_read(cloud, tree, opened, tmp_path):
 def test_viewpoints_stand_above_the_floor(scene):
     places = gsnav.navmesh_viewpoints(scene.navmesh, [0.5, 1.5], 0.4)
     assert places.dtype == np.float64 and places.shape[1] == 3 and len(places) > 50
-    for height in (0.5, 1.5):
-        feet = places - [0, height, 0]
-        assert any(scene.navmesh.is_navigable(p, 0.05) for p in feet)
+    assert all(any(scene.navmesh.is_navigable(p - [0, height, 0], 0.05) for height in (0.5, 1.5)) for p in places)
     for arguments, name in [(([1.5], 0.0), "spacing"), (([], 0.4), "height"), (([np.nan], 0.4), "height")]:
         with pytest.raises(gsnav.InvalidArgument, match=name):
             gsnav.navmesh_viewpoints(scene.navmesh, *arguments)
