@@ -65,11 +65,11 @@ Result<Gaussians> make_flat(OpeningScene& s) {
   s.out.report.up = {0, 1, 0};
   Gaussians made;
   if (s.options.storage == CloudStorage::packed) {
-    made.packed = pack_cloud(std::move(flat->cloud));
-    return made;
+    made.packed = pack_cloud(std::move(flat->cloud), {}, &s.out.report.packing);
+    s.out.report.packed = true;
+  } else {
+    made.cloud = std::move(flat->cloud);  // compact changes nothing: there is no SH above degree 0
   }
-  if (s.options.storage == CloudStorage::compact) compact_sh(flat->cloud);
-  made.cloud = std::move(flat->cloud);
   return made;
 }
 
