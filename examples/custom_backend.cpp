@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <thread>
 #include <vector>
 
@@ -36,8 +37,7 @@ static_assert(gsnav::Backend<MyBackend>);
 int main() try {
   // [snippet: use]
   const auto scene = gsnav::make_default_scene(0.1).value();
-  const auto view = gsnav::default_scene_views()[0];
-  const auto camera = gsnav::Camera::look_at(view.eye, view.target, {0, 1, 0}, 160, 120, 90);
+  const auto camera = gsnav::indoor_views(scene, {.count = 1, .width = 160, .height = 120}).value()[0];
   MyBackend mine;
   gsnav::SerialBackend serial;
   gsnav::BasicRenderer renderer(mine);
