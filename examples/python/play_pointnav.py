@@ -80,10 +80,9 @@ def main() -> None:
     args.device = device_of(args.device).name
     plays = {"agent", "greedy"} & set(args.policies)
     policy = load(args.weights) if plays else None
-    if policy is not None:
-        args.size = policy.size
-        if args.save_weights:
-            return save(policy, args.save_weights)
+    if policy is not None and args.save_weights:
+        return save(policy, args.save_weights)
+    args.size = policy.size if policy is not None else 64
     worlds = Worlds(HELD_OUT_SEEDS, args, -(-args.episodes // len(HELD_OUT_SEEDS)))
     print("| policy | " + " | ".join(METRICS) + " |\n" + "|---" * (len(METRICS) + 1) + "|")
     for name in args.policies:

@@ -14,12 +14,13 @@ import time
 import numpy as np
 
 import gsnav
-from pointnav_worlds import TRAIN_SEEDS, Draw, Worlds, device_of, world_arguments
+from pointnav_worlds import TRAIN_SEEDS, Draw, Worlds, device_of, sensor_arguments, world_arguments
 
 
 def main() -> None:
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     world_arguments(p)
+    sensor_arguments(p)
     p.add_argument("--flats", type=int, default=64, choices=range(1, 65), metavar="1..64", help="number of flats")
     p.add_argument("--environments", type=int, default=256, help="number of environments")
     p.add_argument("--steps", type=int, default=200, help="steps of all environments per run")

@@ -24,9 +24,9 @@ METRICS = ("success", "spl", "soft_spl", "collision_rate", "psi", "steps")
 class Worlds:
     """Flats and their episodes. The same arguments give the same ones."""
 
-    def __init__(self, seeds: range, args: argparse.Namespace, episodes: int) -> None:
+    def __init__(self, seeds: range, args: argparse.Namespace, episodes: int, success: float = 2.5) -> None:
         self.task = gsnav.TaskConfig.avatar_pointnav() if args.people else gsnav.TaskConfig()
-        self.task.reward.success = args.success
+        self.task.reward.success = success
         self.quality = gsnav.Quality.exact() if args.quality == "exact" else gsnav.Quality.fast()
 
         def make(seed: int) -> tuple[gsnav.SimulatorScene, list[gsnav.PointNavEpisode]]:
@@ -84,15 +84,18 @@ def goals(seen: gsnav.BatchStep) -> np.ndarray:
 
 
 def world_arguments(p: argparse.ArgumentParser) -> None:
-    """Adds the arguments for the worlds and the sensors."""
+    """Adds the arguments for the worlds and the quality of images."""
     p.add_argument("--device", default="best", help="device of gsnav and torch: best, cuda, cuda:1, cpu, ...")
     p.add_argument("--people", type=int, default=0, help="people in each flat")
-    p.add_argument("--blind", action="store_true", help="the agent sees no images")
-    p.add_argument("--size", type=int, default=64, help="edge of the depth images, pixels, 36 or more")
     p.add_argument("--density", type=float, default=0.05, help="factor on the number of Gaussians")
     p.add_argument("--rooms", type=int, default=4, help="rooms of a flat")
     p.add_argument("--quality", default="exact", choices=["exact", "fast"], help="error budget of the images")
-    p.add_argument("--success", type=float, default=2.5, help="reward for a success")
+
+
+def sensor_arguments(p: argparse.ArgumentParser) -> None:
+    """Adds the arguments for the sensor of an agent."""
+    p.add_argument("--blind", action="store_true", help="the agent sees no images")
+    p.add_argument("--size", type=int, default=64, help="edge of the depth images, pixels, 36 or more")
 
 
 def device_of(name: str) -> gsnav.Device:

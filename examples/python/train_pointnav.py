@@ -28,7 +28,7 @@ except ImportError:
 import numpy as np
 import torch.distributed as dist
 from pointnav_agent import Agent, Reorder, Rows, clear, devices_of, pieces, progress, write_log
-from pointnav_worlds import ACTIONS, METRICS, TRAIN_SEEDS, Draw, Worlds, goals, mixed, world_arguments
+from pointnav_worlds import ACTIONS, METRICS, TRAIN_SEEDS, Draw, Worlds, goals, mixed, sensor_arguments, world_arguments
 from torch import Tensor, nn
 from torch.nn.utils.rnn import PackedSequence
 
@@ -314,7 +314,7 @@ def log_row(learner: Learner, frames: float, seconds: float) -> dict[str, float]
 def train(args: argparse.Namespace, agent: Agent) -> None:
     """Trains until all environments together have taken `args.steps` steps."""
     began = time.perf_counter()
-    learner = Learner(args, agent, Worlds(TRAIN_SEEDS[:args.flats], args, args.episodes_per_flat))
+    learner = Learner(args, agent, Worlds(TRAIN_SEEDS[:args.flats], args, args.episodes_per_flat, args.success))
     log = resume(learner, args.out)
     if learner.rank == 0:
         print(f"{args.flats} flats made in {time.perf_counter() - began:.0f} s; {learner.update_count} updates done")
@@ -363,7 +363,8 @@ def arguments() -> argparse.Namespace:
     p.add_argument("--every", type=int, default=50, help="updates from one checkpoint to the next")
     p.add_argument("--cut-off", type=float, default=1.0, help="fraction of ranks whose end ends the rollouts of the "
                    "others. DD-PPO has 0.6; below 1, runs on several ranks are not reproducible")
-    world_arguments(p)
+    p.add_argument("--success", type=float, default=2.5, help="reward for a success")
+    world_arguments(p), sensor_arguments(p)
     a = p.parse_args()
     if a.rollout % a.chunks:
         p.error(f"--rollout {a.rollout} must be a multiple of --chunks {a.chunks}")
