@@ -45,8 +45,7 @@ void add_scenes(CLI::App& app, Options& o, std::vector<std::string>& sizes, std:
   app.add_flag("--default", o.default_scene, "The embedded flat, as --scene default");
   app.add_option("--up", o.frame.up,
                  "Axis of the scenes' files that points up, for views from outside: x, y, z, -x, -y or "
-                 "-z; auto: guessed from the ground; keep: "
-                 "the axes of the file")
+                 "-z; auto: guessed from the ground; keep: the axes of the file")
       ->check(CLI::IsMember({"auto", "keep", "x", "y", "z", "+x", "+y", "+z", "-x", "-y", "-z"}))
       ->capture_default_str();
   app.add_option("--time", o.frame.time, "Moment of scenes that move (4D Gaussians), seconds")

@@ -43,7 +43,7 @@ inline gsnav::NavMesh build(const Soup& soup, const gsnav::NavMeshSettings& sett
                             int threads = 2) {
   return gsnav::NavMesh::build(settings, soup.vertices, soup.triangles, threads).value();
 }
-/// The same by cells of another size.
+/// The NavMesh of a soup with default settings but for the sizes of cells and tiles.
 inline gsnav::NavMesh build_cells(const Soup& soup, double cell = 0.1, int tile_size = 0) {
   gsnav::NavMeshSettings s;
   s.cell_size = cell;

@@ -79,7 +79,7 @@ class ThreadPool {
 
   static void pause() noexcept {
 #if defined(__x86_64__) || defined(__i386__)
-    __builtin_ia32_pause();  // as _mm_pause, whose header is two megabytes for every file
+    __builtin_ia32_pause();  // as _mm_pause, without its large header
 #elif defined(__aarch64__)
     asm volatile("yield");
 #endif
