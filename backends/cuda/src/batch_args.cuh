@@ -188,8 +188,8 @@ struct BatchArgs {
   SplatRecord* records;
   SplatEntry* entries;
   std::uint32_t* sources;     ///< Per slot: first_rank of its instance plus the stored row.
-  SplatDepth<float>* depths;  ///< Null if no image sums depths and there are few median depths compared
-                              ///< with visible splats.
+  SplatDepth<float>* depths;  ///< Records of all splats, or null: then the few Gaussians that decide a
+                              ///< median depth are projected again.
   SplatPerspective<float>* perspectives;  ///< Null for Response::ewa.
   HighPrecisionSplat* high_precision;
   SplatKey* several;

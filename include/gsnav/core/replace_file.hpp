@@ -33,7 +33,8 @@ inline Status unwritable(const std::filesystem::path& path, int error,
 
 namespace detail {
 
-/// Follows symbolic links, up to 40. The last target need not exist.
+/// The path that a symbolic link leads to, after up to 40 links; a path that is no link is returned as
+/// it is. The target need not exist.
 inline std::filesystem::path link_target(std::filesystem::path path) {
   constexpr int kMostLinks = 40;
   std::error_code error;

@@ -27,7 +27,8 @@ class SimulatorEngine;
 /// Navigation simulator for one agent on any device: scene, avatars, sensors and the PointNav task.
 ///
 /// It is `BasicSimulator<B>`, compiled for the device's backend B: the same calls return the same bits.
-/// After a move, calls of the old object that can fail return invalid_argument; do not make others.
+/// After a move, functions of the old object that return a Status or Result return invalid_argument. Its
+/// other functions must not be called.
 ///
 /// @code
 /// auto sim = gsnav::Simulator::create(device, scene, config).value();

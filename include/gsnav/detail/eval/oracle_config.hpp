@@ -135,9 +135,9 @@ struct OracleFrames {
   std::vector<std::uint8_t> undecided;
   /// 1 if a Gaussian takes T within kUndecidedCrossing of 1/2 or of 1 - first_hit_tau.
   std::vector<std::uint8_t> undecided_depth;
-  /// 1 if the Gaussians blended here are in another order by the other key: float64 if the image uses
-  /// the float32 key, else the float32 key. The test is exact, because a list is out of order if and
-  /// only if two neighbours are.
+  /// 1 if sorting by the other key would blend the Gaussians of this pixel in another order. The other
+  /// key is the float64 one if the image uses the float32 one, and vice versa. The test is exact,
+  /// because a list is out of order if and only if two neighbours are.
   std::vector<std::uint8_t> order_flip;
   OracleCounts counts;  ///< Work that the images took.
 

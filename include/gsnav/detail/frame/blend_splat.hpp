@@ -131,7 +131,7 @@ struct SplatRecords {
 };
 
 /// Terms of log2 alpha that are constant in one column of pixels. At pixel centre py, log2 alpha =
-/// column - (b (py - ref_y) + w2)^2.
+/// column - (b (py - ref_y) + w2)^2, with b and ref_y of SplatGeometry.
 template <class L>
 struct ColumnTerms {
   L column, w2;

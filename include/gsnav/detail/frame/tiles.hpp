@@ -128,7 +128,7 @@ struct TileSpans {
   std::uint8_t columns[kRows][2];
 };
 
-/// Arguments of binning.
+/// Arguments of binning, which lists for each tile the visible splats that may cover it.
 template <class S>
 struct BinArgs {
   TileGrid grid;

@@ -9,8 +9,8 @@
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
-/// kWidth rows of a set from row i on, as SetRows needs them. The last pack of a set has only `count`
-/// rows and repeats the last one; callers mask those lanes.
+/// Reads kWidth rows of a set from row i on, one per lane, for SetRows. The last pack of a set may have
+/// fewer rows (`count`). Its other lanes repeat the last row, and callers mask them.
 struct PackOfRows {
   using lane = F;
   static constexpr std::size_t kStep = static_cast<std::size_t>(kWidth);

@@ -234,7 +234,7 @@ GSNAV_HD void exclusive_sums(const Count* counts, std::size_t n, std::uint64_t* 
 
 }  // namespace detail
 
-/// Kernel that counts the pieces of a chunk of triangles.
+/// Kernel that counts the pieces that the triangles of a chunk leave after clipping and culling.
 template <class S>
 struct CountMeshTriangles {
   MeshSetupArgs<S> args;

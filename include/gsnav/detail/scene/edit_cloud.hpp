@@ -174,8 +174,8 @@ inline Status transform(GaussianCloud& cloud, const Affine3<double>& by) {
   return {};
 }
 
-/// Keeps the rows for which `keep(i)` is true, in their order. `row_ids` still has the order in which
-/// they were read. Chunk bounds are dropped, so sort again.
+/// Keeps the rows for which `keep(i)` is true, in their order. `row_ids` is renumbered from 0 in the
+/// order in which the kept rows were read. Chunk bounds are dropped; sort_spatially makes new ones.
 template <class Keep>
 void filter_rows(GaussianCloud& cloud, const Keep& keep) {
   std::vector<std::uint32_t> rows;

@@ -46,7 +46,8 @@ struct LoadReport {
                                           ///< (LoadSceneOptions::keep_zero_bands).
   int sh_degree_used = 0;                 ///< Highest band with a non-zero coefficient.
   Filter filter = Filter::classic;        ///< Filter that the file asks for.
-  float eps2d = 0.3f;                     ///< Its term on the diagonal of the 2D covariance, px^2.
+  float eps2d = 0.3f;                     ///< Term that the filter adds to the diagonal of the 2D
+                                          ///< covariance, px^2.
   SortOrder sort_order = SortOrder::z_depth;  ///< Sort order that the file asks for.
   std::uint64_t memory = 0;                   ///< Bytes of the cloud's arrays.
   Vec3d up{};            ///< Guessed up axis in the asset's frame, one of +-y and +-z; zero for an

@@ -44,8 +44,8 @@ struct LodGaussian {
   Vec3d mean{};         ///< Metres.
   Sym3 covariance{};    ///< m^2.
   double mass = 0;      ///< Opacity times area, m^2: the light that it takes, integrated over its image.
-  double spread = 0;    ///< Mean squared distance from this mean to the Gaussians it was merged from, by
-                        ///< mass, m^2.
+  double spread = 0;    ///< Mean squared distance from `mean` to the means of the Gaussians that it was
+                        ///< merged from, weighted by mass, m^2.
   Vec3d color{};        ///< Colour of SH degree 0, for the cost.
   Vec3d normal{};       ///< Axis of the least extent, unit.
   double flatness = 0;  ///< 1 - least / middle standard deviation: how well `normal` is defined.

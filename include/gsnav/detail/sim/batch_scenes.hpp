@@ -28,7 +28,7 @@ struct SceneView {
 template <Backend B>
 class BatchScenes {
  public:
-  /// Returns a scene by its index.
+  /// Function that returns the scene with a given index.
   using SceneOf = std::function<Result<std::shared_ptr<const SimulatorScene>>(std::size_t)>;
 
   /// Creates an empty store. Scenes are fetched when a view first needs them.

@@ -62,8 +62,8 @@ struct BatchScene {
 
   std::shared_ptr<const NavMesh> navmesh;  ///< Surface that agents walk on.
   World::BodySource bodies;                ///< Moving bodies.
-  BodySourceAfter
-      bodies_after{};  ///< If set, replaces `bodies` during steps. It must append the same capsules.
+  BodySourceAfter bodies_after{};  ///< If set, replaces `bodies` during steps. It must append the
+                                   ///< capsules that `bodies` appends.
 };
 
 /// Source of scenes, by index. A scene is fetched when an episode begins in it and released when no

@@ -40,7 +40,8 @@ class SemanticPasses {
     }
   }
 
-  /// The sets in the colours of a pass: three white, the others black. They point into this object.
+  /// Copies of the sets in the colours of a pass: one red, one green, one blue, the others black. Their
+  /// colours point into this object.
   std::vector<GaussianSet> recolored(std::span<const GaussianSet> sets, std::size_t pass) const {
     std::vector<GaussianSet> out(sets.begin(), sets.end());
     for (std::size_t i = 0; i < out.size(); ++i) {
@@ -53,7 +54,8 @@ class SemanticPasses {
     return out;
   }
 
-  /// The meshes, coloured for pass `pass`. `sets` is the number of sets.
+  /// Copies of the meshes in the colours of a pass. A mesh with id m is coloured as set number `sets` +
+  /// m would be.
   static std::vector<MeshInstance> recolored(std::span<const MeshInstance> meshes, std::size_t sets,
                                              std::size_t pass) {
     std::vector<MeshInstance> out(meshes.begin(), meshes.end());

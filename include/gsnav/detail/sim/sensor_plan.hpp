@@ -35,7 +35,7 @@ class SensorPlan {
     std::size_t clean, noisy;
   };
 
-  /// Plans for sensors, which must be valid.
+  /// Assigns a camera and buffers to each of `sensors`. Precondition: validate() accepts each of them.
   explicit SensorPlan(std::vector<SensorSpec> sensors) : sensors_(std::move(sensors)) {
     for (std::size_t i = 0; i < sensors_.size(); ++i) {
       Group& group = group_of(i);
