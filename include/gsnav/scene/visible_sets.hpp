@@ -224,8 +224,8 @@ void add_near_chunks(B& backend, const VisibleSets& sets, const GaussianCloud& c
 }  // namespace detail
 
 /// Finds the chunks and rows of a cloud that are seen from each cell. The cells are those with a
-/// viewpoint in them or within 5 cm. Each viewpoint costs six frames with settings.face pixels a side.
-/// The same bits for any number of threads.
+/// viewpoint in them or within 5 cm. Each viewpoint costs six square frames, settings.face pixels wide.
+/// The result has the same bits for any number of threads.
 /// @param cloud a sorted cloud (sort_spatially).
 /// @param viewpoints world frame, metres; navmesh_viewpoints makes them.
 /// @param world_from_asset placement of the cloud in the world.
