@@ -58,7 +58,7 @@ RULES = {
 UNIT = (r"(?:frame|pixel|tile|row|column|camera|second|minute|hour|episode|thread|core|lane|warp|block|splat|"
         r"gaussian|triangle|voxel|vertex|chunk|slice|byte|view|image|sensor|environment|call|axis|channel|node|joint|"
         r"level|batch|ray|scene|avatar|agent|person|metre|layer|kernel|backend|file|line|cell|set|walker|sample|action|"
-        r"step|process|policy|body|capsule|setting|measurement|device|GPU|worker|world|mesh|query|path|run)")
+        r"step|process|policy|body|capsule|setting|measurement|device|GPU|worker|world|mesh|query|path|run|side)")
 SIZE_OR_TIME = r"(?:ms|us|ns|milliseconds?|microseconds?|nanoseconds?|seconds|bytes|[KMG]i?B)"
 COUNTED = (r"(?:[Gg]aussians|pixels|triangles|voxels|threads|registers|allocations|multiplications|additions|times|"
            r"actions|values|influences|collisions|cameras|bones|episodes|environments|agents|floats|vertices|faces|"

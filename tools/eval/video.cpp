@@ -108,7 +108,7 @@ class AnimatedWebp final : public Video {
     milliseconds_ = 1000 / rate;
     encoder_.reset(WebPAnimEncoderNew(width, height, &options));
     if (encoder_ == nullptr)
-      return {Errc::invalid_argument, path + ": a WebP has at most 16383 pixels a side"};
+      return {Errc::invalid_argument, path + ": a WebP is at most 16383 pixels wide and high"};
     return {};
   }
   Status add(const std::vector<std::uint8_t>& rgb) override {
