@@ -115,11 +115,14 @@ def is_source_tree(root):
 
 
 def found(root, *patterns):
-    """Files of the repository; without git, in an archive, all files."""
+    """Files of the repository; without git, in an archive, all files. Virtual environments of Python are skipped."""
+    environments = {p.parent for p in root.glob("*/pyvenv.cfg")}
     if is_source_tree(root):
-        return tracked(root, *patterns)
-    files = {f for p in patterns for f in root.rglob(p)}
-    return sorted(f for f in files if not any(d.startswith("build") for d in f.relative_to(root).parts))
+        files = tracked(root, *patterns)
+    else:
+        files = sorted({f for p in patterns for f in root.rglob(p)})
+        files = [f for f in files if not any(d.startswith("build") for d in f.relative_to(root).parts)]
+    return [f for f in files if environments.isdisjoint(f.parents)]
 
 
 def check(root):
@@ -162,6 +165,11 @@ def self_test():
         (root / "README.md").write_text("fine\n")
         (root / "x.hpp").write_text("// see docs/none.md\n")
         assert check(root)[0] == ["x.hpp:1: there is no docs/none.md"], check(root)
+        (root / "venv").mkdir()
+        (root / "x.hpp").rename(root / "venv" / "x.hpp")
+        assert len(check(root)[0]) == 1, check(root)
+        (root / "venv" / "pyvenv.cfg").write_text("home = /usr/bin\n")
+        assert not check(root)[0], check(root)
     print("check_links.py: the script finds each of the faults that it is given")
 
 

@@ -406,6 +406,9 @@ def dead_links(html):
 
 
 def make(out, doxygen):
+    if shutil.which(doxygen) is None:
+        print(f"make_site.py: there is no program {doxygen}; Debian's package is doxygen", file=sys.stderr)
+        return 1
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
     write_groups(out)
