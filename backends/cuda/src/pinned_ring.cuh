@@ -26,7 +26,7 @@ class PinnedRing {
     }
   }
 
-  /// Copies `bytes` <= kMaxBytes. `from` may change when it returns.
+  /// Copies `bytes` <= kMaxBytes. `from` may be overwritten once the call has returned.
   cudaError_t send(void* to, const void* from, std::size_t bytes, cudaStream_t stream) {
     Block& b = blocks_[next_];
     next_ = (next_ + 1) % kBlocks;

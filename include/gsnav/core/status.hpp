@@ -21,7 +21,7 @@ enum class Errc {
   file_not_found,     ///< A path does not exist, or cannot be opened for reading or writing.
   unsupported,        ///< Valid input that gsnav does not handle.
   out_of_memory,      ///< An allocation failed.
-  nothing_navigable,  ///< A NavMesh build found no walkable surface.
+  nothing_navigable,  ///< There is no walkable surface, place on it, or path between two places.
   backend_failure,    ///< A device or driver reported an error.
   write_failed,  ///< A file was started and could not be finished (full disk, quota, failing device).
 };

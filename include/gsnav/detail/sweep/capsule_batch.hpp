@@ -53,8 +53,8 @@ struct SweepArgs {
   SweepRules<S> rules;
   View<std::uint8_t> outcome;   ///< [N], sums of kSweepHit, kSweepPushed and kSweepAgentClosing
   View<S> time, start_gap;      ///< [N] each
-  View<S> contact_time, gap;    ///< [N] each. Together with normal and point all empty: not computed.
-  View<S> normal[3], point[3];  ///< [N] each, or all empty: not computed
+  View<S> contact_time, gap;    ///< [N] each, computed unless these, normal and point are empty
+  View<S> normal[3], point[3];  ///< [N] each
 
   GSNAV_HD std::size_t size() const noexcept { return agents.begin.radius.size; }
   GSNAV_HD bool asks_for_contact() const noexcept { return !contact_time.empty(); }
