@@ -24,9 +24,10 @@ int main(int argc, char** argv) try {
     renderer.render({&camera, 1}, frames, time).throw_if_error();
     auto name = "people_" + std::to_string(k) + ".png";
     gsnav::io::save_png_rgb(name, frames.rgb, 320, 240).throw_if_error();
+    std::printf("%s: people at", name.c_str());
     for (const gsnav::AvatarActor& person : scene->avatars) {
       gsnav::Vec3d at = person.placement(time).translation;
-      std::printf("%s: (%.2f, %.2f) ", name.c_str(), at.x, at.z);
+      std::printf(" (%.2f, %.2f)", at.x, at.z);  // x and z, metres
     }
     std::printf("\n");
   }

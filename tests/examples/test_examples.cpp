@@ -189,6 +189,7 @@ TEST_CASE("people: a sequence in which somebody moves") {
   REQUIRE(made.ok);
   for (int k = 0; k < 8; ++k)
     check_picture(folder / ("people_" + std::to_string(k) + ".png"), 320, 240, 0.9);
+  CHECK(made.says("people_7.png: people at ("));
   CHECK(io::load_png(folder / "people_0.png")->samples !=
         io::load_png(folder / "people_7.png")->samples);
 }
