@@ -81,17 +81,6 @@ Status validate(const Options& o) {
   return {};
 }
 
-/// Returns true if all values of a cloud are finite. Edits may exceed the range of float32.
-bool is_finite(const GaussianCloud& cloud) {
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
-    const Vec3d m = cloud.mean(i);
-    bool finite = gsnav::is_finite(vec_cast<float>(m));
-    for (const auto& axis : cloud.scales) finite = finite && std::isfinite(axis[i]);
-    if (!finite) return false;
-  }
-  return true;
-}
-
 /// Crops and prunes in the axes of the input. Then rotates, scales and moves, in this order.
 Status edit(GaussianCloud& cloud, const Options& o) {
   if (!o.crop.empty()) {

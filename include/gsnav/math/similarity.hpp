@@ -13,6 +13,12 @@ struct Similarity {
   double scale = 1.0;   ///< > 0
 };
 
+/// Returns true if `s` is finite, with a unit quaternion and a positive scale.
+inline bool is_valid(const Similarity& s) noexcept {
+  return s.scale > 0 && is_finite(s.scale) && is_finite(s.translation) &&
+         abs(dot(s.rotation, s.rotation) - 1.0) < 1e-6;
+}
+
 /// Maps the point v.
 inline Vec3d operator*(const Similarity& s, const Vec3d& v) noexcept {
   return rotate(s.rotation, v) * s.scale + s.translation;

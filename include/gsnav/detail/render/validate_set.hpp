@@ -167,9 +167,7 @@ inline Status validate(const GaussianSet& set) {
   if (!(set.base_eps2d >= 0 && set.base_eps2d <= set.eps2d)) {
     return bad("base_eps2d = " + std::to_string(set.base_eps2d) + ": must be in [0, eps2d]");
   }
-  const Similarity& a = set.world_from_asset;
-  if (!(a.scale > 0) || !is_finite(a.scale) || !is_finite(a.translation) ||
-      !(abs(dot(a.rotation, a.rotation) - 1.0) < 1e-6)) {
+  if (!is_valid(set.world_from_asset)) {
     return bad("world_from_asset must have a unit quaternion, a positive scale and be finite");
   }
   return {};

@@ -19,6 +19,17 @@
 
 namespace gsnav {
 
+/// Returns true if all means and scales of a cloud are finite. transform() may exceed the range of
+/// float32.
+inline bool is_finite(const GaussianCloud& cloud) {
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    bool finite = is_finite(vec_cast<float>(cloud.mean(i)));
+    for (const auto& axis : cloud.scales) finite = finite && std::isfinite(axis[i]);
+    if (!finite) return false;
+  }
+  return true;
+}
+
 /// Moves, rotates and scales a cloud as a rigid body, with its SH bands. Chunk bounds are dropped, so
 /// sort again. `by.rotation` must be a unit quaternion and `by.scale` positive. The bands of a compact
 /// cloud are rounded once more.
