@@ -11,6 +11,7 @@ void bind_camera(nb::module_& m);
 void bind_navmesh(nb::module_& m);
 void bind_scene(nb::module_& m);
 void bind_cloud(nb::module_& m);
+void bind_edits(nb::module_& m);
 void bind_lod_tree(nb::module_& m);
 void bind_visible_sets(nb::module_& m);
 void bind_scene_files(nb::module_& m);

@@ -20,6 +20,7 @@ NB_MODULE(_gsnav, m) {
   bind_navmesh(m);
   bind_render_settings(m);
   bind_cloud(m);
+  bind_edits(m);
   bind_scene(m);
   bind_scene_files(m);
   bind_levels(m);
