@@ -19,6 +19,7 @@
 #include "gsnav/sim/basic_simulator.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "sim/mesh_box.hpp"
+#include "support/compiled_frames.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;

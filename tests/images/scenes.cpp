@@ -17,6 +17,7 @@
 #include "gsnav/scene/visible_sets.hpp"
 #include "hard_cases/cases.hpp"
 #include "lod/level_support.hpp"
+#include "support/compiled_frames.hpp"
 #include "support/scenes.hpp"
 #include "support/seen_rows.hpp"
 

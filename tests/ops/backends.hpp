@@ -32,13 +32,15 @@ class ToyBackend {
   }
   void fill(void* p, unsigned char byte, std::size_t bytes) { std::memset(p, byte, bytes); }
   template <class F>
-  void parallel_for(std::size_t n, const F& f) {
-    for (std::size_t i = n; i-- > 0;) f(i);
-  }
+  void parallel_for(std::size_t n, const F& f);
   gsnav::Status synchronize() { return {}; }
 
   int allocations = 0, copies_to_host = 0;
 };
+template <class F>
+void ToyBackend::parallel_for(std::size_t n, const F& f) {
+  for (std::size_t i = n; i-- > 0;) f(i);
+}
 static_assert(gsnav::Backend<ToyBackend>);
 
 /// Renders with a fresh renderer.
@@ -52,6 +54,7 @@ gsnav::Frames<S> render(B& backend, const std::vector<gsnav::GaussianSet>& sets,
 }  // namespace gsnav_test
 
 // Compiled once for all tests (support/compiled_frames.cpp).
+GSNAV_TEST_KERNELS(extern, gsnav_test::ToyBackend);
 namespace gsnav {
 using gsnav_test::ToyBackend;
 GSNAV_FRAME_FUNCTIONS(extern, float, ToyBackend);

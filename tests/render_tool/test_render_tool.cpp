@@ -15,6 +15,7 @@
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/scene/basic_renderer.hpp"
 #include "support/command.hpp"
+#include "support/compiled_frames.hpp"
 #include "support/files.hpp"
 
 using namespace gsnav;

@@ -2,6 +2,9 @@
 // What tests render with, compiled once.
 #include "ops/backends.hpp"
 
+GSNAV_TEST_KERNELS(, gsnav::SerialBackend);
+GSNAV_TEST_KERNELS(, gsnav_test::ToyBackend);
+
 namespace gsnav {
 
 GSNAV_FRAME_FUNCTIONS(, float, SerialBackend);

@@ -14,12 +14,16 @@ class SerialBackend : public HostMemory {
  public:
   /// Calls f(i) for i in [0, n), in order.
   template <class F>
-  void parallel_for(std::size_t n, const F& f) {
-    for (std::size_t i = 0; i < n; ++i) f(i);
-  }
+  void parallel_for(std::size_t n, const F& f);
   /// Returns success: work is done when the call returns.
   Status synchronize() { return {}; }
 };
+
+// Outside of the class, so that `extern template` can keep a source file from compiling a kernel.
+template <class F>
+void SerialBackend::parallel_for(std::size_t n, const F& f) {
+  for (std::size_t i = 0; i < n; ++i) f(i);
+}
 
 static_assert(Backend<SerialBackend>);
 
