@@ -40,8 +40,11 @@ def forward_maker(envs):
 def in_child(function, *arguments):
     """Runs function in a new process, because freed memory would hide later growth."""
     call = f"import unit_costs; unit_costs.{function}(*{arguments!r})"
-    code = os.spawnv(os.P_WAIT, sys.executable, [sys.executable, "-c", call])
-    assert code == 0
+    # The child, and actors of Ray that it starts, import this file from any working directory.
+    paths = [os.path.dirname(os.path.abspath(__file__)), *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    if os.spawnve(os.P_WAIT, sys.executable, [sys.executable, "-c", call], environment) != 0:
+        sys.exit(f"unit_costs.py: {function}{arguments} failed")
 
 
 def scenes(density):
@@ -83,8 +86,11 @@ def messages():
 
 
 def calls():
-    import ray
-
+    try:
+        import ray
+    except ImportError:
+        print("driver: a call of an actor: needs ray, which is not installed")
+        return
     ray.init(log_to_driver=False, logging_level="ERROR")
     player = ray.remote(gsnav._rollout.Player).options(num_cpus=1).remote(4, "default", {})
     ray.get(player.ready.remote())
