@@ -92,8 +92,8 @@ Status pictures(const std::filesystem::path& folder, const NavMesh& mesh, const 
 int main(int argc, char** argv) {
   CLI::App app{
       "Compares four policies in a crowd in the embedded flat: shortest path, step filter, local "
-      "planner and\nplanner in time. Prints a table.\nWith --out it draws the first episode among ten "
-      "people (rows: policies; columns: seconds). With --frames it\nalso draws each quarter of a "
+      "planner and planner in time. Prints a table.\n\nWith --out it draws the first episode among ten "
+      "people (rows: policies; columns: seconds). With --frames it also draws each quarter of a "
       "second, for a video."};
   int episodes = 50;
   std::vector<int> people{10, 30, 100};

@@ -140,9 +140,9 @@ int main(int argc, char** argv) try {
   int pictures = -1;
   CLI::App app{
       "Plays PointNav episodes with a policy and measures it.\nWrites episodes.json.gz, journal.jsonl "
-      "(one line per episode), metrics.json, timings.json and\nindex.html (metrics, images and "
+      "(one line per episode), metrics.json, timings.json and index.html (metrics, images and "
       "maps).\nRun again, it plays the episodes that are missing. It refuses to do so if an option has "
-      "changed, or the\ncontent of the scene, the NavMesh, the people or the episodes.\nExample: "
+      "changed, or the content of the scene, the NavMesh, the people or the episodes.\nExample: "
       "gsnav-eval --scene apartment.ply --avatars 5 --episodes 100 --out eval"};
   gsnav_eval::add_world_options(app, o);
   app.add_option("--pictures", pictures, "number of episodes with images on the page; -1 shows all")

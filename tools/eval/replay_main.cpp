@@ -245,7 +245,7 @@ int main(int argc, char** argv) try {
   CLI::App app{
       "Plays an episode of an evaluation again, by its recorded actions.\nWrites images from any camera "
       "as PNG files, and all positions as track.npz.\nThe journal in --out supplies the options of the "
-      "evaluation. Files may have moved, and camera options may\ndiffer; options that would change what "
+      "evaluation. Files may have moved, and camera options may differ. Options that would change what "
       "happens are refused.\nExample: gsnav-replay --out eval --episode 3 --eye 5 2.5 4 --target 5 0 4 "
       "--frames above"};
   gsnav_eval::add_world_options(app, o);

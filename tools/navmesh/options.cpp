@@ -20,9 +20,8 @@ namespace {
 
 const char kDescription[] =
     "Builds, inspects, converts and draws NavMeshes.\nA SCENE that ends in .navmesh or .bin is read as "
-    "a "
-    "NavMesh (MSET files of Habitat and RecastDemo).\nFrom any other scene a NavMesh is built. Prints "
-    "islands and storeys; --out, --obj and --png write files.\nLengths are metres, Y points up.\nExit "
+    "a NavMesh (MSET files of Habitat and RecastDemo).\nFrom any other scene a NavMesh is built. Prints "
+    "islands and storeys. --out, --obj and --png write files.\nLengths are metres, Y points up.\nExit "
     "status: 0 success; 1 failure, with a message on one line; 2 invalid options.\nExample: "
     "gsnav-navmesh apartment.ply --agent-radius 0.2 --out apartment.navmesh --png map.png";
 
