@@ -18,7 +18,7 @@ case ${1:-} in
     exit $([[ $1 == --help || $1 == -h ]] && echo 0 || echo 2)
     ;;
 esac
-for program in clang-format python3; do
+for program in clang-format git python3; do
   if ! command -v "$program" > /dev/null; then
     echo "$program is not installed (Debian: $program)" >&2
     exit 1
