@@ -2,9 +2,10 @@
 #pragma once
 
 // The simulator on a device chosen at run time: scenes, sensors, actions, episodes, metrics and batches.
-// Link gsnav::device. For a backend chosen at compile time, see BasicSimulator (sim/basic_simulator.hpp)
-// and BasicBatchSimulator (sim/basic_batch.hpp).
+// Link gsnav::device. For a backend chosen at compile time, see BasicSimulator
+// (sim/basic_simulator.hpp), BasicBatchSimulator and Team (sim/basic_batch.hpp).
 
+#include "gsnav/detail/scene/placed_meshes.hpp"
 #include "gsnav/detail/sim/batch_world.hpp"
 #include "gsnav/detail/sim/body_cache.hpp"
 #include "gsnav/detail/sim/cube_map.hpp"
@@ -19,10 +20,11 @@
 #include "gsnav/detail/sim/sensor.hpp"
 #include "gsnav/detail/sim/start_times.hpp"
 #include "gsnav/detail/sim/task.hpp"
-#include "gsnav/detail/sim/team.hpp"
 #include "gsnav/device/device.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/device/simulator.hpp"
+#include "gsnav/scene/lod_cut.hpp"
+#include "gsnav/scene/lod_tree.hpp"
 #include "gsnav/sim/config.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "gsnav/sim/metrics.hpp"

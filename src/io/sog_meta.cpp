@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sog_meta.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "file.hpp"

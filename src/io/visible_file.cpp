@@ -7,6 +7,7 @@
 
 #include "cache_file.hpp"
 #include "gsnav/core/replace_file.hpp"
+#include "gsnav/detail/scene/seen_cells.hpp"
 
 namespace gsnav::io {
 namespace {

@@ -9,6 +9,7 @@
 #include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/detail/image/validate_camera.hpp"
 #include "gsnav/detail/open/open_scene.hpp"
+#include "gsnav/detail/scene/placed_meshes.hpp"
 #include "gsnav/detail/scene/views_around.hpp"
 #include "gsnav/nav/navmesh.hpp"
 #include "scene_source.hpp"

@@ -7,8 +7,9 @@
 #include <string>
 
 #include "gsnav/detail/scene/needed_bands.hpp"
+#include "gsnav/detail/scene/view_cells.hpp"
+#include "gsnav/scene/lod_tree.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
-#include "gsnav/scene/visible_sets.hpp"
 
 namespace gsnav {
 

@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/detail/sim/scene_library.hpp"
 
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <thread>
 #include <utility>
 
 #include "gsnav/detail/core/guarded.hpp"
+#include "gsnav/detail/scene/view_cells.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
-#include "gsnav/scene/visible_sets.hpp"
 
 namespace gsnav {
 namespace {
@@ -52,6 +57,142 @@ std::size_t scene_bytes(const SimulatorScene& scene) noexcept {
   return sum;
 }
 
+/// The scenes of a library, and the thread that loads them.
+class SceneLibrary::Loader {
+ public:
+  Loader(std::vector<SceneEntry> scenes, std::size_t budget) : budget_(budget), slots_(scenes.size()) {
+    for (std::size_t i = 0; i < scenes.size(); ++i) slots_[i].entry = std::move(scenes[i]);
+    thread_ = std::thread([this] { work(); });
+  }
+
+  ~Loader() {
+    {
+      std::lock_guard lock(mutex_);
+      stopping_ = true;
+      news_.notify_all();
+    }
+    thread_.join();
+  }
+
+  std::size_t size() const noexcept { return slots_.size(); }
+
+  void prefetch(std::size_t index) {
+    std::lock_guard lock(mutex_);
+    if (index < slots_.size()) want(index);
+  }
+
+  Result<std::shared_ptr<const SimulatorScene>> get(std::size_t index) {
+    std::unique_lock lock(mutex_);
+    if (index >= slots_.size()) {
+      return {Errc::invalid_argument,
+              "scene " + std::to_string(index) + " of " + std::to_string(slots_.size())};
+    }
+    Slot& slot = slots_[index];
+    want(index);
+    ++slot.waiting;
+    news_.wait(lock, [&] {
+      // Another waiting thread may have taken the error of the failed load.
+      if (slot.state == State::absent) want(index);
+      return slot.state == State::there || slot.state == State::failed;
+    });
+    --slot.waiting;
+    if (slot.state == State::there) {
+      std::shared_ptr<const SimulatorScene> scene = slot.scene;
+      make_room();
+      return scene;
+    }
+    slot.state = State::absent;
+    return slot.error;
+  }
+
+  std::size_t bytes() const {
+    std::lock_guard lock(mutex_);
+    return bytes_;
+  }
+
+  std::size_t loads() const {
+    std::lock_guard lock(mutex_);
+    return loads_;
+  }
+
+  bool holds(std::size_t index) const {
+    std::lock_guard lock(mutex_);
+    return slots_[index].state == State::there;
+  }
+
+ private:
+  enum class State : std::uint8_t { absent, wanted, there, failed };
+  struct Slot {
+    SceneEntry entry;
+    State state = State::absent;
+    std::shared_ptr<const SimulatorScene> scene;
+    Status error;
+    std::size_t bytes = 0;
+    std::uint64_t used = 0;
+    std::size_t waiting = 0;
+  };
+
+  void work() {
+    std::unique_lock lock(mutex_);
+    while (true) {
+      news_.wait(lock, [&] { return stopping_ || !queue_.empty(); });
+      if (stopping_) return;
+      const std::size_t index = queue_.front();
+      queue_.pop_front();
+      Slot& slot = slots_[index];
+      lock.unlock();
+      Result<SimulatorScene> scene = load(slot.entry);
+      lock.lock();
+      ++loads_;
+      if (scene) {
+        slot.scene = std::make_shared<const SimulatorScene>(std::move(*scene));
+        slot.bytes = scene_bytes(*slot.scene);
+        slot.state = State::there;
+        bytes_ += slot.bytes;
+        make_room();
+      } else {
+        slot.error = scene.status();
+        slot.state = State::failed;
+      }
+      news_.notify_all();
+    }
+  }
+
+  void make_room() {
+    while (bytes_ > budget_) {
+      Slot* oldest = nullptr;
+      for (Slot& s : slots_) {
+        // Only get() hands out pointers, so a count of one is exact.
+        if (s.state != State::there || s.scene.use_count() > 1 || s.waiting > 0) continue;
+        if (oldest == nullptr || s.used < oldest->used) oldest = &s;
+      }
+      if (oldest == nullptr) return;
+      bytes_ -= oldest->bytes;
+      oldest->scene.reset();
+      oldest->state = State::absent;
+    }
+  }
+
+  void want(std::size_t index) {
+    Slot& slot = slots_[index];
+    slot.used = ++now_;
+    if (slot.state != State::absent) return;
+    slot.state = State::wanted;
+    queue_.push_back(index);
+    news_.notify_all();
+  }
+
+  const std::size_t budget_;
+  mutable std::mutex mutex_;
+  std::condition_variable news_;
+  std::vector<Slot> slots_;
+  std::deque<std::size_t> queue_;
+  std::uint64_t now_ = 0;
+  std::size_t bytes_ = 0, loads_ = 0;
+  bool stopping_ = false;
+  std::thread thread_;
+};
+
 Result<std::shared_ptr<SceneLibrary>> SceneLibrary::create(std::vector<SceneEntry> scenes,
                                                            std::size_t budget) {
   if (scenes.empty()) return {Errc::invalid_argument, "SceneLibrary: no scene"};
@@ -59,118 +200,26 @@ Result<std::shared_ptr<SceneLibrary>> SceneLibrary::create(std::vector<SceneEntr
     if (!e.load)
       return {Errc::invalid_argument, "SceneLibrary: scene \"" + e.name + "\" has no load function"};
   }
-  std::shared_ptr<SceneLibrary> library(new SceneLibrary(std::move(scenes), budget));
-  library->thread_ = std::thread([p = library.get()] { p->work(); });
-  return library;
+  return std::shared_ptr<SceneLibrary>(
+      new SceneLibrary(std::make_unique<Loader>(std::move(scenes), budget)));
 }
 
-SceneLibrary::SceneLibrary(std::vector<SceneEntry> scenes, std::size_t budget)
-    : budget_(budget), slots_(scenes.size()) {
-  for (std::size_t i = 0; i < scenes.size(); ++i) slots_[i].entry = std::move(scenes[i]);
-}
+SceneLibrary::SceneLibrary(std::unique_ptr<Loader> loader) : loader_(std::move(loader)) {}
 
-SceneLibrary::~SceneLibrary() {
-  {
-    std::lock_guard lock(mutex_);
-    stopping_ = true;
-    news_.notify_all();
-  }
-  if (thread_.joinable()) thread_.join();
-}
+SceneLibrary::~SceneLibrary() = default;
 
-void SceneLibrary::work() {
-  std::unique_lock lock(mutex_);
-  while (true) {
-    news_.wait(lock, [&] { return stopping_ || !queue_.empty(); });
-    if (stopping_) return;
-    const std::size_t index = queue_.front();
-    queue_.pop_front();
-    Slot& slot = slots_[index];
-    lock.unlock();
-    Result<SimulatorScene> scene = load(slot.entry);
-    lock.lock();
-    ++loads_;
-    if (scene) {
-      slot.scene = std::make_shared<const SimulatorScene>(std::move(*scene));
-      slot.bytes = scene_bytes(*slot.scene);
-      slot.state = State::there;
-      bytes_ += slot.bytes;
-      make_room();
-    } else {
-      slot.error = scene.status();
-      slot.state = State::failed;
-    }
-    news_.notify_all();
-  }
-}
+std::size_t SceneLibrary::size() const noexcept { return loader_->size(); }
 
-void SceneLibrary::make_room() {
-  while (bytes_ > budget_) {
-    Slot* oldest = nullptr;
-    for (Slot& s : slots_) {
-      // Only get() hands out pointers, so a count of one is exact.
-      if (s.state != State::there || s.scene.use_count() > 1 || s.waiting > 0) continue;
-      if (oldest == nullptr || s.used < oldest->used) oldest = &s;
-    }
-    if (oldest == nullptr) return;
-    bytes_ -= oldest->bytes;
-    oldest->scene.reset();
-    oldest->state = State::absent;
-  }
-}
-
-void SceneLibrary::want(std::size_t index) {
-  Slot& slot = slots_[index];
-  slot.used = ++now_;
-  if (slot.state != State::absent) return;
-  slot.state = State::wanted;
-  queue_.push_back(index);
-  news_.notify_all();
-}
-
-void SceneLibrary::prefetch(std::size_t index) {
-  std::lock_guard lock(mutex_);
-  if (index < slots_.size()) want(index);
-}
+void SceneLibrary::prefetch(std::size_t index) { loader_->prefetch(index); }
 
 Result<std::shared_ptr<const SimulatorScene>> SceneLibrary::get(std::size_t index) {
-  std::unique_lock lock(mutex_);
-  if (index >= slots_.size()) {
-    return {Errc::invalid_argument,
-            "scene " + std::to_string(index) + " of " + std::to_string(slots_.size())};
-  }
-  Slot& slot = slots_[index];
-  want(index);
-  ++slot.waiting;
-  news_.wait(lock, [&] {
-    if (slot.state == State::absent)
-      want(index);  // Another waiting thread may have taken the error of
-                    // the failed load.
-    return slot.state == State::there || slot.state == State::failed;
-  });
-  --slot.waiting;
-  if (slot.state == State::there) {
-    std::shared_ptr<const SimulatorScene> scene = slot.scene;
-    make_room();
-    return scene;
-  }
-  slot.state = State::absent;
-  return slot.error;
+  return loader_->get(index);
 }
 
-std::size_t SceneLibrary::bytes() const {
-  std::lock_guard lock(mutex_);
-  return bytes_;
-}
+std::size_t SceneLibrary::bytes() const { return loader_->bytes(); }
 
-std::size_t SceneLibrary::loads() const {
-  std::lock_guard lock(mutex_);
-  return loads_;
-}
+std::size_t SceneLibrary::loads() const { return loader_->loads(); }
 
-bool SceneLibrary::holds(std::size_t index) const {
-  std::lock_guard lock(mutex_);
-  return slots_[index].state == State::there;
-}
+bool SceneLibrary::holds(std::size_t index) const { return loader_->holds(index); }
 
 }  // namespace gsnav

@@ -2,6 +2,7 @@
 #include <bit>
 #include <cub/device/device_radix_sort.cuh>
 #include <cub/device/device_scan.cuh>
+#include <functional>
 
 #include "gsnav/backends/cuda/device.cuh"
 #include "gsnav/backends/cuda/pinned.hpp"

@@ -9,6 +9,8 @@
 #include "gsnav/image/camera.hpp"
 #include "gsnav/render/config.hpp"
 #include "gsnav/render/frames.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
+#include "gsnav/scene/lod_tree.hpp"
 #include "gsnav/sim/scene.hpp"
 
 namespace gsnav {

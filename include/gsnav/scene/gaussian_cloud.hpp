@@ -5,9 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -17,6 +15,7 @@
 #include "gsnav/detail/math/curves.hpp"
 #include "gsnav/detail/math/half.hpp"
 #include "gsnav/detail/scene/load_report.hpp"
+#include "gsnav/detail/scene/origin_lattice.hpp"
 #include "gsnav/frame/gaussians.hpp"
 
 namespace gsnav {
@@ -108,9 +107,6 @@ struct GaussianCloud {
   GaussianSet set(const Similarity& world_from_asset = {}) const&& = delete;
 };
 
-/// Spacing of the lattice of origins, metres.
-inline constexpr double kOriginLattice = 64.0;
-
 /// A Gaussian after the activations.
 struct ActiveGaussian {
   Vec3d mean{};                   ///< Metres, asset frame.
@@ -150,33 +146,6 @@ inline RowFate activate(const RawGaussian& raw, std::size_t rest, ActiveGaussian
               static_cast<float>(quat.z)};
   return RowFate::kept;
 }
-
-/// Assigns ids to the lattice points nearest to means, in the order in which they occur. Id 0 is the
-/// point zero.
-class OriginLattice {
- public:
-  /// Id of the lattice point nearest to `mean`.
-  std::uint32_t id_of(const Vec3d& mean) {
-    Vec3d origin;
-    for (int k = 0; k < 3; ++k) origin[k] = kOriginLattice * std::nearbyint(mean[k] / kOriginLattice);
-    if (origin == origins_[last_]) return last_;
-    return last_ = id_of_point(origin);
-  }
-  /// Id of a lattice point.
-  std::uint32_t id_of_point(const Vec3d& origin) {
-    const auto [it, added] = index_.emplace(std::make_tuple(origin.x, origin.y, origin.z),
-                                            static_cast<std::uint32_t>(origins_.size()));
-    if (added) origins_.push_back(origin);
-    return it->second;
-  }
-  /// [ids in use] the lattice points.
-  const std::vector<Vec3d>& origins() const noexcept { return origins_; }
-
- private:
-  std::vector<Vec3d> origins_{Vec3d{}};
-  std::map<std::tuple<double, double, double>, std::uint32_t> index_{{{0.0, 0.0, 0.0}, 0u}};
-  std::uint32_t last_ = 0;
-};
 
 /// Appends means to the planes of a cloud, splitting them into origins and offsets.
 class MeanWriter {

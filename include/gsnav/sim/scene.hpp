@@ -7,16 +7,18 @@
 
 #include "gsnav/avatar/actor.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/detail/mesh/mesh.hpp"
 #include "gsnav/detail/nav/obstacles.hpp"
-#include "gsnav/detail/scene/placed_meshes.hpp"
+#include "gsnav/detail/scene/lod_choice.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/nav/navmesh.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
-#include "gsnav/scene/lod_cut.hpp"
 
 namespace gsnav {
 
+struct LodTree;  // gsnav/scene/lod_tree.hpp
 struct PackedCloud;
+struct PlacedMeshes;  // gsnav/detail/scene/placed_meshes.hpp
 struct SceneBands;
 struct VisibleSets;
 

@@ -7,7 +7,8 @@
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/detail/io/read_or_build.hpp"
-#include "gsnav/scene/visible_sets.hpp"
+#include "gsnav/detail/scene/view_cells.hpp"
+#include "gsnav/scene/gaussian_cloud.hpp"
 
 namespace gsnav::io {
 

@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <condition_variable>
 #include <cstddef>
-#include <cstdint>
-#include <deque>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "gsnav/sim/scene.hpp"
@@ -43,7 +38,7 @@ class SceneLibrary {
   SceneLibrary& operator=(const SceneLibrary&) = delete;
 
   /// Number of scenes.
-  std::size_t size() const noexcept { return slots_.size(); }
+  std::size_t size() const noexcept;
   /// Starts loading scene `index` unless it is in memory.
   void prefetch(std::size_t index);
   /// Returns scene `index`, after waiting for it to load. A load that failed is repeated at the next
@@ -59,31 +54,11 @@ class SceneLibrary {
   bool holds(std::size_t index) const;
 
  private:
-  enum class State : std::uint8_t { absent, wanted, there, failed };
-  struct Slot {
-    SceneEntry entry;
-    State state = State::absent;
-    std::shared_ptr<const SimulatorScene> scene;
-    Status error;
-    std::size_t bytes = 0;
-    std::uint64_t used = 0;
-    std::size_t waiting = 0;
-  };
+  class Loader;  // keeps <thread> and <mutex> out of this header
 
-  SceneLibrary(std::vector<SceneEntry> scenes, std::size_t budget);
-  void work();
-  void want(std::size_t index);
-  void make_room();
+  explicit SceneLibrary(std::unique_ptr<Loader> loader);
 
-  const std::size_t budget_;
-  mutable std::mutex mutex_;
-  std::condition_variable news_;
-  std::vector<Slot> slots_;
-  std::deque<std::size_t> queue_;
-  std::uint64_t now_ = 0;
-  std::size_t bytes_ = 0, loads_ = 0;
-  bool stopping_ = false;
-  std::thread thread_;
+  std::unique_ptr<Loader> loader_;
 };
 
 }  // namespace gsnav
