@@ -115,16 +115,16 @@ Result<Simulator> Simulator::create(const Device& device, SimulatorScene scene, 
   return create(device, std::make_shared<const SimulatorScene>(std::move(scene)), std::move(config));
 }
 
-Result<Observations> Simulator::reset(const PointNavEpisode& episode) {
+Result<Observations> Simulator::reset(const PointNavEpisode& episode) & {
   return on_engine(engine_, "Simulator", [&](auto& engine) { return engine.reset(episode); });
 }
-Result<Observations> Simulator::step(Action action) {
+Result<Observations> Simulator::step(Action action) & {
   return on_engine(engine_, "Simulator", [&](auto& engine) { return engine.step(action); });
 }
-Result<Observations> Simulator::step(const VelocityCommand& command) {
+Result<Observations> Simulator::step(const VelocityCommand& command) & {
   return on_engine(engine_, "Simulator", [&](auto& engine) { return engine.step(command); });
 }
-Result<Observations> Simulator::observe() {
+Result<Observations> Simulator::observe() & {
   return on_engine(engine_, "Simulator", [&](auto& engine) { return engine.observe(); });
 }
 bool Simulator::done() const noexcept { return engine_ == nullptr || world().done(); }
@@ -142,10 +142,10 @@ Status Simulator::set_agent(const Vec3d& position, double yaw, double pitch) {
 void Simulator::set_seed(std::uint64_t seed) noexcept { engine_->set_seed(seed); }
 void Simulator::set_rendering(bool on) noexcept { engine_->set_rendering(on); }
 std::size_t Simulator::render_count() const noexcept { return engine_->render_count(); }
-Result<const Frames<float>*> Simulator::render(const Camera& camera, unsigned outputs) {
+Result<const Frames<float>*> Simulator::render(const Camera& camera, unsigned outputs) & {
   return on_engine(engine_, "Simulator", [&](auto& engine) { return engine.render(camera, outputs); });
 }
-Result<std::span<const Observation>> Simulator::goal_images() {
+Result<std::span<const Observation>> Simulator::goal_images() & {
   return on_engine(engine_, "Simulator", [&](auto& engine) { return engine.goal_images(); });
 }
 
@@ -200,13 +200,13 @@ const World& BatchSimulator::world(std::size_t environment) const noexcept {
 std::size_t BatchSimulator::scene_of(std::size_t environment) const noexcept {
   return engine_->scene_of(environment);
 }
-Result<BatchStep> BatchSimulator::reset(std::span<const std::uint8_t> mask) {
+Result<BatchStep> BatchSimulator::reset(std::span<const std::uint8_t> mask) & {
   return on_engine(engine_, "BatchSimulator", [&](auto& engine) { return engine.reset(mask); });
 }
-Result<BatchStep> BatchSimulator::step(std::span<const Action> actions) {
+Result<BatchStep> BatchSimulator::step(std::span<const Action> actions) & {
   return on_engine(engine_, "BatchSimulator", [&](auto& engine) { return engine.step(actions); });
 }
-Result<BatchStep> BatchSimulator::step(std::span<const VelocityCommand> commands) {
+Result<BatchStep> BatchSimulator::step(std::span<const VelocityCommand> commands) & {
   return on_engine(engine_, "BatchSimulator", [&](auto& engine) { return engine.step(commands); });
 }
 std::size_t BatchSimulator::render_count() const noexcept { return engine_->render_count(); }

@@ -2,8 +2,12 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <span>
+#include <utility>
 
 #include "gsnav/backends/serial.hpp"
+#include "gsnav/device/simulator.hpp"
+#include "gsnav/sim/basic_batch.hpp"
 #include "gsnav/sim/basic_simulator.hpp"
 #include "sim_scene.hpp"
 #include "support/compiled_frames.hpp"
@@ -12,6 +16,29 @@ using namespace gsnav;
 using namespace gsnav_test;
 
 namespace {
+
+// Images lie in the simulator: calls that return them do not compile on a temporary.
+template <class T>
+concept ReturnsImages = requires(T&& t) {
+  std::forward<T>(t).reset(PointNavEpisode{});
+}
+|| requires(T&& t) { std::forward<T>(t).step(Action::stop); }
+|| requires(T&& t) { std::forward<T>(t).step(VelocityCommand{}); }
+|| requires(T&& t) { std::forward<T>(t).observe(); }
+|| requires(T&& t) { std::forward<T>(t).render(Camera{}); }
+|| requires(T&& t) { std::forward<T>(t).goal_images(); };
+template <class T>
+concept ReturnsBatches = requires(T&& t) {
+  std::forward<T>(t).reset();
+}
+|| requires(T&& t) { std::forward<T>(t).step(std::span<const Action>()); }
+|| requires(T&& t) { std::forward<T>(t).step(std::span<const VelocityCommand>()); };
+static_assert(ReturnsImages<Simulator&> && !ReturnsImages<Simulator>);
+static_assert(ReturnsImages<BasicSimulator<SerialBackend>&> &&
+              !ReturnsImages<BasicSimulator<SerialBackend>>);
+static_assert(ReturnsBatches<BatchSimulator&> && !ReturnsBatches<BatchSimulator>);
+static_assert(ReturnsBatches<BasicBatchSimulator<SerialBackend>&> &&
+              !ReturnsBatches<BasicBatchSimulator<SerialBackend>>);
 
 SimulatorConfig small_config() {
   SimulatorConfig c;

@@ -29,6 +29,7 @@ class SimulatorEngine;
 /// It is `BasicSimulator<B>`, compiled for the device's backend B: the same calls return the same bits.
 /// After a move, functions of the old object that return a Status or Result return invalid_argument. Its
 /// other functions must not be called.
+/// Images lie in the simulator: functions that return them do not compile on a temporary.
 ///
 /// @code
 /// auto sim = gsnav::Simulator::create(device, scene, config).value();
@@ -56,16 +57,16 @@ class Simulator {
 
   /// Starts an episode and renders the first observations.
   /// @return the errors of World::reset, or a rendering error.
-  Result<Observations> reset(const PointNavEpisode& episode);
+  Result<Observations> reset(const PointNavEpisode& episode) &;
   /// Performs one action for one control period and renders. `Action::stop` ends the episode.
   /// @return the errors of World::step, or a rendering error.
-  Result<Observations> step(Action action);
+  Result<Observations> step(Action action) &;
   /// Moves at the given velocities for one control period and renders.
   /// @return the errors of World::step, or a rendering error.
-  Result<Observations> step(const VelocityCommand& command);
+  Result<Observations> step(const VelocityCommand& command) &;
   /// Renders the sensors at the present time, without acting.
   /// @return a rendering error.
-  Result<Observations> observe();
+  Result<Observations> observe() &;
 
   /// True if the episode has ended.
   bool done() const noexcept;
@@ -102,11 +103,11 @@ class Simulator {
   /// Renders any camera at the present time, such as a map or a spectator's view. The images are valid
   /// until the next call.
   /// @return the errors of Renderer::render.
-  Result<const Frames<float>*> render(const Camera& camera, unsigned outputs = kRgb);
+  Result<const Frames<float>*> render(const Camera& camera, unsigned outputs = kRgb) &;
   /// Goal images of ImageNav: what the sensors see from the episode's goal, without avatars. In the
   /// order of the sensors; valid until the next call.
   /// @return invalid_argument before the first reset; a rendering error.
-  Result<std::span<const Observation>> goal_images();
+  Result<std::span<const Observation>> goal_images() &;
 
  private:
   Simulator(const Device& device, std::unique_ptr<detail::SimulatorEngine> engine) noexcept;
@@ -118,7 +119,8 @@ class Simulator {
 /// Navigation simulator for N environments over M scenes on any device, stepped by one call.
 ///
 /// It is `BasicBatchSimulator<B>`, compiled for the device's backend B. After an error, call reset() to
-/// start again. After a move, the old object has no environments and returns invalid_argument.
+/// start again. After a move, the old object has no environments and returns invalid_argument. Images
+/// lie in the simulator: functions that return them do not compile on a temporary.
 ///
 /// @code
 /// auto sim = gsnav::BatchSimulator::create(device, scenes, config, 256, episode_of).value();
@@ -163,15 +165,15 @@ class BatchSimulator {
   /// Starts the next episode in all environments, or only in those whose mask is not 0.
   /// @param mask [N], or empty for all
   /// @return the errors of the episode source and World::reset, or a rendering error.
-  Result<BatchStep> reset(std::span<const std::uint8_t> mask = {});
+  Result<BatchStep> reset(std::span<const std::uint8_t> mask = {}) &;
   /// Performs one action per environment and renders.
   /// @param actions [N]
   /// @return invalid_argument naming the environment's index: for a wrong number of actions, before the
   ///   first reset, or in an environment that is done with AutoReset::disabled. Also the errors of
   ///   World::step, or a rendering error.
-  Result<BatchStep> step(std::span<const Action> actions);
+  Result<BatchStep> step(std::span<const Action> actions) &;
   /// Moves each environment's agent at the given velocities, [N], and renders. Errors as above.
-  Result<BatchStep> step(std::span<const VelocityCommand> commands);
+  Result<BatchStep> step(std::span<const VelocityCommand> commands) &;
 
   /// Number of renders so far.
   std::size_t render_count() const noexcept;

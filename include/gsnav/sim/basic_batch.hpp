@@ -88,7 +88,7 @@ class BasicBatchSimulator {
   /// Begins the next episode in every environment.
   /// @param mask Shape [N]. If given, only environments with a nonzero value are reset.
   /// @return the errors of the episode source, of World::reset, or of rendering.
-  Result<BatchStep> reset(std::span<const std::uint8_t> mask = {}) {
+  Result<BatchStep> reset(std::span<const std::uint8_t> mask = {}) & {
     if (environments() == 0) return moved_away();
     if (Status s = ask_for_memory(); !s) return s;
     if (Status s = worlds_.reset(parallel(), mask); !s) return s;
@@ -101,10 +101,10 @@ class BasicBatchSimulator {
   /// @return invalid_argument for a wrong number of actions, before reset(), or, with
   /// AutoReset::disabled, for an environment that is done (the message names it); the errors of
   /// World::step and of rendering.
-  Result<BatchStep> step(std::span<const Action> actions) { return act(actions); }
+  Result<BatchStep> step(std::span<const Action> actions) & { return act(actions); }
   /// Drives each environment by a velocity for one control period. See BasicSimulator::step.
   /// @param commands Shape [N].
-  Result<BatchStep> step(std::span<const VelocityCommand> commands) { return act(commands); }
+  Result<BatchStep> step(std::span<const VelocityCommand> commands) & { return act(commands); }
 
   /// Number of images rendered so far. Sensors with the same position and field of view share one.
   std::size_t render_count() const noexcept { return rig_.render_count(); }

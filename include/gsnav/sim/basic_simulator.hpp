@@ -66,27 +66,27 @@ class BasicSimulator {
 
   /// Starts an episode and renders the first observation.
   /// @return the errors of World::reset, or of rendering.
-  Result<Observations> reset(const PointNavEpisode& episode) {
+  Result<Observations> reset(const PointNavEpisode& episode) & {
     if (Status s = world_.reset(episode); !s) return s;
     return observe();
   }
 
   /// Performs one action for one control period and renders. Action::stop ends the episode.
   /// @return the errors of World::step, or of rendering.
-  Result<Observations> step(Action action) {
+  Result<Observations> step(Action action) & {
     if (Result<StepInfo> r = world_.step(action); !r) return r.status();
     return observe();
   }
   /// Moves at a commanded velocity for one control period and renders.
   /// @return the errors of World::step, or of rendering.
-  Result<Observations> step(const VelocityCommand& command) {
+  Result<Observations> step(const VelocityCommand& command) & {
     if (Result<StepInfo> r = world_.step(command); !r) return r.status();
     return observe();
   }
 
   /// Renders the current observation without acting.
   /// @return an error of rendering.
-  Result<Observations> observe() {
+  Result<Observations> observe() & {
     if (Status s = alive(); !s) return s;
     Observations obs;
     static_cast<StepInfo&>(obs) = world_.last_step();
@@ -149,7 +149,7 @@ class BasicSimulator {
   /// @param camera Camera in world coordinates.
   /// @param outputs Bitmask of kRgb, kAlpha, ...
   /// @return the errors of BasicRenderer::render.
-  Result<const Frames<float>*> render(const Camera& camera, unsigned outputs = kRgb) {
+  Result<const Frames<float>*> render(const Camera& camera, unsigned outputs = kRgb) & {
     if (Status s = alive(); !s) return s;
     if (Status s = scene_.pose(0, world_.time()); !s) return s;
     RenderConfig config = config_.render;
@@ -164,7 +164,7 @@ class BasicSimulator {
   /// goal_rotation(), without avatars.
   /// @return images in the order of the sensors, valid until the next call; invalid_argument before
   /// reset(), or an error of rendering.
-  Result<std::span<const Observation>> goal_images() {
+  Result<std::span<const Observation>> goal_images() & {
     if (Status s = alive(); !s) return s;
     const WorldState& s = world_.state();
     if (!s.running) return {Errc::invalid_argument, "goal_images before reset: no episode is running"};

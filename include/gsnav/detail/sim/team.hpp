@@ -94,7 +94,7 @@ class Team {
   /// Starts an episode for each agent, all with the same start time.
   /// @return invalid_argument for a wrong number of episodes or different start times; the errors of
   /// BasicSimulator::reset.
-  Result<std::vector<Observations>> reset(std::span<const PointNavEpisode> episodes) {
+  Result<std::vector<Observations>> reset(std::span<const PointNavEpisode> episodes) & {
     if (episodes.size() != size()) return wrong_number("episodes", episodes.size());
     for (std::size_t i = 0; i < size(); ++i) {
       if (episodes[i].start_time != episodes[0].start_time) {
@@ -118,7 +118,7 @@ class Team {
 
   /// Performs one action per agent. Agents whose episode has ended are skipped.
   /// @return invalid_argument for a wrong number of actions; the errors of BasicSimulator::step.
-  Result<std::vector<Observations>> step(std::span<const Action> actions) {
+  Result<std::vector<Observations>> step(std::span<const Action> actions) & {
     if (actions.size() != size()) return wrong_number("actions", actions.size());
     for (std::size_t i = 0; i < size(); ++i) {
       if (agents_[i].done()) continue;
