@@ -10,6 +10,7 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/io/visible_file.hpp"
+#include "gsnav/scene/visible_sets.hpp"
 #include "support/files.hpp"
 #include "two_rooms.hpp"
 
