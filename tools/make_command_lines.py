@@ -40,6 +40,20 @@ prints the same for `--help`.
 | program | what it does |
 |---|---|
 """
+TAIL = """
+## Scene options
+
+One set of options opens a scene in all programs: the group *Scene* of `gsnav-render --help`. A program
+in which an option has no effect refuses it and says why. Some options do more in three programs:
+
+| option | gsnav-convert | gsnav-navmesh | gsnav-report |
+|---|---|---|---|
+| `--scene` | an input; repeatable | a scene, or a NavMesh file | `[NAME=]SCENE[:CAMERAS.json]`; repeatable |
+| `--up` | default `keep` | as in all programs | for views from outside |
+| `--crop` | keeps the Gaussians in the box | builds the NavMesh in the box | refused |
+| `--navmesh` | refused | what to build from | refused |
+| `--visible-sets` | refused | the file to write | `[SCENE=]FILE`, another profile |
+"""
 WIDTH = 105
 
 
@@ -92,7 +106,7 @@ def main():
             parts.append(kept.get(name, ""))
     there = [p for p, part in zip(PROGRAMS, parts) if part]
     head = HEAD + "".join(f"| [{name}](#{name}) | {what} |\n" for name, _, what in there)
-    new = head + "\n" + "\n".join(part for part in parts if part)
+    new = head + TAIL + "\n" + "\n".join(part for part in parts if part)
     if missing:
         print(f"make_command_lines.py: not built, left as it is: {', '.join(missing)}", file=sys.stderr)
     if not options.check:

@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "../../tools/common/parse_options.hpp"
+#include "../../tools/common/scene_options.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/version.hpp"
 
@@ -50,10 +51,14 @@ void add_scenes(CLI::App& app, Options& o, std::vector<std::string>& sizes, std:
       ->capture_default_str();
   app.add_option("--time", o.frame.time, "Moment of scenes that move (4D Gaussians), seconds")
       ->capture_default_str();
+  app.add_option("--density", o.frame.density,
+                 "Density of Gaussians in the embedded flat, relative to the default")
+      ->check(CLI::Range(0.05, 20.0))
+      ->capture_default_str();
   app.add_option("--flat", o.flats, "Benchmark flats, PLY files with a cameras.json beside them");
   app.add_option(
       "--visible-sets", o.visible_sets,
-      "SCENE=FILE: visible sets of a scene, written by gsnav-navmesh --visible-sets; adds the profile "
+      "[SCENE=]FILE: visible sets of a scene, written by gsnav-navmesh --visible-sets; adds the profile "
       "visible, which is fast with only the Gaussians that are visible from the view's cell. "
       "Repeatable");
   app.add_option("--views", o.views, "Views per scene, spread over its cameras")
@@ -70,6 +75,20 @@ void add_scenes(CLI::App& app, Options& o, std::vector<std::string>& sizes, std:
   app.add_option("--near", o.near_plane, "Near plane, metres")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  const char* no_navmesh = "views need no NavMesh";
+  const char* no_people = "the report measures scenes without people, and skinning by itself";
+  gsnav_tools::refuse_scene_options(
+      app, {{"--storage", "the report compares storages: see --knobs"},
+            {"--profile", "the report compares profiles: see --profiles"},
+            {"--lod-error", "the report measures levels at the default error"},
+            {"--lod-levels", "the report measures levels that it builds"},
+            {"--mesh", "the report measures Gaussians only"},
+            {"--navmesh", no_navmesh},
+            {"--cell-size", no_navmesh},
+            {"--crop", "it limits a NavMesh, and views need none; gsnav-convert crops Gaussians"},
+            {"--avatars", no_people},
+            {"--seed", no_people},
+            {"--device", "the report compares backends: see --backends"}});
 }
 
 std::string joined(const std::vector<std::string>& names) {

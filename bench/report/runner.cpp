@@ -49,13 +49,17 @@ Result<std::vector<SceneSpec>> scene_specs(const Options& o) {
       return {Errc::invalid_argument, "two scenes are called " + spec.name};
   }
   for (const std::string& text : o.visible_sets) {
+    if (std::error_code ignored; names.size() == 1 && std::filesystem::exists(text, ignored)) {
+      specs.front().visible_sets = text;
+      continue;
+    }
     const std::size_t equals = text.find('=');
     const auto scene = names.find(text.substr(0, equals));
     if (equals == text.npos || scene == names.end()) {
       std::string known;
       for (const auto& [name, spec] : names) known.append(known.empty() ? "" : ", ").append(name);
       return {Errc::invalid_argument,
-              "--visible-sets " + text + ": use SCENE=FILE; scenes are " + known};
+              "--visible-sets " + text + ": use [SCENE=]FILE; scenes are " + known};
     }
     scene->second->visible_sets = text.substr(equals + 1);
   }

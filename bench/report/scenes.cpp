@@ -57,7 +57,7 @@ std::string name_of(const std::string& scene) {
 
 Result<SceneSpec> parse_scene(const std::string& text) {
   std::size_t equals = text.find('=');
-  if (equals != text.npos && text.find('/') < equals) equals = text.npos;  // of the path
+  if (is_there(text) || text.find('/') < equals) equals = text.npos;  // of the path
   if (text.empty() || equals == 0 || equals + 1 == text.size()) {
     return {Errc::invalid_argument, "--scene " + text + ": use [NAME=]SCENE[:CAMERAS.json]"};
   }
@@ -119,6 +119,7 @@ Result<Scene> load(const SceneSpec& spec, int views, const SceneFrame& frame) {
   OpenOptions how;
   how.up = "keep";  // cameras stand in the axes of the file
   how.time = frame.time;
+  how.density = frame.density;
   how.navmesh = "none";
   auto opened = open_scene(spec.path, how);
   if (!opened) return bad(opened.status());

@@ -31,6 +31,7 @@ struct SceneSpec {
 struct SceneFrame {
   std::string up = "auto";  ///< axis of the file that points up, for views that are made; auto: guessed
   double time = 0;          ///< moment of a scene that moves, seconds
+  double density = 1;       ///< of the Gaussians of the embedded flat, relative to the default
 };
 
 struct Scene {

@@ -384,6 +384,16 @@ TEST_CASE("convert: the axis that is said to be up points to +Y afterwards") {
     CHECK(nearest < 1e-4);
   }
   CHECK_FALSE(run(folder, "in.ply a.ply --up w").ok);
+  // The box is in the axes that --up gives, as in all programs; --scene names an input.
+  REQUIRE(run(folder, "--scene in.ply b.ply --views 0 --up -z --crop -100 0 -100 100 100 100").ok);
+  const GaussianCloud above = load(folder, "b.ply");
+  std::size_t want = 0;
+  for (std::size_t i = 0; i < source.size(); ++i) want += source.mean(i).z <= 0 ? 1 : 0;
+  CHECK(above.size() == want);
+  REQUIRE(want > 0);
+  REQUIRE(want < source.size());
+  const Outcome same = run(folder, "b.ply b.ply --views 0");
+  CHECK(same.says("b.ply: replaces the input"));
 }
 
 TEST_CASE("convert: what was read, dropped and repaired is said line by line") {
@@ -492,7 +502,9 @@ TEST_CASE("convert: what cannot be done is said") {
   says("a.ply out.ply --crop 100 100 100 101 101 101", "no Gaussian is left");
   says("a.ply out.ply --rotate 0 0 0 90", "the axis is zero");
   says("a.ply out.ply --cameras none.json", "none.json");
-  says("a.ply", "paths");
+  says("a.ply", "IN... OUT: an input and an output are needed");
+  says("a.ply out.ply --avatars 3", "--avatars: scene files hold no people");
+  says("a.ply out.ply --navmesh auto", "--navmesh: scene files hold no NavMesh");
   // In place: nothing is written before all is known to be right.
   const std::string before = read_file(folder / "a.ply");
   for (const char* edit : {"--scale nan", "--translate nan 0 0", "--rotate 0 0 1 inf",

@@ -13,6 +13,7 @@
 #include "gsnav/detail/io/ply.hpp"
 #include "gsnav/detail/io/visible_file.hpp"
 #include "gsnav/io/scene_file.hpp"
+#include "gsnav/scene/visible_sets.hpp"
 #include "lod/two_rooms.hpp"
 #include "support/command.hpp"
 #include "support/files.hpp"
@@ -60,6 +61,8 @@ TEST_CASE("report: errors name the option and the value") {
       {"--scene =x", {"--scene", "=x", "[NAME=]SCENE"}},
       {"nonsense", {"nonsense"}},
       {"--scene a=/none.ply", {"/none.ply"}},
+      {"--default --avatars 3", {"--avatars", "without people"}},
+      {"--default --profile lod", {"--profile", "see --profiles"}},
       {"--flat /none.ply", {"--flat", "/none.ply"}},
       {"--default --visible-sets a", {"--visible-sets", "SCENE=FILE", "embedded_flat"}},
       {"--default --visible-sets b=/none.vis", {"--visible-sets", "b=/none.vis", "embedded_flat"}},
@@ -170,7 +173,7 @@ TEST_CASE("report: visible sets are rows beside fast, and say where no set serve
     from.push_back(Camera::look_at({x, 1.3, 0.1}, {-x, 1.2, 0.2}, {0, 1, 0}, 48, 32, 90));
   io::save_cameras(cameras, from).throw_if_error();
   const std::string arguments =
-      "--scene rooms=\"" + ply.string() + ":" + cameras.string() + "\" --visible-sets rooms=\"" +
+      "--scene rooms=\"" + ply.string() + ":" + cameras.string() + "\" --visible-sets \"" +
       sets.string() + "\" --views 2 --sizes 48x32,96x64 --runs 1 --kinds render --knobs none " +
       "--profiles fast --sensors rgbd --backends openmp --oracles contract --no-html --out \"" +
       (folder / "out").string() + "\"";

@@ -152,6 +152,7 @@ TEST_CASE("scene: options that cannot be used exit with 2, help and version with
     CHECK(exits_with(folder, arguments, 2));
   }
   CHECK(run(folder, "flat --out a.ply --gaussians 10").says("50000000"));
+  CHECK(run(folder, "castle --out a.ply").says("there is no command castle"));
   CHECK(run(folder, "--version").says("gsnav-scene "));
   for (const char* command : {"", "flat", "rooms", "default", "humanoid"}) {
     const Outcome help = run(folder, std::string(command) + " --help");

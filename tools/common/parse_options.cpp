@@ -2,10 +2,14 @@
 #include "parse_options.hpp"
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "gsnav/core/printable.hpp"
 #include "gsnav/version.hpp"
@@ -14,6 +18,15 @@ namespace gsnav_tools {
 namespace {
 
 constexpr std::size_t kHelpColumns = 100;
+
+std::string program_name;  ///< For check_stdout().
+
+/// Ends the program with kFailed if its output was lost, for instance on a full disk.
+void check_stdout() {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return;
+  std::fprintf(stderr, "%s: cannot write the output: %s\n", program_name.c_str(), std::strerror(errno));
+  std::_Exit(kFailed);
+}
 
 std::string version() {
   return std::to_string(GSNAV_VERSION_MAJOR) + "." + std::to_string(GSNAV_VERSION_MINOR) + "." +
@@ -34,6 +47,14 @@ std::string unknown_option(const CLI::App& app) {
     return "there is no option " + option;
   }
   return {};
+}
+
+/// Error message for a word that is no command, where the program has commands. Else empty.
+std::string unknown_command(const CLI::App& app) {
+  if (app.get_require_subcommand_min() == 0 || !app.get_subcommands().empty()) return {};
+  const std::vector<std::string> rest = app.remaining(true);
+  if (rest.empty() || rest.front().starts_with("-")) return {};
+  return "there is no command " + rest.front();
 }
 
 /// Makes negative numbers errors where an option takes an unsigned one. CLI11 would wrap them round.
@@ -85,12 +106,16 @@ std::optional<int> parse_options(CLI::App& app, int argc, const char* const* arg
   app.set_version_flag("--version", name + " " + version());
   std::setvbuf(stdout, nullptr, _IOLBF, BUFSIZ);  // Line buffering keeps output to a pipe in order with
                                                   // errors.
+  program_name = name;
+  static const int registered = std::atexit(check_stdout);
+  static_cast<void>(registered);
   try {
     app.parse(argc, argv);
     if (check) check();
   } catch (const CLI::ParseError& error) {
-    if (const std::string unknown = unknown_option(app);
-        !unknown.empty() && error.get_exit_code() != 0) {
+    std::string unknown = unknown_command(app);
+    if (unknown.empty()) unknown = unknown_option(app);
+    if (!unknown.empty() && error.get_exit_code() != 0) {
       std::fprintf(stderr, "%s: %s\nRun with --help for more information.\n", name.c_str(),
                    gsnav::printable(unknown).c_str());
       return kUsage;

@@ -88,8 +88,7 @@ void add_navmesh_options(CLI::App& app, SceneOptions& o) {
         const std::string name = gsnav::lower_case(v);
         const bool known = v == "auto" || v == "mesh" || v == "gaussians" || v == "none";
         if (known || name.ends_with(".navmesh") || name.ends_with(".bin")) return std::string();
-        return "--navmesh " + v +
-               ": use auto, mesh, gaussians, none, or a file that ends in .navmesh or .bin";
+        return v + ": use auto, mesh, gaussians, none, or a file that ends in .navmesh or .bin";
       })
       ->group(kGroup);
   add_voxel_options(app, o.cell_size, o.crop, kGroup);
@@ -146,6 +145,14 @@ void add_scene_options(CLI::App& app, SceneOptions& o, bool* float64) {
   add_density_option(app, o,
                      "density of Gaussians in the embedded flat and in people, relative to the default");
   add_device_option(app, o.device, float64);
+}
+
+void refuse_scene_options(CLI::App& app, std::initializer_list<UnusedOption> unused) {
+  for (const UnusedOption& o : unused) {
+    app.add_option_function<std::vector<std::string>>(
+           o.name, [o](const std::vector<std::string>&) { throw CLI::ValidationError(o.name, o.why); })
+        ->group("");  // not in --help
+  }
 }
 
 gsnav::OpenOptions open_options(const SceneOptions& o) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <cstdio>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -54,6 +55,14 @@ void add_scene_file_options(CLI::App& app, SceneOptions& o);
 void add_scene_mesh_option(CLI::App& app, SceneOptions& o);
 /// Adds all scene options, with the values of `o` as defaults. See add_device_option for `float64`.
 void add_scene_options(CLI::App& app, SceneOptions& o, bool* float64 = nullptr);
+
+/// A scene option that has no effect in a program, and why.
+struct UnusedOption {
+  const char *name, *why;
+};
+/// Makes the options errors with these reasons, so that each program knows the one set of scene options.
+void refuse_scene_options(CLI::App& app, std::initializer_list<UnusedOption> unused);
+
 /// Converts the options to those of the library.
 gsnav::OpenOptions open_options(const SceneOptions& o);
 

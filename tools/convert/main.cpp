@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "../common/parse_options.hpp"
+#include "../common/scene_options.hpp"
+#include "../common/voxel_options.hpp"
 #include "compare.hpp"
 #include "gsnav/core/lower_case.hpp"
 #include "gsnav/io.hpp"
@@ -23,7 +25,7 @@ namespace {
 using namespace gsnav;
 
 struct Options {
-  std::vector<std::string> paths;
+  std::vector<std::string> inputs, paths;  ///< Those of --scene; IN... OUT.
   std::vector<double> crop, rotate, translate;
   std::string cameras, order = "read", up = "keep";
   double time = 0, density = 1, scale = 1, min_opacity = 0, max_scale = 0;
@@ -54,8 +56,8 @@ Status add_scene(const std::string& name, const Options& o, GaussianCloud& all) 
 
 Result<GaussianCloud> load(const Options& o) {
   GaussianCloud all;
-  for (std::size_t k = 0; k + 1 < o.paths.size(); ++k) {
-    if (Status s = add_scene(o.paths[k], o, all); !s) return s;
+  for (const std::string& input : o.inputs) {
+    if (Status s = add_scene(input, o, all); !s) return s;
   }
   return all;
 }
@@ -81,14 +83,14 @@ Status validate(const Options& o) {
   return {};
 }
 
-/// Crops and prunes in the axes of the input. Then rotates, scales and moves, in this order.
+/// Turns the scene upright, crops and prunes. Then rotates, scales and moves, in this order.
 Status edit(GaussianCloud& cloud, const Options& o) {
-  if (!o.crop.empty()) {
-    Aabb<double> box;
-    box.add(Vec3d{o.crop[0], o.crop[1], o.crop[2]});
-    box.add(Vec3d{o.crop[3], o.crop[4], o.crop[5]});
-    crop(cloud, box);
+  if (o.up != "keep") {
+    const auto turned = upright(o.up == "auto" ? axis_name(guess_up(cloud).up) : o.up);
+    if (!turned) return {turned.code(), "--up: " + turned.message()};
+    transform(cloud, *turned);
   }
+  if (!o.crop.empty()) crop(cloud, gsnav_tools::box_of(o.crop));
   if (o.min_opacity > 0 || o.max_scale > 0) {
     filter_rows(cloud, [&](std::size_t i) {
       bool keep = static_cast<double>(cloud.opacities[i]) >= o.min_opacity;
@@ -106,13 +108,8 @@ Status edit(GaussianCloud& cloud, const Options& o) {
     if (!(norm(axis) > 0)) return {Errc::invalid_argument, "--rotate: the axis is zero"};
     by.rotation = axis_angle(normalized(axis), o.rotate[3] * 3.14159265358979323846 / 180);
   }
-  if (o.up != "keep") {
-    const auto turned = upright(o.up == "auto" ? axis_name(guess_up(cloud).up) : o.up);
-    if (!turned) return {turned.code(), "--up: " + turned.message()};
-    by.rotation = by.rotation * turned->rotation;
-  }
   if (!o.translate.empty()) by.translation = {o.translate[0], o.translate[1], o.translate[2]};
-  if (o.up != "keep" || !o.rotate.empty() || !o.translate.empty() || o.scale != 1) transform(cloud, by);
+  if (!o.rotate.empty() || !o.translate.empty() || o.scale != 1) transform(cloud, by);
   if (cloud.size() == 0) return {Errc::invalid_argument, "no Gaussian is left"};
   if (!is_finite(cloud))
     return {Errc::invalid_argument,
@@ -190,42 +187,42 @@ Status compare(const GaussianCloud& source, const std::vector<std::uint32_t>& ro
   return {};
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  Options o;
-  CLI::App app{
-      "Converts scenes of 3D Gaussians. Several inputs are merged.\nThe extension of OUT chooses the "
-      "format: .ply, .compressed.ply, .splat, .spz, .sog, DIR/meta.json or .glb.\nReads the file back "
-      "and prints the largest error of each field and of images.\nExample: gsnav-convert apartment.ply "
-      "room.spz --crop -4 -3 -4 4 0 4"};
+void add_inputs(CLI::App& app, Options& o) {
   app.add_option(
          "paths", o.paths,
          "IN... OUT; an input is a file, a folder of a SOG or a streamed set, tiles (DIR/2_0,2_1), a "
          "Habitat scene (SET.scene_dataset_config.json#NAME), or default, the embedded flat")
-      ->required()
-      ->expected(2, -1);
+      ->expected(1, -1);
+  app.add_option("--scene", o.inputs, "an input, like IN; may be repeated")
+      ->allow_extra_args(false)
+      ->type_name("SCENE");
   app.add_option("--level", o.level, "level of streamed sets; 0 is the finest");
   app.add_option("--time", o.time, "time of a scene that moves (4D Gaussians), seconds");
   app.add_option("--density", o.density, "density of the Gaussians of the embedded flat")
       ->check(CLI::Range(0.05, 20.0))
       ->capture_default_str();
+  app.add_option("--up", o.up,
+                 "axis of the file that points up: x, y, z, -x, -y or -z; it becomes +Y; auto guesses "
+                 "it from the ground; keep leaves the axes of the file")
+      ->check(CLI::IsMember({"keep", "auto", "x", "y", "z", "+x", "+y", "+z", "-x", "-y", "-z"}))
+      ->capture_default_str();
   app.add_option("--crop", o.crop,
-                 "keep Gaussians with their centre in X0 Y0 Z0 X1 Y1 Z1, metres, axes of the input")
+                 "keep Gaussians with their centre in X0 Y0 Z0 X1 Y1 Z1, metres, axes of --up")
       ->expected(6);
+}
+
+void add_edits(CLI::App& app, Options& o) {
   app.add_option("--min-opacity", o.min_opacity, "drop Gaussians with a lower opacity")
       ->check(CLI::Range(0.0, 1.0));
   app.add_option("--max-scale", o.max_scale, "drop Gaussians with a larger standard deviation, metres");
   app.add_option("--sh", o.degree, "keep SH bands up to this degree")
       ->check(CLI::Range(0, kMaxShDegree));
-  app.add_option("--up", o.up,
-                 "turn the scene so that this axis becomes +Y: x, y, z, -x, -y or -z; auto guesses it "
-                 "from the ground")
-      ->check(CLI::IsMember({"keep", "auto", "x", "y", "z", "+x", "+y", "+z", "-x", "-y", "-z"}))
-      ->capture_default_str();
   app.add_option("--rotate", o.rotate, "then turn about the axis X Y Z by DEGREES")->expected(4);
   app.add_option("--scale", o.scale, "then scale by this factor")->check(CLI::PositiveNumber);
   app.add_option("--translate", o.translate, "then move by X Y Z metres")->expected(3);
+}
+
+void add_output(CLI::App& app, Options& o) {
   app.add_option(
          "--order", o.order,
          "order of the Gaussians in the file: read keeps the order of the input, which decides ties of "
@@ -239,7 +236,47 @@ int main(int argc, char** argv) {
   app.add_option("--width", o.width, "width of the compared images, pixels")->check(CLI::Range(1, 8192));
   app.add_option("--height", o.height, "height of the compared images, pixels")
       ->check(CLI::Range(1, 8192));
-  if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
+}
+
+/// The scene options that have no effect here.
+void refuse_others(CLI::App& app) {
+  const char* in_file = "the file to write decides how Gaussians are stored";
+  const char* exact = "images are compared in full quality";
+  const char* no_navmesh = "scene files hold no NavMesh: gsnav-navmesh builds one";
+  const char* no_people = "scene files hold no people: gsnav-avatar makes them";
+  gsnav_tools::refuse_scene_options(
+      app, {{"--storage", in_file},
+            {"--profile", exact},
+            {"--lod-error", exact},
+            {"--lod-levels", "one level is converted: see --level"},
+            {"--visible-sets", "rows are in another order afterwards: gsnav-navmesh makes sets"},
+            {"--mesh", "the formats hold Gaussians only"},
+            {"--navmesh", no_navmesh},
+            {"--cell-size", no_navmesh},
+            {"--avatars", no_people},
+            {"--seed", no_people},
+            {"--device", "images are compared on the processor"}});
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options o;
+  CLI::App app{
+      "Converts scenes of 3D Gaussians. Several inputs are merged.\nThe extension of OUT chooses the "
+      "format: .ply, .compressed.ply, .splat, .spz, .sog, DIR/meta.json or .glb.\nReads the file back "
+      "and prints the largest error of each field and of images.\nExample: gsnav-convert apartment.ply "
+      "room.spz --crop -4 -3 -4 4 0 4"};
+  add_inputs(app, o);
+  add_edits(app, o);
+  add_output(app, o);
+  refuse_others(app);
+  const auto status = gsnav_tools::parse_options(app, argc, argv, [&o] {
+    if (o.inputs.size() + o.paths.size() < 2 || o.paths.empty())
+      throw CLI::ValidationError("IN... OUT", "an input and an output are needed");
+    o.inputs.insert(o.inputs.end(), o.paths.begin(), o.paths.end() - 1);
+  });
+  if (status) return *status;
 
   const std::string out = o.paths.back();
   if (Status s = validate(o); !s) return fail(s.message());
@@ -254,6 +291,11 @@ int main(int argc, char** argv) {
     cloud->row_ids.clear();
     std::printf("%s: rows along a curve through space%s: where depths are equal, images differ\n",
                 printable(out).c_str(), chunks ? ", as the format's chunks need them" : "");
+  }
+  for (const std::string& input : o.inputs) {
+    std::error_code ignored;
+    if (std::filesystem::equivalent(input, out, ignored))
+      std::printf("%s: replaces the input\n", printable(out).c_str());
   }
   const std::vector<std::uint32_t> rows = rows_as_read(*cloud);
   if (Status s = io::save_scene(out, *cloud); !s) return fail(s.message());

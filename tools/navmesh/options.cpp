@@ -269,6 +269,16 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   add_build(app, o, given);
   add_gaussians(app, o, given);
   add_visible_sets(app, o);
+  const char* no_image = "gsnav-navmesh draws no images";
+  const char* no_people = "a NavMesh has no people: gsnav-eval and gsnav-viewer add them";
+  gsnav_tools::refuse_scene_options(
+      app, {{"--storage", "a NavMesh is built from Gaussians as they are in the file"},
+            {"--profile", no_image},
+            {"--lod-error", no_image},
+            {"--lod-levels", "a NavMesh is built from the finest level"},
+            {"--avatars", no_people},
+            {"--seed", no_people},
+            {"--device", "NavMeshes and visible sets are built on the processor: see --threads"}});
   const auto status =
       gsnav_tools::parse_options(app, argc, argv, [&] { check_together(app, o, given); });
   if (status) {
