@@ -267,5 +267,8 @@ void launch_ordering(const BatchArgs& args, int multiprocessors, cudaStream_t st
 /// @param rgb8 8-bit image, or null. May be combined with raster.images.rgb.
 void launch_blending(const BatchArgs& args, const RasterArgs<float>& raster, std::uint8_t* rgb8,
                      cudaStream_t stream);
+/// Replaces the slots of median Gaussians by their depths, unless blending has done it. Without
+/// `args.sources`, slots are sources.
+void launch_depths(const BatchArgs& args, const RasterArgs<float>& raster, cudaStream_t stream);
 
 }  // namespace gsnav::cuda

@@ -206,7 +206,7 @@ __device__ __noinline__ void depth_record64(const ViewedSet<float>& args, const 
 
 /// Depth record of a slot's Gaussian.
 __device__ SplatDepth<float> depth_record(const BatchArgs& a, std::uint32_t camera, std::uint32_t slot) {
-  const std::uint32_t source = a.sources[slot];
+  const std::uint32_t source = a.sources == nullptr ? slot : a.sources[slot];
   const ViewedSet<float>& args = instance_of(a, camera, source).args;
   const ViewedRow row({args.gaussians.shape, source - args.first_rank}, args.offsets);
   const RowKey<float> key = row_key<float>(args.camera64, row);
@@ -268,6 +268,10 @@ void launch_blending(const BatchArgs& args, const RasterArgs<float>& raster, std
       kernel<<<args.tiles, kThreads, sizeof(BlendShared), stream>>>(b);
     });
   }
+  launch_depths(args, raster, stream);
+}
+
+void launch_depths(const BatchArgs& args, const RasterArgs<float>& raster, cudaStream_t stream) {
   if (raster.depth_mode() == DepthMode::median && raster.mesh.empty()) {
     const auto blocks = [](int pixels, unsigned of) {
       return (static_cast<unsigned>(pixels) + of - 1) / of;

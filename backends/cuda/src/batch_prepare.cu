@@ -135,7 +135,8 @@ std::size_t CudaBatchRenderer::State::list_camera_sets(std::span<const GaussianS
 
 /// Reserves one pinned block, and the same size on the device, for the inputs of a call.
 cuda::InputPlaces CudaBatchRenderer::State::reserve_inputs(std::size_t sets, std::size_t cameras,
-                                                           std::size_t origins, bool plain_rules) {
+                                                           std::size_t origins, bool plain_rules,
+                                                           bool by_regions) {
   cuda::Layout layout;
   cuda::InputPlaces at;
   at.sets = layout.add<BatchSet>(sets);
@@ -144,6 +145,11 @@ cuda::InputPlaces CudaBatchRenderer::State::reserve_inputs(std::size_t sets, std
   at.first = layout.add<std::uint32_t>(cameras + 1);
   at.list = layout.add<std::uint32_t>(camera_sets.size());
   at.offsets = layout.add<Vec3d>(origins);
+  if (by_regions) {
+    at.region_sets = layout.add<cuda::RegionSet>(sets);
+    at.region_views = layout.add<cuda::RegionView>(camera_sets.size());
+    at.camera_rows = layout.add<std::uint32_t>(cameras);
+  }
   cuda::Flight& flight = flights[calls % cuda::policy::Batch::kInFlight];
   cuda::need(cudaEventSynchronize(flight.done), "waiting for an earlier batch");
   flight.inputs.reserve(layout.bytes());
@@ -272,8 +278,10 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
                                          const BatchImages& images) {
   const std::size_t origins = list_camera_sets(sets, cameras);
   const bool plain_rules = has_plain_rules(config, sets, cameras);
-  const cuda::InputPlaces at = reserve_inputs(sets.size(), cameras.size(), origins, plain_rules);
-  fill_instances(sets, cameras, at, plain_rules);
+  const bool by_regions = uses_regions(sets, cameras, images);
+  const cuda::InputPlaces at =
+      reserve_inputs(sets.size(), cameras.size(), origins, plain_rules || by_regions, by_regions);
+  fill_instances(sets, cameras, at, plain_rules || by_regions);
 
   args = {};
   args.color = images.floats.rgb != nullptr || images.rgb8 != nullptr;
@@ -291,6 +299,12 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
   args.cameras = static_cast<std::uint32_t>(cameras.size());
   std::uint64_t gaussians = 0;
   for (const CameraSet& v : camera_sets) gaussians += sets[v.set].gaussians.size();
+  region_args = {};
+  if (by_regions) {
+    plan_regions(sets, cameras, gaussians, at);
+    set_raster(images);
+    return {};
+  }
   const bool few = plan_tiles(cameras, gaussians);
   if (args.tiles > cuda::kMostTiles)
     return {Errc::unsupported, "CudaBatchRenderer: more than 2^31 tiles in one batch"};

@@ -21,12 +21,23 @@ std::size_t bin_words(const cuda::BatchArgs& args) {
   return std::size_t{args.tiles} << args.depth_bins.bits;
 }
 
+/// Counters of a call. Those of lists of regions are its pairs and the rows that may need double.
+cuda::BatchCounters counters_of(const cuda::Flight& flight) {
+  if (flight.key.regions.sets == nullptr) return *flight.counters;
+  cuda::BatchCounters n{};
+  n.pairs = flight.region_counters->pairs;
+  n.high_precision = flight.region_counters->far_rows;
+  n.items = static_cast<std::uint32_t>(flight.region_counters->groups);
+  return n;
+}
+
 /// Number of 32-bit words that are zeroed before a call: its counters and bins.
 std::size_t zeroed_words(const cuda::BatchArgs& args) { return kCounterWords + bin_words(args); }
 
 }  // namespace
 
 void CudaBatchRenderer::State::size_scratch() {
+  if (region_args.sets != nullptr) return size_regions();
   const auto exactly = [](auto& array, std::size_t n) {
     array.resize_exactly(n);
     return array.data();
@@ -92,11 +103,11 @@ void CudaBatchRenderer::State::size_scratch() {
       long_parts.capacity_bytes() + zeroed.capacity_bytes() + tile_counts.capacity_bytes() +
       tile_begins.capacity_bytes() + tile_shifts.capacity_bytes() + tile_order.capacity_bytes() +
       pairs.capacity_bytes() + pairs_alt.capacity_bytes() + beyond.capacity_bytes() +
-      depths.capacity_bytes() + perspectives.capacity_bytes() + meshes.bytes();
+      depths.capacity_bytes() + perspectives.capacity_bytes() + meshes.bytes() + regions.bytes();
 }
 
 void CudaBatchRenderer::State::fit_room(const cuda::BatchCounters& n) {
-  if (args.list_room == 0) return;
+  if (args.list_room == 0 || region_args.sets != nullptr) return;
   // Ignore small differences, because arrays would move and launches would be recorded again.
   const std::uint32_t wanted = room_for(n.pairs);
   if (n.beyond > n.pairs / cuda::policy::Capacity::kPairsPerBeyond && wanted > list_room + list_room / 8)
@@ -106,6 +117,14 @@ void CudaBatchRenderer::State::fit_room(const cuda::BatchCounters& n) {
 void CudaBatchRenderer::State::enqueue(const cuda::Flight& flight) {
   const cudaStream_t stream = backend.stream();
   cudaMemcpyAsync(inputs.data(), flight.inputs.data, input_bytes, cudaMemcpyHostToDevice, stream);
+  if (region_args.sets != nullptr) {
+    backend.fill(regions.zeroed.data(), 0, regions.zeroed_words * sizeof(std::uint32_t));
+    cuda::launch_region_rows(args, region_args, multiprocessors, stream);
+    cuda::launch_region_lists(args, region_args, multiprocessors, stream);
+    cuda::launch_region_drawing(args, region_args, raster, rgb8, multiprocessors, stream);
+    return backend.copy(flight.region_counters, region_args.counters, sizeof(cuda::RegionCounters),
+                        CopyKind::device_to_host);
+  }
   backend.fill(zeroed.data(), 0, zeroed_words(args) * sizeof(std::uint32_t));
   cuda::launch_culling(args, multiprocessors, stream);
   cuda::launch_projection(args, multiprocessors, stream);
@@ -139,7 +158,8 @@ Status CudaBatchRenderer::State::launch() {
   flight.triangle_capacity = triangle_capacity;
   size_scratch();
   const cuda::LaunchKey key{
-      args, raster.images, rgb8, raster.mesh.depth, raster.mesh.color, flight.inputs.data, input_bytes};
+      args,        raster.images, rgb8, raster.mesh.depth, raster.mesh.color, flight.inputs.data,
+      input_bytes, region_args};
   if (key != flight.key) {
     flight.forget_recorded();
     flight.key = key;
@@ -188,7 +208,7 @@ Status CudaBatchRenderer::render(std::span<const GaussianSet> sets, std::span<co
 }
 
 bool CudaBatchRenderer::State::fit_capacities(const cuda::Flight& flight) {
-  const cuda::BatchCounters& n = *flight.counters;
+  const cuda::BatchCounters n = counters_of(flight);
   const cuda::BatchArgs& was = flight.key.args;
   bool had = true;
   // A later call may have grown it already.
@@ -197,6 +217,12 @@ bool CudaBatchRenderer::State::fit_capacities(const cuda::Flight& flight) {
     if (count > capacity) capacity = grown(count);
     had = false;
   };
+  if (flight.key.regions.sets != nullptr) {
+    fit(regions.pair_capacity, flight.key.regions.pair_capacity, n.pairs);
+    fit(regions.far_capacity, flight.key.regions.far_capacity, n.high_precision);
+    fit(regions.group_capacity, flight.key.regions.group_capacity, n.items);
+    return had;
+  }
   fit(slot_capacity, was.slot_capacity, n.slots);
   fit(high_precision_capacity, was.high_precision_capacity, n.high_precision);
   fit(several_capacity, was.several_capacity, n.several);
@@ -222,7 +248,7 @@ Status CudaBatchRenderer::finish() {
       return {Errc::backend_failure, std::string("CudaBatchRenderer: the batch failed on the device: ") +
                                          cudaGetErrorString(e)};
     }
-    const cuda::BatchCounters& n = *flight.counters;
+    const cuda::BatchCounters n = counters_of(flight);
     const cuda::MeshCounters of_meshes =
         flight.has_meshes ? *flight.mesh_counters : cuda::MeshCounters{};
     // Places of pairs have 32 bits, and each list has space for at least one pair.
@@ -239,7 +265,8 @@ Status CudaBatchRenderer::finish() {
     if (last && s.prepared) s.fit_room(n);
     s.taken = {flight.key.args.cameras, n.slots, n.pairs};
     s.stats.tile_intersections = n.pairs;
-    s.stats.parts_read = n.items;
+    s.stats.by_regions = flight.key.regions.sets != nullptr;
+    s.stats.parts_read = s.stats.by_regions ? 0 : n.items;
     s.stats.meshes = {flight.mesh_triangles, of_meshes.not_finite, of_meshes.drawn, 0};
     if (had_room || !last || !s.prepared) {
       lost = lost || !had_room;  // Another call has overwritten its images.

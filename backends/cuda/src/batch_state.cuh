@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "batch_args.cuh"
+#include "batch_region_arrays.cuh"
 #include "gsnav/backends/cuda/batch.hpp"
 #include "gsnav/core/buffer.hpp"
 #include "mesh.cuh"
@@ -31,6 +32,7 @@ struct LaunchKey {
   const float *mesh_depth = nullptr, *mesh_color = nullptr;
   const unsigned char* inputs = nullptr;  ///< Pinned memory.
   std::size_t input_bytes = 0;
+  RegionArgs regions{};
   bool operator==(const LaunchKey&) const = default;
 };
 
@@ -72,6 +74,7 @@ struct Flight {
   PinnedBlock inputs, mesh_inputs;
   BatchCounters* counters = nullptr;
   MeshCounters* mesh_counters = nullptr;
+  RegionCounters* region_counters = nullptr;
   bool has_meshes = false;
   std::uint64_t mesh_triangles = 0;  ///< Sum over all instances.
   std::uint32_t triangle_capacity = 0;
@@ -153,6 +156,7 @@ void for_each_set(const BatchCamera& camera, std::size_t sets, const F& f) {
 /// (`host`) and on the device.
 struct InputPlaces {
   std::size_t sets = 0, instances = 0, plain = 0, first = 0, list = 0, offsets = 0;
+  std::size_t region_sets = 0, region_views = 0, camera_rows = 0;  ///< If regions have lists.
   unsigned char* host = nullptr;
   unsigned char* device = nullptr;
 
@@ -200,14 +204,20 @@ struct CudaBatchRenderer::State {
         pairs(b),
         pairs_alt(b),
         beyond(b),
-        meshes(b) {
+        meshes(b),
+        regions(b) {
     int device = 0;
     cuda::need(cudaGetDevice(&device), "cudaGetDevice");
     cuda::need(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device),
                "cudaDeviceGetAttribute");
+    int bytes = 0;
+    cuda::need(cudaDeviceGetAttribute(&bytes, cudaDevAttrMaxSharedMemoryPerBlockOptin, device),
+               "cudaDeviceGetAttribute");
+    shared_bytes = static_cast<std::uint32_t>(bytes);
     for (cuda::Flight& f : flights) {
       cuda::need(cudaMallocHost(&f.counters, sizeof(cuda::BatchCounters)), "cudaMallocHost");
       cuda::need(cudaMallocHost(&f.mesh_counters, sizeof(cuda::MeshCounters)), "cudaMallocHost");
+      cuda::need(cudaMallocHost(&f.region_counters, sizeof(cuda::RegionCounters)), "cudaMallocHost");
       cuda::need(cudaEventCreateWithFlags(&f.done, cudaEventDisableTiming), "cudaEventCreate");
     }
   }
@@ -219,6 +229,7 @@ struct CudaBatchRenderer::State {
       f.mesh_inputs.release();
       if (f.counters != nullptr) cudaFreeHost(f.counters);
       if (f.mesh_counters != nullptr) cudaFreeHost(f.mesh_counters);
+      if (f.region_counters != nullptr) cudaFreeHost(f.region_counters);
       if (f.done != nullptr) cudaEventDestroy(f.done);
     }
   }
@@ -228,13 +239,20 @@ struct CudaBatchRenderer::State {
   // Steps of prepare().
   std::size_t list_camera_sets(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras);
   cuda::InputPlaces reserve_inputs(std::size_t sets, std::size_t cameras, std::size_t origins,
-                                   bool plain_rules);
+                                   bool plain_rules, bool by_regions);
   void fill_instances(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                       const cuda::InputPlaces& at, bool plain_rules);
   bool plan_units(std::span<const GaussianSet> sets, const cuda::InputPlaces& at);
   bool plan_tiles(std::span<const BatchCamera> cameras, std::uint64_t gaussians);
   void set_raster(const BatchImages& images);
   void guess_capacities(std::uint64_t gaussians, bool few);
+  /// True if the call is drawn by lists of regions.
+  bool uses_regions(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
+                    const BatchImages& images) const;
+  /// Writes the inputs of a call that is drawn by lists of regions, and sets its arguments.
+  void plan_regions(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
+                    std::uint64_t gaussians, const cuda::InputPlaces& at);
+  void size_regions();
   /// Writes the meshes that the prepared cameras see into the call's pinned memory.
   Status place_meshes(std::span<const BatchCamera> cameras);
   // Steps of place_meshes().
@@ -261,6 +279,7 @@ struct CudaBatchRenderer::State {
   CudaBackend& backend;
   RenderConfig config;
   int multiprocessors = 0;
+  std::uint32_t shared_bytes = 0;  ///< Largest shared memory of a block.
   std::array<cuda::Flight, cuda::policy::Batch::kInFlight> flights;
   std::size_t calls = 0, finished = 0;  ///< Number of calls made, and number of calls whose counters
                                         ///< have been read.
@@ -279,7 +298,9 @@ struct CudaBatchRenderer::State {
   Array<cuda::Pair> pairs, pairs_alt;
   Array<cuda::BeyondPair> beyond;
   cuda::BatchMeshes meshes;
+  cuda::BatchRegions regions;
   cuda::BatchArgs args{};
+  cuda::RegionArgs region_args{};  ///< No `sets`: the call is not drawn by lists of regions.
   RasterArgs<float> raster;
   std::uint8_t* rgb8 = nullptr;
   std::size_t input_bytes = 0;

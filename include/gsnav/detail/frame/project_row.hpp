@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <type_traits>
 
 #include "gsnav/detail/frame/projection.hpp"
 #include "gsnav/detail/frame/projection_camera.hpp"
@@ -108,7 +109,16 @@ GSNAV_HD void project_mean(const ProjectionCamera<double>& camera, const Vec3<L>
 template <class L>
 GSNAV_HD L reference_pixel(L x, int size) noexcept {
   using S = scalar_of<L>;
-  return truncated(clamp(x, L(S(0)), L(static_cast<S>(size - 1)))) + L(S(0.5));
+#if defined(__CUDA_ARCH__)
+  // The same pixel with fewer instructions: on a GPU, conversions to integers saturate.
+  if constexpr (std::is_same_v<L, double>) {
+    const int pixel = static_cast<int>(x);
+    return (pixel < 0 ? 0 : pixel < size ? pixel : size - 1) + 0.5;
+  } else
+#endif
+  {
+    return truncated(clamp(x, L(S(0)), L(static_cast<S>(size - 1)))) + L(S(0.5));
+  }
 }
 
 }  // namespace detail

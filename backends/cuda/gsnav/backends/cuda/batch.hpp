@@ -39,13 +39,15 @@ struct BatchImages {
 struct BatchStats {
   std::uint64_t tile_intersections =
       0;  ///< Number of (tile, Gaussian) pairs. See docs/notes/cuda.md for the size of tiles.
-  std::uint64_t parts_read =
-      0;  ///< Number of parts (kChunkPart rows) that may be in view, counted once per 32 cameras.
+          ///< With lists of regions, of (region, Gaussian) pairs.
+  std::uint64_t parts_read = 0;  ///< Number of parts (kChunkPart rows) that may be in view, counted once
+                                 ///< per 32 cameras. With lists of regions, 0.
   std::uint64_t scratch_bytes = 0;  ///< Device memory for scratch, in bytes, without scene and images.
   int reruns = 0;                   ///< How often the batch was drawn again because scratch had to grow.
-  bool replayed = false;  ///< True if a recorded CUDA graph was replayed. Calls that differ only in
-                          ///< their cameras are replayed.
-  MeshStats meshes;       ///< Statistics of the meshes.
+  bool replayed = false;    ///< True if a recorded CUDA graph was replayed. Calls that differ only in
+                            ///< their cameras are replayed.
+  bool by_regions = false;  ///< True if the batch was drawn by lists of regions (docs/notes/cuda.md).
+  MeshStats meshes;         ///< Statistics of the meshes.
 };
 
 /// Renders many cameras in one call on one GPU (docs/notes/cuda.md). Images are bit-identical to those

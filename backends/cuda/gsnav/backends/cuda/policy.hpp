@@ -93,6 +93,34 @@ struct BlendSmall {
                                                  ///< slower.
 };
 
+/// Small images of many cameras, drawn by lists of regions.
+struct Regions {
+  /// Largest width and height of an image, and of depth alone if cameras see kManyGaussians or more
+  /// each. In larger images, too many tiles project the same row.
+  static constexpr int kSide = 64, kSideOfDepth = 128;
+  static constexpr std::uint64_t kManyGaussians = 600'000;
+  /// Fewer cameras do not keep all multiprocessors busy.
+  static constexpr std::size_t kLeastCameras = 128;
+  static constexpr std::uint64_t kMostRows = (1u << 20) - (1u << 14);  ///< Largest number per camera.
+  static constexpr std::uint32_t kMostFarRows = 1u << 13;              ///< Largest number of their
+                                                                       ///< records per camera.
+  /// Depth bins of all regions of an image, and of one region. They cover kOctaves octaves, of which
+  /// kOctavesBelow are nearer than the mean.
+  static constexpr std::uint32_t kBins = 20480, kMostBins = 1280, kOctaves = 5, kOctavesBelow = 3;
+  static constexpr unsigned kRowThreads = 256, kCullThreads = 256, kCullBlocks = 16;
+  static constexpr unsigned kListThreads = 1024, kListResident = 1, kGroupsAtOnce = 4;
+  static constexpr unsigned kFarThreads = 128, kOrderThreads = 256;
+  /// A tile is drawn in quarters or halves if its list is longer than this fraction of the rows that a
+  /// warp reads on average.
+  static constexpr float kQuarters = 0.8f, kHalves = 0.4f;
+  static constexpr unsigned kDrawWarps = 4, kDrawResident = 4;
+  /// Numbers of rows: the most that a warp holds, those that it collects, and the fewest that it draws.
+  static constexpr std::uint32_t kHeld = 256, kTarget = 160, kLeast = 48;
+  static constexpr std::uint32_t kStaged = 64;     ///< Splats staged before they are drawn.
+  static constexpr std::uint32_t kReadAtOnce = 4;  ///< Batches of 32 rows of a list.
+  static constexpr std::uint64_t kGaussiansPerPair = 2, kPairsPerFarRow = 16;  ///< First estimates.
+};
+
 struct MedianDepth {
   static constexpr unsigned kColumns = 16, kRows = 8;  ///< Pixels per block.
   static constexpr int kResident = 6;

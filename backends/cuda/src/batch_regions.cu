@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "batch_state.cuh"
+
+// Host side of calls that are drawn by lists of regions.
+
+namespace gsnav {
+
+namespace {
+
+using Policy = cuda::policy::Regions;
+
+/// Largest squared radius of a footprint, in standard deviations.
+double largest_radius2(const RenderConfig& config) {
+  return -log2_alpha_min(config.quality) / (kWhitenScale * kWhitenScale);
+}
+
+/// Pixels outside the image at which a record may need double (detail::needs_double). The whitened form
+/// of a pixel is at most this factor times its distance.
+double whitened_per_pixel(const GaussianSet& set) {
+  return kWhitenScale / std::sqrt(static_cast<double>(set.eps2d));
+}
+
+bool fits_regions(const GaussianSet& set, const Camera& camera) {
+  // Lengths of the image alone never ask for double.
+  return set.filter == Filter::classic && set.gaussians.shape.axes.empty() &&
+         !set.gaussians.shape.packed() && set.gaussians.color.rotations.empty() &&
+         set.gaussians.shape.origin_ids.empty() && set.selection.drawn_chunks.empty() &&
+         whitened_per_pixel(set) * (camera.width + camera.height) * 1.01 < 512;
+}
+
+cuda::RegionView region_view(const cuda::BatchInstance& instance, const GaussianSet& set,
+                             double radius2) {
+  const ProjectionCamera<double>& c = instance.args.camera64;
+  cuda::RegionView v{};
+  const double limit_x = std::max(std::abs(c.u_min), std::abs(c.u_max));
+  const double limit_y = std::max(std::abs(c.v_min), std::abs(c.v_max));
+  const double fixed = std::sqrt(c.eps2d * radius2) + 0.05;
+  const auto plane = [&](int i, int axis, double f, double rest, double limit, double extent) {
+    for (int k = 0; k < 3; ++k)
+      v.plane[i][k] = static_cast<float>(f * c.rotation(axis, k) + rest * c.rotation(2, k));
+    v.wide[i] = static_cast<float>(1.05 * std::abs(f) * std::sqrt(1 + limit * limit));
+    v.slack[i] = static_cast<float>(1e-5 * (std::abs(f) + std::abs(rest) + extent));
+  };
+  plane(0, 0, c.fx, c.cx + fixed, limit_x, c.width);
+  plane(1, 0, -c.fx, c.width - c.cx + fixed, limit_x, c.width);
+  plane(2, 1, c.fy, c.cy + fixed, limit_y, c.height);
+  plane(3, 1, -c.fy, c.height - c.cy + fixed, limit_y, c.height);
+  for (int k = 0; k < 3; ++k) v.axis[k] = static_cast<float>(c.rotation(2, k));
+  v.nearest = static_cast<float>(c.near_plane / c.scale * (1 - 1e-6));
+  v.limit2_x = static_cast<float>(limit_x * limit_x * 1.00001);
+  v.limit2_y = static_cast<float>(limit_y * limit_y * 1.00001);
+  v.inverse_scale = static_cast<float>(1 / c.scale);
+  v.near_sigma = instance.args.camera.near_sigma;
+  v.far_limit = static_cast<float>(0.5 * (c.width + c.height) + 15.5 / whitened_per_pixel(set) - 2);
+  v.rounding = static_cast<float>((std::abs(c.fx) + std::abs(c.fy)) * 4e-6);
+  v.camera = instance.camera;
+  return v;
+}
+
+}  // namespace
+
+bool CudaBatchRenderer::State::uses_regions(std::span<const GaussianSet> sets,
+                                            std::span<const BatchCamera> cameras,
+                                            const BatchImages& images) const {
+  const Camera& first = cameras[0].camera;
+  const FrameImages<float>& f = images.floats;
+  const bool depth_alone = f.rgb == nullptr && images.rgb8 == nullptr && f.alpha == nullptr;
+  std::uint64_t gaussians = 0;
+  for (const CameraSet& v : camera_sets) gaussians += sets[v.set].gaussians.size();
+  const bool many = depth_alone && gaussians >= Policy::kManyGaussians * cameras.size();
+  if (cameras.size() < Policy::kLeastCameras ||
+      std::max(first.width, first.height) > (many ? Policy::kSideOfDepth : Policy::kSide) ||
+      config.response != Response::ewa || config.compat != Compat::none ||
+      config.sort_order != SortOrder::z_depth || config.quality.key_bits < 32 ||
+      config.quality.alpha_min >= 1 || f.depth_mode() == DepthMode::all) {
+    return false;
+  }
+  for (const BatchCamera& c : cameras) {
+    if (!c.meshes.instances.empty()) return false;
+  }
+  std::uint64_t rows = 0;
+  std::uint32_t camera = 0;
+  for (const CameraSet& v : camera_sets) {
+    if (v.camera != camera) rows = 0;
+    camera = v.camera;
+    rows += sets[v.set].gaussians.size();
+    if (rows > Policy::kMostRows || !fits_regions(sets[v.set], first)) return false;
+  }
+  return true;
+}
+
+void CudaBatchRenderer::State::plan_regions(std::span<const GaussianSet> sets,
+                                            std::span<const BatchCamera> cameras,
+                                            std::uint64_t gaussians, const cuda::InputPlaces& at) {
+  const Camera& first = cameras[0].camera;
+  args.grid = TileGrid::of(first.width, first.height, cuda::kRegionTile);
+  args.tiles = args.cameras * static_cast<std::uint32_t>(args.grid.count());
+  args.log2_alpha_min = static_cast<float>(log2_alpha_min(config.quality));
+  args.elliptic = true;
+  const double radius2 = largest_radius2(config);
+  cuda::RegionArgs& r = region_args;
+  r.columns = (first.width + cuda::kRegion - 1) / cuda::kRegion;
+  r.rows = (first.height + cuda::kRegion - 1) / cuda::kRegion;
+  const auto count = static_cast<std::uint32_t>(r.columns * r.rows);
+  const std::uint32_t bins = std::min(Policy::kBins, shared_bytes / 4 - 1024);
+  r.bins = std::min(Policy::kMostBins, bins / count) / 32 * 32;
+  r.shift = 24 - std::bit_width(r.bins / Policy::kOctaves);
+  r.radius_unit = static_cast<float>(radius2 * 1.01 / 4000);
+
+  auto* const region_sets = at.on_host<cuda::RegionSet>(at.region_sets);
+  for (std::size_t s = 0; s < sets.size(); ++s) {
+    const auto groups = static_cast<std::uint32_t>((sets[s].gaussians.size() + 31) / 32);
+    region_sets[s] = {r.groups, groups, set_begins[s], set_begins[s + 1] - set_begins[s]};
+    if (region_sets[s].instances != 0) r.groups += (groups + 31) / 32 * 32;
+  }
+  const auto* const instances = at.on_host<cuda::BatchInstance>(at.instances);
+  auto* const views = at.on_host<cuda::RegionView>(at.region_views);
+  std::size_t in_view = 0;
+  for (std::size_t s = 0; s < sets.size(); ++s) {
+    for (std::uint32_t i = set_begins[s]; i < set_begins[s + 1]; ++i) {
+      cuda::RegionView v = region_view(instances[i], sets[s], radius2);
+      v.first_row = region_sets[s].first_group * 32;
+      v.first_in_view = static_cast<std::uint32_t>(in_view);
+      in_view += region_sets[s].groups;
+      views[i] = v;
+    }
+  }
+  auto* const rows = at.on_host<std::uint32_t>(at.camera_rows);
+  std::fill(rows, rows + cameras.size(), 0u);
+  for (const CameraSet& v : camera_sets)
+    rows[v.camera] += static_cast<std::uint32_t>(sets[v.set].gaussians.size());
+  regions.groups_in_view = in_view;
+  r.sets = at.on_device<cuda::RegionSet>(at.region_sets);
+  r.views = at.on_device<cuda::RegionView>(at.region_views);
+  r.cameras = at.on_device<cuda::PlainCamera>(at.plain);
+  r.camera_rows = at.on_device<std::uint32_t>(at.camera_rows);
+  if (regions.pair_capacity == 0) {
+    regions.pair_capacity = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(
+        gaussians / Policy::kGaussiansPerPair, cuda::policy::Capacity::kLeastSlots, 0x7fffffffu));
+    regions.far_capacity = regions.pair_capacity / Policy::kPairsPerFarRow;
+    regions.group_capacity = regions.pair_capacity / 32;
+  }
+}
+
+void CudaBatchRenderer::State::size_regions() {
+  const auto with_room = [](auto& array, std::size_t n) {
+    array.resize_discard(n);
+    return array.data();
+  };
+  cuda::RegionArgs& r = region_args;
+  const std::size_t count = std::size_t{args.cameras} * static_cast<std::size_t>(r.columns * r.rows);
+  constexpr std::size_t kCounterWords = sizeof(cuda::RegionCounters) / sizeof(std::uint32_t);
+  const std::size_t views = (camera_sets.size() + 1) / 2 * 2;
+  regions.zeroed_words = kCounterWords + views + 2 * args.cameras;
+  std::uint32_t* const words = with_room(regions.zeroed, regions.zeroed_words);
+  r.counters = reinterpret_cast<cuda::RegionCounters*>(words);
+  r.view_groups = words + kCounterWords;
+  r.depths = reinterpret_cast<uint2*>(r.view_groups + views);
+  r.positions = with_room(regions.positions, std::size_t{r.groups} * 32);
+  r.shapes = with_room(regions.shapes, std::size_t{r.groups} * 64);
+  r.bounds = with_room(regions.bounds, r.groups);
+  r.in_view = with_room(regions.in_view, regions.groups_in_view);
+  r.lists = with_room(regions.lists, count);
+  r.bases = with_room(regions.bases, args.cameras);
+  r.far_begins = with_room(regions.far_begins, args.cameras);
+  r.order = with_room(regions.order, std::size_t{4 * cuda::kItemKinds} * args.tiles);
+  regions.pairs.resize_exactly(regions.pair_capacity);
+  r.pairs = regions.pairs.data();
+  regions.far_rows.resize_exactly(regions.far_capacity);
+  r.far_rows = regions.far_rows.data();
+  regions.far_records.resize_exactly(regions.far_capacity);
+  r.far_records = regions.far_records.data();
+  regions.rows_in_view.resize_exactly(std::size_t{regions.group_capacity} * 32);
+  r.rows_in_view = regions.rows_in_view.data();
+  r.group_capacity = regions.group_capacity;
+  r.pair_capacity = regions.pair_capacity;
+  r.far_capacity = regions.far_capacity;
+  raster.depths = {};
+  raster.perspectives = {};
+  stats.scratch_bytes = inputs.capacity_bytes() + regions.bytes();
+}
+
+}  // namespace gsnav

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+// Batches of small images, which are drawn by lists of regions: the bits of one camera at a time.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "ops/backends.hpp"
+#include "support/scenes.hpp"
+
+#if defined(GSNAV_HAS_CUDA)
+#include "gsnav/detail/scene/spatial_order.hpp"
+#include "ops/cuda_batch_images.hpp"
+#include "ops/no_gpu.hpp"
+#include "support/seen_rows.hpp"
+
+using namespace gsnav;
+using namespace gsnav_test;
+
+namespace {
+
+constexpr int kCameras = 130;  ///< At least policy::Regions::kLeastCameras.
+
+/// Images of the cameras with these numbers.
+Frames<float> of_cameras(const Frames<float>& all, const std::vector<std::size_t>& numbers) {
+  Frames<float> out;
+  const auto pick = [&](std::vector<float>& to, const std::vector<float>& from) {
+    const std::size_t size = from.size() / kCameras;
+    for (const std::size_t c : numbers) {
+      const auto begin = from.begin() + static_cast<std::ptrdiff_t>(c * size);
+      to.insert(to.end(), begin, begin + static_cast<std::ptrdiff_t>(size));
+    }
+  };
+  for_each_image(out, all, pick);
+  return out;
+}
+
+/// Checks a batch against some of its cameras alone.
+void check_some(CudaBackend& cuda, const Batch& got, const std::vector<GaussianSet>& sets,
+                const std::vector<Camera>& cameras, const Lists& lists, const RenderConfig& config,
+                unsigned outputs) {
+  REQUIRE(got.stats.by_regions);
+  std::vector<std::size_t> numbers;
+  std::vector<Camera> some;
+  Lists of_some;
+  for (std::size_t c = 0; c < kCameras; c += 9) {
+    numbers.push_back(c);
+    some.push_back(cameras[c]);
+    if (!lists.empty()) of_some.push_back(lists[c]);
+  }
+  check_same(of_cameras(got.frames, numbers), singly(cuda, sets, some, of_some, config, outputs));
+}
+
+constexpr unsigned kSmallOutputs[] = {kMedianDepth, kRgb, kRgb | kAlpha | kMedianDepth};
+
+}  // namespace
+
+TEST_CASE("cuda batch regions: several scenes, placed, in lists of each camera's own") {
+  if (no_gpu("cuda batch regions")) return;
+  CudaBackend cuda;
+  const int count = is_emulated() ? 1200 : 9000;
+  GaussianCloud a = random_cloud(1, {.count = count, .needle = 0.3});
+  GaussianCloud b = random_cloud(2, {.count = count / 3, .sh_degree = 1, .scale = 0.2});
+  const GaussianCloud c = random_cloud(3, {.count = 700, .sh_degree = 0, .scale = 0.02});
+  sort_spatially(a);
+  sort_spatially(b);
+  compact_sh(b);
+  const GaussianArrays<CudaBackend> on_a(cuda, a), on_b(cuda, b), on_c(cuda, c);
+  Similarity placed;
+  placed.translation = {0.4, -0.2, 0.3};
+  placed.scale = 0.7;
+  const std::vector<GaussianSet> sets{on_a.set(), on_b.set(), on_c.set(placed)};
+  Lists lists;
+  for (std::uint32_t i = 0; i < kCameras; ++i) {
+    lists.push_back(i % 4 == 0   ? std::vector<std::uint32_t>{2, 0}
+                    : i % 4 == 1 ? std::vector<std::uint32_t>{1}
+                    : i % 4 == 2 ? std::vector<std::uint32_t>{}
+                                 : std::vector<std::uint32_t>{0, 1, 2});
+  }
+  for (const auto& [width, height] : {std::pair{53, 37}, {64, 64}, {16, 9}}) {
+    const std::vector<Camera> cameras = ring(kCameras, width, height);  // Some have near_sigma.
+    for (const Quality& quality : {Quality::exact(), Quality::fast()}) {
+      if (is_emulated() && (quality == Quality::fast()) != (width == 53)) continue;
+      RenderConfig config;
+      config.quality = quality;
+      config.background = {0.25, 0.5, 0.75};
+      CudaBatchRenderer renderer(cuda, config);
+      for (const unsigned outputs : kSmallOutputs) {
+        if (is_emulated() && outputs == kRgb) continue;
+        CAPTURE(width);
+        CAPTURE(outputs);
+        const Batch got = draw_batch(cuda, renderer, sets, cameras, lists, outputs, outputs == kRgb);
+        check_some(cuda, got, sets, cameras, lists, config, outputs);
+        // The same bits on every run.
+        if (is_emulated()) continue;
+        check_same(got.frames, draw_batch(cuda, renderer, sets, cameras, lists, outputs, false).frames);
+      }
+    }
+  }
+}
+
+TEST_CASE("cuda batch regions: rows that need double, and more of them than have records") {
+  if (no_gpu("cuda batch regions in double")) return;
+  CudaBackend cuda;
+  SerialBackend serial;
+  // Needles as long as the view is wide: their centres lie far outside most images.
+  for (const int count : {600, 24000}) {
+    if (is_emulated() && count > 600) continue;
+    GaussianCloud cloud = random_cloud(
+        17,
+        {.count = count, .sh_degree = 1, .needle = 1, .scale = 0.4, .center = {0, 0, 0}, .extent = 3});
+    sort_spatially(cloud);
+    const GaussianArrays<CudaBackend> arrays(cuda, cloud);
+    const std::vector<GaussianSet> sets{arrays.set()};
+    std::vector<Camera> cameras = ring(kCameras, 40, 40);
+    for (Camera& camera : cameras) {
+      camera.fx *= 4;
+      camera.fy *= 4;
+    }
+    const RenderConfig config;
+    CudaBatchRenderer renderer(cuda, config);
+    for (const unsigned outputs : {unsigned{kMedianDepth}, kRgb | kAlpha | kMedianDepth}) {
+      const Batch got = draw_batch(cuda, renderer, sets, cameras, {}, outputs, false);
+      check_some(cuda, got, sets, cameras, {}, config, outputs);
+      RenderConfig of_one = config;
+      of_one.outputs = outputs;
+      check_same(of_cameras(got.frames, {3}), render<float>(serial, {cloud.set()}, cameras[3], of_one));
+    }
+  }
+}
+
+TEST_CASE("cuda batch regions: thousands of rows of one key are in order of rank") {
+  if (no_gpu("cuda batch regions order")) return;
+  CudaBackend cuda;
+  SerialBackend serial;
+  // Faint walls, so that pixels stay open: one of equal keys, one of few bins, and one far behind.
+  GaussianCloudBuilder builder(0);
+  Rng rng(5);
+  const int count = is_emulated() ? 1000 : 24000;
+  for (int i = 0; i < count; ++i) {
+    RawGaussian g;
+    const double z = i % 3 == 0 ? 2.0 : i % 3 == 1 ? 2 + 1e-4 * rng.uniform(0, 1) : rng.uniform(1, 28);
+    const double spread = is_emulated() ? 0.03 * z : 0.2 * z;
+    g.mean = {spread * rng.uniform(-1, 1), spread * rng.uniform(-1, 1), z};
+    g.quat = {1, 0, 0, 0};
+    for (int k = 0; k < 3; ++k) g.log_scales[k] = std::log(0.01 * z);
+    g.opacity_logit = -4;
+    for (auto& c : g.sh0) c = static_cast<float>(rng.normal());
+    builder.add(g);
+  }
+  GaussianCloud cloud = builder.cloud();
+  Camera camera;
+  camera.set_hfov(48, 48, 60);
+  camera.cx = camera.cy = 24;
+  const std::vector<Camera> cameras(kCameras, camera);
+  for (const bool sorted : {false, true}) {
+    if (sorted) sort_spatially(cloud);
+    if (is_emulated() && !sorted) continue;
+    const GaussianArrays<CudaBackend> arrays(cuda, cloud);
+    const RenderConfig config;
+    CudaBatchRenderer renderer(cuda, config);
+    const unsigned outputs = kRgb | kAlpha | kMedianDepth;
+    const Batch got = draw_batch(cuda, renderer, {arrays.set()}, cameras, {}, outputs, false);
+    REQUIRE(got.stats.by_regions);
+    RenderConfig of_one = config;
+    of_one.outputs = outputs;
+    const Frames<float> one = render<float>(serial, {cloud.set()}, camera, of_one);
+    check_same(of_cameras(got.frames, {0}), one);
+    check_same(of_cameras(got.frames, {kCameras - 1}), one);
+  }
+}
+
+TEST_CASE("cuda batch regions: visible sets of chunks and rows; depth against float64") {
+  if (no_gpu("cuda batch regions of visible sets")) return;
+  CudaBackend cuda;
+  SerialBackend serial;
+  GaussianCloud cloud = random_cloud(65, {.count = is_emulated() ? 3000 : 15050, .scale = 0.1});
+  sort_spatially(cloud);
+  const GaussianArrays<CudaBackend> arrays(cuda, cloud);
+  const std::vector<Camera> cameras = ring(kCameras, 44, 36);
+  const std::size_t words = (cloud.view().chunk_count() + 31) / 32;
+  Rng rng(6);
+  std::vector<std::uint32_t> bits;
+  std::vector<std::size_t> begins{0};
+  std::vector<GaussianCloud> rests;
+  for (std::size_t c = 0; c < 3; ++c) {  // Rows, chunks alone, nothing known.
+    std::vector<bool> may = random_rows(rng, cloud.size());
+    if (c == 1) {
+      for (std::size_t i = 0; i < may.size(); ++i) may[i] = may[i / kProjectChunk * kProjectChunk];
+    }
+    std::vector<std::uint32_t> of_camera = seen_words(may);
+    if (c == 1) of_camera.resize(words);
+    if (c == 2) {
+      of_camera.clear();
+      may.assign(may.size(), true);
+    }
+    rests.push_back(only_seen(cloud, may));
+    bits.insert(bits.end(), of_camera.begin(), of_camera.end());
+    begins.push_back(bits.size());
+  }
+  Buffer<std::uint32_t, CudaBackend> there(cuda);
+  there.upload(bits.data(), bits.size());
+  std::vector<std::vector<View<const std::uint32_t>>> seen;
+  for (std::size_t c = 0; c < kCameras; ++c)
+    seen.push_back({{there.data() + begins[c % 3], begins[c % 3 + 1] - begins[c % 3]}});
+  CudaBatchRenderer renderer(cuda);
+  const Batch got =
+      draw_batch(cuda, renderer, {arrays.set()}, cameras, {}, kMedianDepth, false, {}, seen);
+  REQUIRE(got.stats.by_regions);
+  RenderConfig config;
+  config.outputs = kAlpha | kMedianDepth;
+  for (std::size_t c = 0; c < (is_emulated() ? 3u : 12u); ++c) {
+    const Frames<float> mine = of_cameras(got.frames, {c});
+    const Frames<float> one = render<float>(serial, {rests[c % 3].set()}, cameras[c], config);
+    CHECK(differing(mine.median_depth, one.median_depth) == 0);
+    const Frames<double> truth = render<double>(serial, {rests[c % 3].set()}, cameras[c], config);
+    std::vector<double> errors;
+    for (std::size_t i = 0; i < truth.alpha.size(); ++i) {
+      if (truth.alpha[i] > 0.9) errors.push_back(std::abs(mine.median_depth[i] - truth.median_depth[i]));
+    }
+    std::sort(errors.begin(), errors.end());
+    if (!errors.empty()) CHECK(errors[errors.size() * 99 / 100] <= 1e-4);
+  }
+}
+
+TEST_CASE("cuda batch regions: calls that they cannot draw are drawn by tiles, and scratch grows") {
+  if (no_gpu("cuda batch regions limits")) return;
+  CudaBackend cuda;
+  // Splats as wide as the image: each row is in every region.
+  const GaussianCloud wide = random_cloud(4, {.count = is_emulated() ? 300 : 40000, .scale = 2});
+  const GaussianCloud filtered = random_cloud(5, {.count = 300, .mip = true});
+  const GaussianArrays<CudaBackend> arrays(cuda, wide), on_mip(cuda, filtered);
+  const std::vector<Camera> cameras = ring(kCameras, 48, 48);
+  CudaBatchRenderer renderer(cuda);
+  const Batch first = draw_batch(cuda, renderer, {arrays.set()}, cameras, {}, kMedianDepth, false);
+  CHECK(first.stats.reruns > 0);
+  check_some(cuda, first, {arrays.set()}, cameras, {}, {}, kMedianDepth);
+  const Batch second = draw_batch(cuda, renderer, {arrays.set()}, cameras, {}, kMedianDepth, false);
+  CHECK(second.stats.reruns == 0);
+  check_same(first.frames, second.frames);
+  const std::vector<Camera> few(cameras.begin(), cameras.begin() + 20);
+  CHECK(!draw_batch(cuda, renderer, {arrays.set()}, few, {}, kMedianDepth, false).stats.by_regions);
+  CHECK(!draw_batch(cuda, renderer, {on_mip.set()}, cameras, {}, kMedianDepth, false).stats.by_regions);
+  CHECK(!draw_batch(cuda, renderer, {on_mip.set()}, cameras, {}, kAll, false).stats.by_regions);
+  // No row is in view.
+  std::vector<Camera> away(kCameras, Camera::look_at({0, 0, 50}, {0, 0, 90}, {0, -1, 0}, 32, 32, 60));
+  const Batch nothing = draw_batch(cuda, renderer, {arrays.set()}, away, {}, kMedianDepth, false);
+  CHECK(nothing.stats.by_regions);
+  CHECK(std::all_of(nothing.frames.median_depth.begin(), nothing.frames.median_depth.end(),
+                    [](float z) { return z == 0; }));
+}
+
+#else
+TEST_CASE("cuda batch regions") { std::printf("SKIP: cuda batch regions: built without CUDA\n"); }
+#endif
