@@ -294,9 +294,6 @@ __global__ void __launch_bounds__(Policy::kFarThreads)
 
 void launch_region_lists(const BatchArgs& args, const RegionArgs& regions, int multiprocessors,
                          cudaStream_t stream) {
-  const auto blocks = [](std::size_t items, std::size_t of) {
-    return static_cast<unsigned>((items + of - 1) / of);
-  };
   const std::size_t bytes =
       sizeof(std::uint32_t) * regions.bins * static_cast<std::size_t>(regions.columns * regions.rows);
   cudaFuncSetAttribute(list_rows_kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
