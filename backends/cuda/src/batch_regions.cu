@@ -73,6 +73,7 @@ bool CudaBatchRenderer::State::uses_regions(std::span<const GaussianSet> sets,
   for (const CameraSet& v : camera_sets) gaussians += sets[v.set].gaussians.size();
   const bool many = depth_alone && gaussians >= Policy::kManyGaussians * cameras.size();
   if (cameras.size() < Policy::kLeastCameras ||
+      gaussians < least_gaussians_of_regions * cameras.size() ||
       std::max(first.width, first.height) > (many ? Policy::kSideOfDepth : Policy::kSide) ||
       config.response != Response::ewa || config.compat != Compat::none ||
       config.sort_order != SortOrder::z_depth || config.quality.key_bits < 32 ||

@@ -187,6 +187,9 @@ CudaBatchRenderer::CudaBatchRenderer(CudaBackend& backend, const RenderConfig& c
     : state_(std::make_unique<State>(backend, config)) {}
 CudaBatchRenderer::~CudaBatchRenderer() = default;
 const BatchStats& CudaBatchRenderer::stats() const noexcept { return state_->stats; }
+void CudaBatchRenderer::set_least_gaussians_of_regions(std::uint64_t gaussians) noexcept {
+  state_->least_gaussians_of_regions = gaussians;
+}
 
 Status CudaBatchRenderer::render(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                                  const BatchImages& images) {

@@ -278,6 +278,7 @@ struct CudaBatchRenderer::State {
 
   CudaBackend& backend;
   RenderConfig config;
+  std::uint64_t least_gaussians_of_regions = cuda::policy::Regions::kLeastGaussians;
   int multiprocessors = 0;
   std::uint32_t shared_bytes = 0;  ///< Largest shared memory of a block.
   std::array<cuda::Flight, cuda::policy::Batch::kInFlight> flights;

@@ -109,6 +109,10 @@ class CudaBatchRenderer {
   /// Throws like render().
   Status finish();
 
+  /// Sets the number of Gaussians that cameras must see each, on average, for lists of regions. It
+  /// changes the time of a call and no bit of an image. Default: policy::Regions::kLeastGaussians.
+  void set_least_gaussians_of_regions(std::uint64_t gaussians) noexcept;
+
   /// Statistics of the last batch that finish() has completed.
   const BatchStats& stats() const noexcept;
 

@@ -99,6 +99,9 @@ struct Regions {
   /// each. In larger images, too many tiles project the same row.
   static constexpr int kSide = 64, kSideOfDepth = 128;
   static constexpr std::uint64_t kManyGaussians = 600'000;
+  /// Cameras that see fewer Gaussians each, on average, are drawn by tiles: lists of regions then cost
+  /// more than they save.
+  static constexpr std::uint64_t kLeastGaussians = 100'000;
   /// Fewer cameras do not keep all multiprocessors busy.
   static constexpr std::size_t kLeastCameras = 128;
   static constexpr std::uint64_t kMostRows = (1u << 20) - (1u << 14);  ///< Largest number per camera.
