@@ -74,9 +74,10 @@ class GeodesicSearch {
   std::vector<Vec3d> path() const;
   /// Computes distances from `starts` to everything that can be reached.
   void flood(const UnfoldedMesh& mesh, const std::vector<Site>& starts);
-  /// Spreads straight paths from a vertex. nodes() then holds the windows and the turning vertices in
-  /// the order reached. Returns how many of the first nodes lie in directions in which a path that bends
-  /// at the vertex may leave.
+  /// Spreads straight paths from a vertex over the mesh. nodes() then holds the windows and turning
+  /// vertices that were reached. Nodes of directions in which a shortest path through this vertex can go
+  /// on, that is, around a corner of the boundary, come first. Returns the number of these nodes; the
+  /// other nodes can only be reached by paths that begin at the vertex.
   std::size_t look_around(const UnfoldedMesh& mesh, std::uint32_t vertex);
 
   const std::vector<Node>& nodes() const noexcept { return nodes_; }

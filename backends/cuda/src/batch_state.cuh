@@ -171,7 +171,7 @@ struct InputPlaces {
 };
 
 /// Checks the inputs of a call.
-/// @return an error with the camera, set or field.
+/// @return ok, or an error that names the camera, the set or the field of `config` that is wrong.
 Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                    const RenderConfig& config);
 

@@ -75,7 +75,7 @@ __global__ void __launch_bounds__(kScanThreads) scan_triangles_kernel(const Mesh
   if (threadIdx.x == 0) args.offsets[args.counts.size] = sum;
 }
 
-/// Computes the begins of triangle chunks and the number of triangles, one camera per block.
+/// Sums the triangle counts of each camera's chunks: where a chunk begins, and the camera's total.
 __global__ void __launch_bounds__(kScanThreads)
     scan_cameras_kernel(const MeshSetupArgs<float> args, const MeshWave wave) {
   const std::uint64_t sum = scan_by_block(args.counts.data, wave.chunk_begins[blockIdx.x],
