@@ -245,19 +245,29 @@ def unfinished(text, name):
             if (m := UNFINISHED.search(line)) and (name.endswith(".md") or "//" in line[:m.start()])]
 
 
-ENUM = re.compile(r"^ *enum (?:class |struct )?(\w+)[^;{]*\{\n(.*?)^ *\}", FLAGS)
+ENUM = re.compile(r"^( *)enum (?:class |struct )?(\w+)[^;{]*\{(.*?)\};", FLAGS)
+SCOPE = re.compile(r"( *)(?:(public|protected|private):|(?:template <.*> )?(class|struct|union)\b(?!.*;))")
+
+
+def is_private(text, indent):
+    """Whether a member that stands `indent` columns in, behind this text, is for its class alone."""
+    for line in reversed(text.splitlines()):
+        scope = SCOPE.match(line)
+        if scope and len(scope.group(1)) < indent:
+            return scope.group(2) in ("protected", "private") or scope.group(3) == "class"
+    return False
 
 
 def bare_enumerators(text, name):
     """Lines for enumerators without a comment. A public enumeration of one line has one comment for all."""
     found = []
     for enum in ENUM.finditer(text):
-        before, above = text[:enum.start()], ""
-        if max(before.rfind("\nprivate:"), before.rfind("\n private:")) > before.rfind(" public:"):
+        lines, above = enum.group(3).splitlines(), ""
+        if len(lines) < 2 or (enum.group(1) and is_private(text[:enum.start()], len(enum.group(1)))):
             continue
-        for line in enum.group(2).splitlines():
-            if re.match(r" *\w", line) and "///<" not in line and not above.startswith("///"):
-                found.append(f"{name}: error: {enum.group(1)}: no documentation of {line.strip(' ,')}")
+        for line in lines:
+            if re.match(r" *\w", line) and "///<" not in line and not re.match(r"///(?!<)", above):
+                found.append(f"{name}: error: {enum.group(2)}: no documentation of {line.strip(' ,')}")
             above = line.strip()
     return found
 

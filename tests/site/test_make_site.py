@@ -85,7 +85,16 @@ class Tree(unittest.TestCase):
         self.assertEqual(bare("/// A kind: one or two.\nenum class Kind { one, two };\n"), [])
         self.assertEqual(bare("/// A kind.\nenum Kind : int {\n  one,\n  two,  ///< Second.\n};\n"),
                          ["a.hpp: error: Kind: no documentation of one"])
-        self.assertEqual(bare("class A {\n private:\n  enum Kind {\n    one,\n  };\n};\n"), [])
+        two = "enum class Kind {\n  one,  ///< First.\n        ///< Of two.\n  two\n};\n"
+        missing = ["a.hpp: error: Kind: no documentation of two"]
+        self.assertEqual(bare(two), missing)
+        self.assertEqual(bare("enum class Kind { one,  ///< First.\n  two };\n"), missing)
+        hidden = "class A {\n public:\n  int f();\n\n private:\n  enum Kind {\n    one,\n  };\n};\n"
+        self.assertEqual(bare(hidden), [])
+        self.assertEqual(bare(hidden + two), missing)  # behind a class, not in it
+        inner = "".join(f"  {line}\n" for line in two.splitlines())
+        self.assertEqual(bare(hidden + "struct B {\n" + inner + "};\n"), missing)
+        self.assertEqual(bare("class A {\n" + inner + "};\n"), [])
 
     def test_concepts_need_comments(self):
         bare = lambda text: make_site.bare_concepts(text, "a.hpp")  # noqa: E731
