@@ -97,8 +97,8 @@ function(_gsnav_programs)
   if(GSNAV_TESTS)
     _gsnav_part("  embree" test_mesh_embree "meshes are compared with it"
                 "no libembree-dev: meshes are not compared with it")
-    _gsnav_part("  chromium" GSNAV_CHROMIUM "gsnav-viewer's page is tested in it"
-                "not found: gsnav-viewer's page is not tested")
+    _gsnav_part("  chromium" GSNAV_CHROMIUM "gsnav-viewer's page and the widths of the API site are tested in it"
+                "not found: gsnav-viewer's page and the widths of the API site are not tested")
   endif()
   _gsnav_part(fuzz GSNAV_FUZZ "fuzzers of the readers" "GSNAV_FUZZ=OFF")
   _gsnav_part(install GSNAV_INSTALL "cmake --install" "GSNAV_INSTALL=OFF")

@@ -397,6 +397,20 @@ def drop_links_to_nothing(html):
             page.write_text(text, encoding="utf-8")
 
 
+DRAWING = re.compile(r'<object type="image/svg\+xml" data="([^"]+)"[^>]*></object>\s*'
+                     r'<div class="caption">\s*([^<"]*)</div>')
+
+
+def link_drawings(html):
+    """Makes each drawing a picture that links to its file, where a phone can enlarge it."""
+    for page in html.glob("*.html"):
+        text = page.read_text(encoding="utf-8")
+        linked = DRAWING.sub(lambda m: f'<a href="{m[1]}"><img class="drawing" src="{m[1]}" alt="{m[2].strip()}"/>'
+                                       f'</a>\n<div class="caption">\n{m[2]}</div>', text)
+        if linked != text:
+            page.write_text(linked, encoding="utf-8")
+
+
 def dead_links(html):
     """Lines for pictures, files and anchors that a page names and that are not on the site."""
     texts = {p.name: p.read_text(encoding="utf-8") for p in html.glob("*.html")}
@@ -443,6 +457,7 @@ def make(out, doxygen):
         print("\n".join(wrong))
         return 1
     drop_links_to_nothing(out / "html")
+    link_drawings(out / "html")
     wrong += wrong_pages(out / "html") + dead_links(out / "html")
     if wrong:
         print("\n".join(wrong))

@@ -210,6 +210,13 @@ class Tree(unittest.TestCase):
         self.write("docs/guide/b.png", "another picture")
         self.assertIn("two pictures are called b.png", self.run_doxygen().stdout)
 
+    def test_a_drawing_links_to_its_file(self):
+        page = self.root / "a.html"
+        page.write_text('<object type="image/svg+xml" data="a.svg" style="pointer-events: none;"></object>\n'
+                        '<div class="caption">\nA &amp; B</div></div>\n')
+        make_site.link_drawings(self.root)
+        self.assertIn('<a href="a.svg"><img class="drawing" src="a.svg" alt="A &amp; B"/></a>', page.read_text())
+
     def test_dead_links(self):
         html = self.root / "out/html"
         self.write("out/html/b.html", '<a id="it"></a>')
