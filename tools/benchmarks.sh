@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# Measures the rows of gsnav in docs/benchmarks.md, on scenes that it makes itself: frame times on a
+# Measures the rows of gsnav in docs/benchmarks.md and README.md, on scenes that it makes itself: frame times on a
 # processor and, with CUDA and a GPU, on that. Each time has its error against float64 beside it.
 #
 #   tools/benchmarks.sh                builds the programs in build/benchmarks, measures, writes
@@ -80,31 +80,37 @@ done
 
 # A row of bench_batch: profile batch ms p90 frames/s rgb_max p99.9 psnr least depth_p99 pairs scratch host_us
 rows_of_gpu() {
-  awk -v scene="$1" -v size="$2" '
+  awk -v scene="$1" -v size="$2" -v images="$3" '
     $1 == "fast" || $1 == "exact" {
-      printf "| %s | %s | %s | %s | %s | %s | %s | %s | %s | %s |\n", scene, size, $2, $1, $3, $4, $9, $6, $10, $12
+      for (i = 3; i <= NF; ++i) if ($i ~ /nan/) $i = "–"  # the error of an image that is not drawn
+      printf "| %s | %s | %s | %s | %s | %s | %s | %s | %s | %s | %s |\n",
+        scene, size, images, $2, $1, $3, $4, $9, $6, $10, $12
     }'
 }
 if [[ $gpu == 1 ]]; then
   {
-    echo "| scene | size | cameras per call | profile | ms per frame | 90th percentile | PSNR, dB | largest error |" \
-         "depth p99, m | scratch, MB |"
-    echo "|---|---|---:|---|---:|---:|---:|---:|---:|---:|"
+    echo "| scene | size | images | cameras per call | profile | ms per frame | 90th percentile | PSNR, dB |" \
+         "largest error | depth p99, m | scratch, MB |"
+    echo "|---|---|---|---:|---|---:|---:|---:|---:|---:|---:|"
     for count in ${gaussians//,/ }; do
       for size in $small ${sizes//,/ }; do
         counts=1
         [[ $size != 256x256 ]] || counts=$cameras
         [[ " $small " != *" $size "* ]] || counts=${cameras##*,}
-        echo "GPU: $(of "$count"), $size" >&2
-        # shellcheck disable=SC2086
-        GSNAV_BENCH_SCENE=$out/flat_$count.ply GSNAV_BENCH_CAMERAS=$out/cameras.json \
-          "$batch" --size "$size" ${counts//,/ } | tee "$out/gpu_${count}_$size.txt" |
-          rows_of_gpu "flat $(of "$count")" "$size"
+        for images in RGB-D RGB depth; do
+          option=""
+          [[ $images == RGB-D ]] || option=--${images,,}
+          echo "GPU: $(of "$count"), $size, $images" >&2
+          # shellcheck disable=SC2086
+          GSNAV_BENCH_SCENE=$out/flat_$count.ply GSNAV_BENCH_CAMERAS=$out/cameras.json \
+            "$batch" --size "$size" $option ${counts//,/ } | tee "$out/gpu_${count}_${size}_$images.txt" |
+            rows_of_gpu "flat $(of "$count")" "$size" "$images"
+        done
       done
     done
   } > "$out/gpu.md"
   first=${gaussians%%,*}
-  device=$(sed -n '1s/: .*//p' "$out/gpu_${first}_${sizes%%,*}.txt")
+  device=$(sed -n '1s/: .*//p' "$out/gpu_${first}_${sizes%%,*}_RGB-D.txt")
 fi
 
 {
@@ -116,7 +122,7 @@ fi
   cat "$out/cpu.md"
   if [[ $gpu == 1 ]]; then
     printf '\n## %s\n\n' "$device"
-    printf 'RGB, alpha and median depth. '
+    printf 'RGB-D is RGB, alpha and median depth; depth is median depth alone. '
     printf 'PSNR is the worst of four evenly spread views (0, 16, 32 and 48 of 64).\n\n'
     cat "$out/gpu.md"
   else
