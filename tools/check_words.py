@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks the wording of pages, comments and messages against the style rules in CONTRIBUTING.md.
 
-Reads Markdown, the text of SVG files, comments of C++, CUDA, Python, shell and CMake, Python docstrings, and
-string literals of at least four words outside tests/ (help texts and messages). Skips code, inline code, link
-targets and quotations of up to three words.
+Reads Markdown, the text of SVG files, comments of C++ (// in raw strings too), CUDA, Python, shell and CMake,
+Python docstrings, and string literals of at least four words outside tests/ (help texts and messages). Skips
+code, inline code, link targets and quotations of up to three words.
 
 usage: check_words.py                 check the folders that must be clean (CLEAN in this script)
        check_words.py PATH...         check these files and folders
@@ -93,7 +93,8 @@ DEVICES = {
             rf"^(?!.*\b{PERSONS}\b.* who)(?:.*[^\w-])?(?!(?:{ASKS}|and|or|as)\b,?)[\w-]+,? who (?!it is)\w+"],
     "person": [r"\b[Oo]nes? who\b", r"\b[Ww]ho(?:m)?ever\b", r"\b[Nn]obody(?:'s)?\b", r"\b[Nn]o one\b",
                r"\b[Ss]omebody\b", r"\b[Ee]verybody\b", r"\b[Oo]thers (?:get|go|take|keep|find|know|want|ask|wait)\b",
-               r"\b(?:knows?|knew) nothing\b", r"\b(?:header|file|format|reader|kernel) promises?\b",
+               r"\b(?:knows?|knew) nothing\b", r"\b[Rr]eaders? wants?\b",
+               r"\b(?:header|file|format|reader|kernel) promises?\b",
                rf"^(?!.*\b(?:{PERSONS}|who|you|we|they|I)\b.* want).*\bwants?\b",
                r"\b(?:[Hh]e|[Ss]he|[Hh]is|[Hh]er|[Hh]im)\b"],
     "per": [rf"{NUMBER}(?: (?!{SMALL}\b)[\w-]+)? an? {UNIT}\b{NO_VERB}",
@@ -123,7 +124,7 @@ DEVICES = {
                r"\b(?:[Ii]n|[Bb]efore|[Uu]ntil) version \d[\d.]*,? (?:.* )?(?:was|were|had)\b",
                 r"\b(?:was|were|had)\b.* in (?:version|release) \d",
                 r"\b(?:was|were) \d[\d.]*(?:, \d[\d.]*)* and \d",
-                r"^(?:It|They) (?:was|were) (?!(?:\w+(?:ed|en|t|n|nd|de|ld|id)|read)\b)\w+[.;]?$"],
+                r"^(?:It|They|The [\w-]+) (?:was|were) (?!(?:\w+(?:ed|en|t|n|nd|de|ld|id)|read)\b)\w+[.;]?$"],
 }
 DEVICES = {rule: [re.compile(p) for p in patterns] for rule, patterns in DEVICES.items()}
 ABBREVIATION = re.compile(r"(?:\b(?:e\.g|i\.e|vs|etc|cf|Fig|Eq|Sec|No|approx|al|resp|incl|max|min)|^\W*\d+|\b[A-Z])$")
@@ -279,10 +280,16 @@ def cpp(text):
     newlines = [m.start() for m in re.finditer("\n", text)]
     for m in CPP_TOKEN.finditer(text):
         token = m.group()
-        if token[0] not in "/\"":
+        if token[0] not in "/\"R":
             continue
         row = bisect.bisect_left(newlines, m.start())
         begin = newlines[row - 1] + 1 if row else 0
+        if token[0] == "R":  # scripts and shaders
+            for k, line in enumerate(token.split("\n")):
+                said = re.match(r"((?:.*\s)?)//[/!]?\s(.*)", line)
+                if said:
+                    comments.add(row + 1 + k, len(said.group(1)), said.group(2), not said.group(1).strip())
+            continue
         if token[0] == '"':
             add_string(strings, token[1:-1], row + 1, before is not None and not text[before:m.start()].strip())
             before = m.end()

@@ -22,7 +22,8 @@ SENTENCES = {
     "who": (["It is built for who asks for a distance.", "Who asks for it waits.", "The pool, who holds it, is full."],
             ["Users who ask for a distance wait.", "The people, who walk, give way.", "This page says who it is for.",
              "A person of radius 0.3 who stands still is passed."]),
-    "person": (["One who looks sees it.", "Whoever takes it frees it.", "Nobody reads it.", "The others get zero.",
+    "person": (["The reader wants the size.", "One who looks sees it.", "Whoever takes it frees it.",
+                "Nobody reads it.", "The others get zero.",
                 "The backend knows nothing of meshes.", "He waits.", "The file wants a header.",
                 "Each lane that wants one gets one.", "The file has more rows than the header promises."],
                ["A caller that looks sees it.", "No thread reads it.", "The other rows are zero.", "There it is.",
@@ -64,9 +65,10 @@ SENTENCES = {
                  "Meshes were opaque once.", "Previously it was sorted.", "Formerly a list.", "It once was a list.",
                  "In version 0.1 this was slower.", "We tried a hash and dropped it.", "This no longer copies.",
                  "We no longer sort twice.", "Lists no longer overlap.", "This was slower in version 0.1.",
-                 "They were opaque.", "The ratio was 3.8, 1.7 and 1.3."],
+                 "They were opaque.", "The settings were opaque.", "The ratio was 3.8, 1.7 and 1.3."],
                 ["The flag is used to be explicit.", "Lists are sorted once.", "It is float16 in version 1.",
-                 "It names content that no longer exists.", "They were read.", "A file of version 2 is read."]),
+                 "It names content that no longer exists.", "They were read.", "The bytes were read.",
+                 "A file of version 2 is read."]),
     "colon": (["It has two parts: one for rows: the other for columns."],
               ["It has two parts: rows and columns. It returns one: rows.", "At 12:30 it takes `a: b` from a::b: fine.",
                'It prints "file: what: why".']),
@@ -164,6 +166,8 @@ class Text(unittest.TestCase):
         self.assertIn("what", rules("examples/a/help.txt", f"  --a    {said}\n"))
         self.assertFalse(rules("tests/a.cpp", f'TEST_CASE("{said}") {{}}\n'))
         self.assertFalse(rules("tools/a.cpp", f'auto a = R"html({said})html";\n'))
+        script = f'auto a = R"js(let a = "https://b";\n// {said}\n)js";\n'
+        self.assertEqual([(f.line, f.rule) for f in check_words.check_text("tools/a.cpp", script)], [(2, "what")])
         self.assertFalse(rules("tools/a.cpp", "const int a = 1'000'000;  // rows\n"))
         self.assertNotIn("colon", rules("tools/a.cpp", 'error("file: what it holds: why it is wrong");\n'))
 

@@ -113,7 +113,8 @@ async function draw(id, bytes) {
   to.getContext("2d").drawImage(image, 0, 0);
   image.close();
 }
-/// What is to be said now; turns by held keys are radians a second.
+/// Body of the next request: the inputs since the last one. A held arrow key turns the camera by 1.2
+/// radians per second, or tilts it by 0.8.
 function message() {
   const now = performance.now(), passed = Math.min((now - before) / 1000, 0.2);
   before = now;
@@ -129,7 +130,7 @@ function message() {
   for (const k in once) delete once[k];
   return Object.entries(fields).map(e => e.join("=")).join("&");
 }
-/// A request that waits for a frame of a scene that stands still is given up: the next one has what was asked for.
+/// Aborts a request that waits for a frame of a paused scene: the next one carries new inputs at once.
 function hurry() { if (request && state && state.paused && performance.now() - request.since > 30) request.abort(); }
 async function frames() {
   for (;;) {
