@@ -140,3 +140,15 @@ TEST_CASE("the backend's type is not named twice") {
   CHECK(there.render(arrays.set(), camera).value().rgb ==
         renderer.render(cloud.set(), camera).value().rgb);
 }
+
+TEST_CASE("arrays view a named cloud") {
+  SerialBackend backend;
+  const auto load_cloud = [] { return random_cloud(3, {.count = 100}); };
+  static_assert(!std::is_constructible_v<GaussianArrays<SerialBackend>, SerialBackend&, GaussianCloud>);
+  // [snippet: named_cloud]
+  // GaussianArrays arrays(backend, load_cloud()) does not compile, because the cloud is a temporary.
+  const gsnav::GaussianCloud cloud = load_cloud();
+  const gsnav::GaussianArrays arrays(backend, cloud);  // right while cloud lives
+  // [/snippet]
+  CHECK(arrays.set().gaussians.size() == 100);
+}
