@@ -126,7 +126,8 @@ Result<OpenedScene> open(const Options& o) {
   return gsnav_tools::open_scene(o, how, stdout);
 }
 
-/// Names the option that asks for Gaussians of a scene that has none, or triangles, or ok.
+/// Checks that the scene has the Gaussians and triangles that the options need.
+/// @return ok, or invalid_argument that names the option and the missing part.
 Status check_parts(const Options& o, bool gaussians, bool triangles) {
   const auto lacks = [&o](const char* option, const char* what) {
     return Status(Errc::invalid_argument, std::string(option) + ": " + o.scene + " has no " + what);

@@ -128,8 +128,11 @@ class HostView {
   BasicRenderer<double, SerialBackend> reference_;
 };
 
-/// @param draw Renders one camera with the light of the meshes into the given frames, and returns a
-/// Status.
+/// Renders the scene's cameras one after another, writes their images and prints the progress.
+/// @param host The scene in host memory, which the ledger of a frame is computed from.
+/// @param draw Called as draw(camera, light of the meshes, frames). Renders into the frames and returns
+///   a Status.
+/// @return the program's exit status: 1 after an error, which is printed.
 template <class S, class Draw>
 int run(const Options& o, const Scene& scene, HostView& host, const Draw& draw) {
   const std::vector<Camera>& cameras = scene.cameras;
