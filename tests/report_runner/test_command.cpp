@@ -64,7 +64,7 @@ TEST_CASE("report: errors name the option and the value") {
       {"--default --avatars 3", {"--avatars", "without people"}},
       {"--default --profile lod", {"--profile", "see --profiles"}},
       {"--flat /none.ply", {"--flat", "/none.ply"}},
-      {"--default --visible-sets a", {"--visible-sets", "SCENE=FILE", "embedded_flat"}},
+      {"--default --visible-sets a", {"--visible-sets", "[SCENE=]FILE", "embedded_flat"}},
       {"--default --visible-sets b=/none.vis", {"--visible-sets", "b=/none.vis", "embedded_flat"}},
       {"--default --visible-sets embedded_flat=/none.vis", {"--visible-sets", "/none.vis"}},
       {"--kinds kernel --benchmarks /none.json", {"--benchmarks", "/none.json"}}};
