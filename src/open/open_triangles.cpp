@@ -4,6 +4,7 @@
 
 #include "gsnav/core/lower_case.hpp"
 #include "gsnav/detail/io/mesh_file.hpp"
+#include "gsnav/detail/scene/placed_meshes.hpp"
 #include "parts.hpp"
 
 namespace gsnav::detail {
