@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 #include "gsnav/backends/cuda/batch.hpp"
@@ -127,6 +128,24 @@ inline std::vector<Camera> ring(int count, int width, int height) {
     cameras.push_back(camera);
   }
   return cameras;
+}
+
+/// Gaussians of random colours, so faint that pixels stay open. place(i, rng) is the mean of Gaussian i,
+/// and size(z) the standard deviation of those at depth z.
+template <class Size, class Place>
+GaussianCloud faint_cloud(int count, const Size& size, const Place& place) {
+  GaussianCloudBuilder builder(0);
+  Rng rng(5);
+  for (int i = 0; i < count; ++i) {
+    RawGaussian g;
+    g.mean = place(i, rng);
+    g.quat = {1, 0, 0, 0};
+    for (int k = 0; k < 3; ++k) g.log_scales[k] = std::log(size(g.mean.z));
+    g.opacity_logit = -4;
+    for (auto& c : g.sh0) c = static_cast<float>(rng.normal());
+    builder.add(g);
+  }
+  return builder.cloud();
 }
 
 /// Cameras whose images have more than sixteen tiles a multiprocessor.

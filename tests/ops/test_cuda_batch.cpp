@@ -191,18 +191,12 @@ TEST_CASE("cuda batch: long lists, and thousands of Gaussians at one depth, are 
   SerialBackend serial;
   // A wall across the view: every key is equal, and tiles hold more than fits into shared memory. Faint,
   // so that pixels stay open to the end.
-  GaussianCloudBuilder builder(0);
-  Rng rng(5);
-  for (int i = 0; i < 30000; ++i) {
-    RawGaussian g;
-    g.mean = {rng.uniform(-0.4, 0.4), rng.uniform(-0.4, 0.4), i < 20000 ? 2.0 : rng.uniform(1, 3)};
-    g.quat = {1, 0, 0, 0};
-    for (int k = 0; k < 3; ++k) g.log_scales[k] = std::log(0.02);
-    g.opacity_logit = -4;
-    for (auto& c : g.sh0) c = static_cast<float>(rng.normal());
-    builder.add(g);
-  }
-  GaussianCloud cloud = builder.cloud();
+  GaussianCloud cloud = faint_cloud(
+      30000, [](double) { return 0.02; },
+      [](int i, Rng& rng) {
+        return Vec3d{rng.uniform(-0.4, 0.4), rng.uniform(-0.4, 0.4),
+                     i < 20000 ? 2.0 : rng.uniform(1, 3)};
+      });
   Camera camera;
   camera.set_hfov(48, 48, 60);
   camera.cx = camera.cy = 24;

@@ -72,7 +72,7 @@ bool CudaBatchRenderer::State::uses_regions(std::span<const GaussianSet> sets,
   std::uint64_t gaussians = 0;
   for (const CameraSet& v : camera_sets) gaussians += sets[v.set].gaussians.size();
   const bool many = depth_alone && gaussians >= Policy::kManyGaussians * cameras.size();
-  if (cameras.size() < Policy::kLeastCameras ||
+  if (cameras.size() < Policy::kLeastCameras || gaussians == 0 ||
       gaussians < least_gaussians_of_regions * cameras.size() ||
       std::max(first.width, first.height) > (many ? Policy::kSideOfDepth : Policy::kSide) ||
       config.response != Response::ewa || config.compat != Compat::none ||
