@@ -106,9 +106,7 @@ inline Status validate(const MeshInstance& instance) {
       return bad("texture: sizes do not fit its texels");
     }
   }
-  const Similarity& a = instance.world_from_mesh;
-  if (!(a.scale > 0) || !is_finite(a.scale) || !is_finite(a.translation) ||
-      !(abs(dot(a.rotation, a.rotation) - 1.0) < 1e-6)) {
+  if (!is_valid(instance.world_from_mesh)) {
     return bad("world_from_mesh must have a unit quaternion, a positive scale and be finite");
   }
   return {};
