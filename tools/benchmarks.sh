@@ -14,6 +14,7 @@
 #   --sizes LIST       image sizes (default: 256x256,640x480,1920x1080; on a GPU also 64x64 and 128x128)
 #   --cameras LIST     cameras per call on a GPU (default: 1,64,256)
 #   --no-gpu           processor alone
+#   --no-cpu           GPU alone
 #
 # The first run computes float64 references and keeps them in the folder; later runs take less time.
 # Times are medians over 64 views. They mean something only while no other program runs.
@@ -23,8 +24,8 @@ set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 build="" out=$root/out/benchmarks gaussians=100000,300000,1000000 sizes=256x256,640x480,1920x1080 cameras=1,64,256
-rounds=2 gpu=1 small="64x64 128x128"  # of a GPU, with the last of --cameras
-usage() { sed -n '4,21s/^# \{0,1\}//p' "$root/tools/benchmarks.sh"; }
+rounds=2 cpu=1 gpu=1 small="64x64 128x128"  # of a GPU, with the last of --cameras
+usage() { sed -n '4,22s/^# \{0,1\}//p' "$root/tools/benchmarks.sh"; }
 stop() { echo "benchmarks.sh: $*" >&2; exit 2; }
 while [[ $# -gt 0 ]]; do
   case $1 in
@@ -35,6 +36,7 @@ while [[ $# -gt 0 ]]; do
       ;;
     --quick) gaussians=100000 sizes=256x256 small="" rounds=1 ;;
     --no-gpu) gpu=0 ;;
+    --no-cpu) cpu=0 ;;
     --help | -h) usage; exit 0 ;;
     *) usage >&2; exit 2 ;;
   esac
@@ -48,7 +50,7 @@ if [[ -z $build ]]; then
   build=$root/build/benchmarks
   mkdir -p "$build"
   cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DGSNAV_BENCH=ON -DGSNAV_TESTS=OFF \
-    -DGSNAV_EXAMPLES=OFF -DGSNAV_INSTALL=OFF > "$build/configure.log" 2>&1 ||
+    -DCMAKE_UNITY_BUILD=ON -DGSNAV_EXAMPLES=OFF -DGSNAV_INSTALL=OFF > "$build/configure.log" 2>&1 ||
     { cat "$build/configure.log" >&2; stop "not configured; tools/install_deps.sh tests installs what is missing"; }
   targets=(gsnav-scene bench_render)
   targets_there=$(cmake --build "$build" --target help)
@@ -60,6 +62,7 @@ for program in "$scene" "$render"; do
   [[ -x $program ]] || stop "there is no $program; configure with -DGSNAV_BENCH=ON and build it"
 done
 [[ $gpu == 1 && -x $batch ]] || gpu=0
+[[ $cpu == 1 || $gpu == 1 ]] || stop "--no-cpu needs bench_batch (-DGSNAV_CUDA=ON), and no --no-gpu"
 
 mkdir -p "$out"
 out=$(cd "$out" && pwd)
@@ -75,8 +78,10 @@ for count in ${gaussians//,/ }; do
   scenes+=(--scene "flat $(of "$count")=$out/flat_$count.ply:$out/cameras.json")
 done
 
-"$root/tools/cpu_table.py" --build "$build" --sizes "$sizes" --rounds "$rounds" --cache "$out/cpu" \
-  --out "$out/cpu.md" "${scenes[@]}"
+if [[ $cpu == 1 ]]; then
+  "$root/tools/cpu_table.py" --build "$build" --sizes "$sizes" --rounds "$rounds" --cache "$out/cpu" \
+    --out "$out/cpu.md" "${scenes[@]}"
+fi
 
 # A row of bench_batch: profile batch ms p90 frames/s rgb_max p99.9 psnr least depth_p99 pairs scratch host_us
 rows_of_gpu() {
@@ -116,10 +121,10 @@ fi
 {
   commit=$(git -C "$root" describe --always --dirty 2> /dev/null || echo "not a repository")
   echo "# Benchmarks of $(date +%Y-%m-%d), commit $commit"
-  echo
-  echo "## Processor"
-  echo
-  cat "$out/cpu.md"
+  if [[ $cpu == 1 ]]; then
+    printf '\n## Processor\n\n'
+    cat "$out/cpu.md"
+  fi
   if [[ $gpu == 1 ]]; then
     printf '\n## %s\n\n' "$device"
     printf 'RGB-D is RGB, alpha and median depth; depth is median depth alone. '

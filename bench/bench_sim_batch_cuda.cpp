@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: Apache-2.0
+// Calls of a batch simulator on a GPU, at the image sizes at which agents are trained.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "device_time.hpp"
+#include "error.hpp"
+#include "gsnav/backends/cuda.hpp"
+#include "gsnav/backends/openmp.hpp"
+#include "gsnav/core/rng.hpp"
+#include "gsnav/open.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
+#include "gsnav/sim/basic_batch.hpp"
+#include "samples.hpp"
+
+namespace {
+
+using namespace gsnav;
+using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t kFlats = 4, kEnvironments = 256, kJudged = 4;
+enum Profile : std::int64_t { kFast, kVisible, kLod };
+const char* const kProfiles[] = {"fast", "fast with visible sets", "lod"};
+
+std::vector<SensorSpec> sensors(int side, bool rgb) {
+  std::vector<SensorSpec> all = rgbd_sensors(side, side);
+  if (!rgb) all.erase(all.begin());
+  return all;
+}
+
+/// Four copies of the embedded flat with `people` persons, each with arrays of its own, levels of detail
+/// and visible sets for a sensor of `side` pixels. The latest is kept, because rows of one size follow
+/// one another.
+const std::vector<std::shared_ptr<const SimulatorScene>>& flats(int side, std::size_t people) {
+  static std::map<std::pair<int, std::size_t>, std::vector<std::shared_ptr<const SimulatorScene>>> kept;
+  auto& flats = kept[{side, people}];
+  if (!flats.empty()) return flats;
+  OpenOptions options;
+  options.navmesh = "auto";
+  options.levels = SceneLevels::built;
+  options.visible_sets = "auto";
+  options.people = people;
+  options.eye = Camera::look_at({0, 1.5, 0}, {0, 1.5, -1}, {0, 1, 0}, side, side, 90);
+  const OpenedScene opened = open_scene("default", options).value();
+  for (const std::string& line : opened.notes) std::fprintf(stderr, "%s\n", line.c_str());
+  for (std::size_t i = 0; i < kFlats; ++i) {
+    SimulatorScene copy = *opened.scene;
+    for (SceneAsset& a : copy.assets) a.cloud = std::make_shared<const GaussianCloud>(*a.cloud);
+    flats.push_back(std::make_shared<const SimulatorScene>(std::move(copy)));
+  }
+  return flats;
+}
+
+/// Error of the images of the first environments against float64, without people.
+struct Judged {
+  double psnr = std::numeric_limits<double>::quiet_NaN(), depth_p99 = psnr;
+};
+
+template <class Batch>
+Judged judge(CudaBackend& cuda, const Batch& sim, const BatchStep& step, const SimulatorScene& scene,
+             const std::vector<SensorSpec>& wanted) {
+  std::vector<Camera> cameras;
+  for (std::size_t e = 0; e < kJudged; ++e) {  // environments 0, 4, 8, 12: all in the first flat
+    const AgentPose& agent = sim.world(kFlats * e).agent();
+    cameras.push_back(sensor_camera(wanted[0], agent.position, agent.rotation(), agent.pitch));
+  }
+  std::vector<GaussianSet> sets;
+  for (const SceneAsset& a : scene.assets) sets.push_back(a.cloud->set(a.world_from_asset));
+  OpenMPBackend cpu;
+  BasicRenderer<double, OpenMPBackend> reference(cpu);
+  const Frames<double> truth = reference.render(sets, cameras).value();
+  Judged judged;
+  for (const BatchObservation& o : step.images) {
+    const auto floats = static_cast<std::size_t>(o.height * o.width * o.channels);
+    std::vector<float> image(kJudged * floats), seen;
+    std::vector<double> expected;
+    for (std::size_t e = 0; e < kJudged; ++e) {
+      cuda.copy(image.data() + e * floats, o.on_backend + kFlats * e * floats, floats * sizeof(float),
+                CopyKind::device_to_host);
+    }
+    cuda.synchronize().throw_if_error();
+    if (o.kind == SensorKind::rgb) {
+      judged.psnr = gsnav_bench::error_of(image, truth.rgb).psnr;
+      continue;
+    }
+    for (std::size_t i = 0; i < image.size(); ++i) {
+      if (truth.alpha[i] <= 0.9) continue;
+      seen.push_back(image[i]);
+      expected.push_back(truth.median_depth[i]);
+    }
+    judged.depth_p99 = gsnav_bench::error_of(seen, expected).p99;
+  }
+  return judged;
+}
+
+/// BasicBatchSimulator::step() of 256 environments over four flats, with random actions. Images are left
+/// on the device. The time is that of the call, and the label names the profile.
+///
+/// Arguments: side in pixels, whether RGB is drawn beside depth, people in each flat, profile. With
+/// people, each environment is at a time of its own.
+///
+/// Counters: `ms` and `p90_ms` of the calls, `steps/s`, and `world_ms`, which is a call without images.
+/// `draw_ms` is what the renderer takes on the device for the same frames (`fast`, without people).
+/// `psnr` and `depth_p99` (metres) compare four environments after the reset with float64, without
+/// people. gsnav-report judges `lod`, against photos.
+void step_batch_cuda(benchmark::State& state) {
+  if (CudaBackend::device_count() == 0) {
+    state.SkipWithError("no GPU");
+    return;
+  }
+  const int side = static_cast<int>(state.range(0));
+  const auto people = static_cast<std::size_t>(state.range(2));
+  const std::int64_t profile = state.range(3);
+  state.SetLabel(kProfiles[profile]);
+  const auto& scenes = flats(side, people);
+  CudaBackend cuda;
+  BatchConfig config;
+  config.sensors = sensors(side, state.range(1) != 0);
+  config.images = ImageMemory::backend;
+  config.render.quality = Quality::fast();
+  config.visible_sets = profile == kVisible;
+  if (profile == kLod) config.lod = LodChoice{};
+  config.pose_slots = kEnvironments / kFlats;
+  if (people != 0) config.task = TaskConfig::avatar_pointnav();
+  const auto episode_of = [&](std::size_t e, std::size_t count) -> Result<BatchEpisode> {
+    Rng rng(100000 * e + count);
+    auto made = generate_episode(*scenes[e % kFlats]->navmesh, rng);
+    if (!made) return made.status();
+    made->start_time = rng.uniform(0.0, 600.0);
+    return BatchEpisode{e % kFlats, std::move(*made)};
+  };
+  auto sim = BasicBatchSimulator<CudaBackend>::create(
+                 cuda, {scenes.begin(), scenes.end()}, config, kEnvironments, episode_of)
+                 .value();
+  const BatchStep first = sim.reset().value();
+  Judged judged;
+  if (people == 0 && profile != kLod) judged = judge(cuda, sim, first, *scenes[0], config.sensors);
+
+  CudaBatchRenderer renderer(cuda, RenderConfig{.quality = Quality::fast()});
+  std::vector<GaussianArrays<CudaBackend>> arrays;
+  std::vector<GaussianSet> sets;
+  std::vector<std::vector<std::uint32_t>> sets_of(kFlats);
+  const bool draws = people == 0 && profile == kFast;
+  for (std::size_t i = 0; draws && i < kFlats; ++i) {
+    for (const SceneAsset& a : scenes[i]->assets) {
+      sets_of[i].push_back(static_cast<std::uint32_t>(sets.size()));
+      sets.push_back(arrays.emplace_back(cuda, *a.cloud).set(a.world_from_asset));
+    }
+  }
+  const std::size_t pixels = kEnvironments * static_cast<std::size_t>(side * side);
+  Buffer<float, CudaBackend> memory(cuda);
+  memory.resize_discard(4 * pixels);
+  BatchImages images;
+  images.floats.median_depth = memory.data();
+  if (state.range(1) != 0) images.floats.rgb = memory.data() + pixels;
+  gsnav_bench::DeviceTime device(cuda);
+
+  Rng rng(9);
+  std::vector<Action> actions(kEnvironments);
+  std::vector<double> calls, world, draw;
+  const auto call = [&] {
+    for (Action& a : actions) {
+      const auto k = rng.below(4);
+      a = k == 0 ? Action::turn_left : k == 1 ? Action::turn_right : Action::move_forward;
+    }
+    const auto begin = Clock::now();
+    sim.step(actions).value();
+    const std::chrono::duration<double> took = Clock::now() - begin;
+    return took.count();
+  };
+  const auto drawn = [&] {
+    std::vector<BatchCamera> cameras;
+    for (std::size_t e = 0; e < kEnvironments; ++e) {
+      const AgentPose& agent = sim.world(e).agent();
+      cameras.push_back(
+          {sensor_camera(config.sensors[0], agent.position, agent.rotation(), agent.pitch),
+           sets_of[e % kFlats]});
+    }
+    renderer.render(sets, cameras, images).throw_if_error();
+  };
+  for (int i = 0; i < 10; ++i) call();  // these allocate the scratch
+  for (auto _ : state) {
+    calls.push_back(call());
+    state.SetIterationTime(calls.back());
+    if (!draws || calls.size() % 4 != 0) continue;
+    draw.push_back(device.us(drawn));
+    renderer.finish().throw_if_error();
+  }
+  sim.set_rendering(false);
+  for (int i = 0; i < 20; ++i) world.push_back(call());
+  const double median = gsnav_bench::median(calls);
+  state.counters["ms"] = 1e3 * median;
+  state.counters["p90_ms"] = 1e3 * gsnav_bench::quantile(calls, 0.9);
+  state.counters["steps/s"] = static_cast<double>(kEnvironments) / median;
+  state.counters["world_ms"] = 1e3 * gsnav_bench::median(world);
+  state.counters["draw_ms"] = 1e-3 * gsnav_bench::median(draw);
+  state.counters["psnr"] = judged.psnr;
+  state.counters["depth_p99"] = judged.depth_p99;
+}
+BENCHMARK(step_batch_cuda)
+    ->ArgNames({"side", "rgb", "people", "profile"})
+    ->ArgsProduct({{64, 128, 256}, {0, 1}, {0, 5}, {kFast, kVisible, kLod}})
+    ->Iterations(100)
+    ->UseManualTime()
+    ->Unit(benchmark::kMillisecond);
+
+}  // namespace
