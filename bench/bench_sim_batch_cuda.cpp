@@ -37,25 +37,38 @@ std::vector<SensorSpec> sensors(int side, bool rgb) {
   return all;
 }
 
-/// Four copies of the embedded flat with `people` persons, each with arrays of its own, levels of detail
-/// and visible sets for a sensor of `side` pixels. The latest is kept, because rows of one size follow
-/// one another.
-const std::vector<std::shared_ptr<const SimulatorScene>>& flats(int side, std::size_t people) {
-  static std::map<std::pair<int, std::size_t>, std::vector<std::shared_ptr<const SimulatorScene>>> kept;
-  auto& flats = kept[{side, people}];
-  if (!flats.empty()) return flats;
+using Flats = std::vector<std::shared_ptr<const SimulatorScene>>;
+
+/// Four copies of the embedded flat with five people, each with arrays of its own, levels of detail and
+/// visible sets for a sensor of `side` pixels.
+Flats make_flats(int side) {
   OpenOptions options;
   options.navmesh = "auto";
   options.levels = SceneLevels::built;
   options.visible_sets = "auto";
-  options.people = people;
+  options.people = 5;
   options.eye = Camera::look_at({0, 1.5, 0}, {0, 1.5, -1}, {0, 1, 0}, side, side, 90);
   const OpenedScene opened = open_scene("default", options).value();
   for (const std::string& line : opened.notes) std::fprintf(stderr, "%s\n", line.c_str());
+  Flats flats;
   for (std::size_t i = 0; i < kFlats; ++i) {
     SimulatorScene copy = *opened.scene;
     for (SceneAsset& a : copy.assets) a.cloud = std::make_shared<const GaussianCloud>(*a.cloud);
     flats.push_back(std::make_shared<const SimulatorScene>(std::move(copy)));
+  }
+  return flats;
+}
+
+/// Flats of make_flats(), with or without their people.
+Flats flats_for(int side, bool people) {
+  static std::map<int, Flats> kept;
+  if (kept.find(side) == kept.end()) kept[side] = make_flats(side);
+  Flats flats = kept[side];
+  if (people) return flats;
+  for (auto& flat : flats) {
+    SimulatorScene alone = *flat;
+    alone.avatars.clear();
+    flat = std::make_shared<const SimulatorScene>(std::move(alone));
   }
   return flats;
 }
@@ -118,10 +131,10 @@ void step_batch_cuda(benchmark::State& state) {
     return;
   }
   const int side = static_cast<int>(state.range(0));
-  const auto people = static_cast<std::size_t>(state.range(2));
+  const bool people = state.range(2) != 0;
   const std::int64_t profile = state.range(3);
   state.SetLabel(kProfiles[profile]);
-  const auto& scenes = flats(side, people);
+  const Flats scenes = flats_for(side, people);
   CudaBackend cuda;
   BatchConfig config;
   config.sensors = sensors(side, state.range(1) != 0);
@@ -130,7 +143,7 @@ void step_batch_cuda(benchmark::State& state) {
   config.visible_sets = profile == kVisible;
   if (profile == kLod) config.lod = LodChoice{};
   config.pose_slots = kEnvironments / kFlats;
-  if (people != 0) config.task = TaskConfig::avatar_pointnav();
+  if (people) config.task = TaskConfig::avatar_pointnav();
   const auto episode_of = [&](std::size_t e, std::size_t count) -> Result<BatchEpisode> {
     Rng rng(100000 * e + count);
     auto made = generate_episode(*scenes[e % kFlats]->navmesh, rng);
@@ -138,18 +151,18 @@ void step_batch_cuda(benchmark::State& state) {
     made->start_time = rng.uniform(0.0, 600.0);
     return BatchEpisode{e % kFlats, std::move(*made)};
   };
-  auto sim = BasicBatchSimulator<CudaBackend>::create(
-                 cuda, {scenes.begin(), scenes.end()}, config, kEnvironments, episode_of)
+  auto sim = BasicBatchSimulator<CudaBackend>::create(cuda, {scenes.begin(), scenes.end()}, config,
+                                                      kEnvironments, episode_of)
                  .value();
   const BatchStep first = sim.reset().value();
   Judged judged;
-  if (people == 0 && profile != kLod) judged = judge(cuda, sim, first, *scenes[0], config.sensors);
+  if (!people && profile != kLod) judged = judge(cuda, sim, first, *scenes[0], config.sensors);
 
   CudaBatchRenderer renderer(cuda, RenderConfig{.quality = Quality::fast()});
   std::vector<GaussianArrays<CudaBackend>> arrays;
   std::vector<GaussianSet> sets;
   std::vector<std::vector<std::uint32_t>> sets_of(kFlats);
-  const bool draws = people == 0 && profile == kFast;
+  const bool draws = !people && profile == kFast;
   for (std::size_t i = 0; draws && i < kFlats; ++i) {
     for (const SceneAsset& a : scenes[i]->assets) {
       sets_of[i].push_back(static_cast<std::uint32_t>(sets.size()));
@@ -181,9 +194,8 @@ void step_batch_cuda(benchmark::State& state) {
     std::vector<BatchCamera> cameras;
     for (std::size_t e = 0; e < kEnvironments; ++e) {
       const AgentPose& agent = sim.world(e).agent();
-      cameras.push_back(
-          {sensor_camera(config.sensors[0], agent.position, agent.rotation(), agent.pitch),
-           sets_of[e % kFlats]});
+      cameras.push_back({sensor_camera(config.sensors[0], agent.position, agent.rotation(), agent.pitch),
+                         sets_of[e % kFlats]});
     }
     renderer.render(sets, cameras, images).throw_if_error();
   };
