@@ -15,8 +15,8 @@ constexpr std::size_t kNoNode = static_cast<std::size_t>(-1);
 struct GltfSkinPart {
   std::size_t index = 0;              ///< Index among the file's skins.
   std::vector<std::size_t> joint_of;  ///< For each entry of the skin's list, the joint of the skeleton.
-  Affine3<double> rig_from_mesh{};    ///< From its vertices to the space that the rig's inverse binds
-                                      ///< expect.
+  Affine3<double> rig_from_mesh{};    ///< Maps the skinned mesh's vertices to the space that the rig's
+                                      ///< inverse bind matrices expect.
 };
 
 /// A rig: the file's matrices, and the rigid skeleton made from them.

@@ -19,7 +19,7 @@ inline constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180.0;
 struct AsfBone {
   std::string name;
   Vec3d direction{};
-  double length = 0.0;     ///< In units of the file.
+  double length = 0.0;     ///< Length of the bone, in units of the file.
   Quatd axis{};            ///< C, the rotation of the bone's own axes.
   std::vector<int> turns;  ///< Axes of its rotations in the order listed: 0 x, 1 y, 2 z.
   std::vector<std::size_t> children;

@@ -45,7 +45,7 @@ class Landmarks {
 
   /// Distances from one landmark along one edge, metres.
   struct Line {
-    std::array<float, kParts + 1> at;  ///< From the first corner of the edge on.
+    std::array<float, kParts + 1> at;  ///< At evenly spaced points, from the edge's first corner on.
     float below = 0, above = 0;        ///< How far the distance may be below and above the lines.
   };
 

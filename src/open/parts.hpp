@@ -19,7 +19,7 @@ struct OpeningScene {
   SceneSource source;
   OpenedScene out;
   SimulatorScene scene;
-  Similarity world_from_file{};  ///< From the up axis.
+  Similarity world_from_file{};  ///< Turns the file's up axis to +y.
   NavMeshTriangles triangles;    ///< World frame. A NavMesh may be built from them.
 
   void note(std::string text) { out.notes.push_back(std::move(text)); }

@@ -16,8 +16,9 @@ struct ClipSource {
   std::string clip;    ///< A file (.bvh, .amc, .glb, .gltf, or a driver's .npz), or the name of a clip
                        ///< in the body's own file.
   std::string asf;     ///< Skeleton of an .amc file.
-  double scale = 0.0;  ///< Metres per unit of the clip's file. 0: 1, or the unit of the .asf file.
-  bool z_up = false;
+  double scale = 0.0;  ///< Metres per unit of the clip's file. 0 takes the unit that the .asf file
+                       ///< names, and for other files 1.
+  bool z_up = false;   ///< Whether z is the clip's up axis, instead of y.
 };
 
 /// Options of from-gltf and from-makehuman.

@@ -39,7 +39,7 @@ enum class OptionRole {
 };
 /// An option as given on a command line.
 struct OptionValue {
-  std::string flag;   ///< With dashes.
+  std::string flag;   ///< Name of the option, with its dashes.
   std::string value;  ///< Several values are separated by line breaks.
   OptionRole role = OptionRole::result;
   bool names_file = false;  ///< The value is the name of a file.

@@ -161,7 +161,7 @@ struct BatchCounters {
   alignas(kLine) std::uint32_t long_parts;
   alignas(kLine) std::uint32_t tiles_of_length[33];  ///< By leading zeros of a tile's count, so that
                                                      ///< long lists come first.
-  std::uint32_t ordered_of_length[33];               ///< Number of these that are in tile_order already.
+  std::uint32_t ordered_of_length[33];  ///< How many tiles of each length are in tile_order already.
 };
 
 /// Arguments of every kernel, passed by value.

@@ -17,11 +17,12 @@ constexpr unsigned kDrawThreads = 32 * Policy::kDrawWarps;
 template <bool Color>
 struct TileShared {
   ReaderShared reader;
-  float4 geometry[2][kStaged + 1];  ///< The last covers no pixel.
+  float4 geometry[2][kStaged + 1];  ///< Geometry of the staged splats. The last covers no pixel.
   float4 colors[Color ? kStaged + 1 : 1];
-  std::uint32_t sources[kStaged + 1];
-  std::uint32_t masks[kStaged + 32];  ///< Pairs of pixels of each splat; then splats of each pair.
-  std::uint32_t waiting[64];          ///< Sources of rows to be projected.
+  std::uint32_t sources[kStaged + 1];  ///< Which row each staged splat comes from.
+  std::uint32_t masks[kStaged + 32];   ///< Bits of the pixel pairs that a splat covers. Transposed in
+                                       ///< blend() to bits of the splats that cover a pixel pair.
+  std::uint32_t waiting[64];           ///< Rows that are still to be projected.
 };
 
 /// Transposes a matrix of 32 x 32 bits, one row per lane.

@@ -59,7 +59,7 @@ inline constexpr std::uint32_t kItemKinds = 6, kInDouble = 5;
 struct RegionCounters {
   static constexpr std::size_t kLine = 256;
   alignas(kLine) unsigned long long pairs;
-  unsigned long long groups;  ///< In view, of all cameras.
+  unsigned long long groups;  ///< Number of groups in view, summed over all cameras.
   alignas(kLine) std::uint32_t far_rows;
   alignas(kLine) std::uint32_t next_item[2];  ///< For all kinds but kInDouble, and for that.
   alignas(kLine) std::uint32_t items[kItemKinds];

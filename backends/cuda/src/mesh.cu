@@ -117,7 +117,7 @@ __global__ void __launch_bounds__(kThreads)
   });
 }
 
-/// Shows a triangle at a pixel of its box if it covers the pixel and is nearer than the one shown.
+/// Makes a triangle the visible one at a pixel of its box if it covers the pixel and is nearest so far.
 __device__ void show(const MeshRasterArgs<float>& args, const MeshTriangle<float>& t, std::uint32_t id,
                      int x, int y, PixelWord* pixels) {
   const float inverse_z = mesh_inverse_z(t, x, y);

@@ -64,8 +64,8 @@ struct FirstImpact {
       bone = 0;                      ///< index of the capsule within the avatar
   bool started_overlapping = false;  ///< true if some body overlapped the agent at the start
   bool pushed = false;               ///< true if some body in contact came closer by its own motion
-  std::uint32_t pushed_avatar = 0,   ///< smallest avatar of those bodies, if `pushed`
-      pushed_bone = 0;               ///< smallest capsule of that avatar
+  std::uint32_t pushed_avatar = 0,   ///< lowest index of an avatar among those bodies, if `pushed`
+      pushed_bone = 0;               ///< lowest index among the pushing capsules of that avatar
 };
 
 /// Sweeps `agent` against the part [u0, u1] of the bodies' motion and merges the result into `best`.

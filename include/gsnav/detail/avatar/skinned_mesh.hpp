@@ -44,10 +44,10 @@ struct SkinnedMeshReport {
   double least_weight_sum = 1.0, greatest_weight_sum = 1.0;
   std::size_t without_weights =
       0;  ///< Vertices without weights; the joints of the nearest weighted vertex move them.
-  /// Greatest distance, metres, over the poses looked at, between a vertex posed by the file's own
-  /// matrices and by rigid joints, which drop scales.
+  /// Error of replacing the file's matrices by rigid joints, which have no scales. It is the greatest
+  /// distance that a vertex moves, metres, in the file's own pose and in all frames of its clips.
   double rigid_error = 0.0;
-  std::vector<std::string> warnings;  ///< Everything else that a person should know.
+  std::vector<std::string> warnings;  ///< One line for each other oddity of the file.
 };
 
 }  // namespace gsnav

@@ -8,7 +8,7 @@
 
 namespace gsnav {
 
-/// The weight that a number of parts stands for (AvatarAsset::skinning_weights).
+/// Skinning weight in [0, 1] of an integer number of parts, each of which is 1 / kWeightParts.
 inline double weight_of_parts(std::uint16_t parts) noexcept { return skinning_weight<double>(parts); }
 
 /// Rounds weights to integer parts whose sum is kWeightParts.

@@ -23,7 +23,7 @@ struct SceneAvatar {
   double offset_y = 0.0;             ///< Metres upwards.
   double time_begin = 0.0;           ///< Seconds on the scene's clock.
   std::optional<double> time_end;    ///< Empty: the avatar leaves after the driver's last frame.
-  Affine3<double> coordinates{};     ///< From the driver's frame to the world, rigid.
+  Affine3<double> coordinates{};     ///< Rigid map from the driver's frame to the world.
   bool guess_coordinates = true;  ///< Whether the scene file names no coordinate system. An avatar whose
                                   ///< root is upside down in the first frame is then turned over.
 };

@@ -10,8 +10,8 @@ struct ReadLimits {
   /// Nesting of arrays and objects in JSON. Range [1, 10000]. Readers of JSON without ReadLimits (SOG,
   /// cameras, Habitat's configurations, NavMesh settings, avatar scenes) allow 64.
   int json_depth = 64;
-  /// Bytes of text for each byte of a gzip file; the first 64 KiB are always read. Range [1, 1032];
-  /// deflate cannot expand more.
+  /// Largest ratio of decompressed to compressed size of a gzip file. The first 64 KiB of the
+  /// decompressed data are read whatever the ratio. Range [1, 1032]: deflate cannot expand more.
   int inflation = 200;
   /// Pixels along the longer side of a texture of a glTF file (PNG, JPEG, WebP), checked before it is
   /// decoded. Range [1, 65535]; a JPEG is limited to 16384. A larger texture is left out with a warning,

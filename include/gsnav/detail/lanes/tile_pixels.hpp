@@ -134,7 +134,7 @@ class TilePixels {
   Unset<F, Mesh ? kMaxBlocks : 1> mesh;  ///< depth of the mesh
 
  private:
-  /// The tile's part of the stored states.
+  /// Blending state of this tile's pixels, kept from one depth slice to the next.
   float* kept() const noexcept {
     const std::size_t pixels = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
     return args_.progress.states.data + tile_ * blend_state_values(D) * pixels;

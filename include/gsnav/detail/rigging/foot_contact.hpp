@@ -12,7 +12,7 @@ namespace gsnav {
 /// A point of a sole, fixed to a joint.
 struct SolePoint {
   std::size_t joint = 0;  ///< Index of the joint.
-  Vec3d local{};          ///< In the joint's frame, metres.
+  Vec3d local{};          ///< Position in the joint's frame, metres.
 };
 
 /// The joints of one foot, the ankle first, and the points where it touches the ground: heel, ball and
@@ -39,8 +39,8 @@ struct FootSlide {
 
 /// Movement of a foot from one frame to the next.
 struct FootMove {
-  bool down = false;  ///< Whether the foot is down.
-  Vec3d way{};        ///< Movement along the floor of the point of the sole that moves least, metres.
+  bool down = false;  ///< Whether the foot is on the floor.
+  Vec3d way{};        ///< Displacement along the floor, metres, of the sole point that moves least.
 };
 
 /// Finds when a foot is down: while a point of its sole is within `clearance` of the lowest height that

@@ -63,7 +63,7 @@ struct LoadReport {
                         ///< least and the greatest of their own times, seconds.
   double first_time = 0, last_time = 0;  ///< Range of time of a moving scene, seconds.
   Aabb<double> bounds{};                 ///< Box of the kept means, asset frame.
-  std::vector<std::string> warnings;     ///< Everything else that a person should know.
+  std::vector<std::string> warnings;     ///< One line for each other oddity of the file.
 
   /// Counts a row that was read.
   void count(RowFate fate, bool clamped) noexcept {
