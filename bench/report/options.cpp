@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "../../tools/common/check_values.hpp"
 #include "../../tools/common/parse_options.hpp"
 #include "../../tools/common/scene_options.hpp"
 #include "gsnav/core/printable.hpp"
@@ -140,8 +141,10 @@ void add_run(CLI::App& app, Options& o) {
   app.add_option("--out", o.out, "Folder of the report")->capture_default_str();
   app.add_option("--cache", o.cache,
                  "Folder of the references; default OUT/references, `none`: not kept");
-  app.add_option("--docs", o.docs,
-                 "Also writes a Markdown page of approximations from the CSV to this file");
+  gsnav_tools::check_output_name(
+      app.add_option("--docs", o.docs,
+                     "Also writes a Markdown page of approximations from the CSV to this file (.md)"),
+      gsnav_tools::ends_in({".md"}));
   app.add_option("--commit", o.commit, "Commit that the rows are measured for")->capture_default_str();
   app.add_option("--machine", o.machine,
                  "Machine that the rows are measured on; default: the processor's name");

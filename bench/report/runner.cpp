@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "../../tools/common/check_values.hpp"
 #include "csv.hpp"
 #include "docs.hpp"
 #include "gsnav/core/printable.hpp"
@@ -139,6 +140,8 @@ Status add_rows(const Options& o, CsvFile& csv, const Row& stamp, const std::str
 Status run_report(const Options& o) {
   if (Status s = make_output_folder(o.out); !s) return {s.code(), "--out " + s.message()};
   const std::filesystem::path out(o.out), path = out / "report.csv";
+  if (Status s = gsnav_tools::check_files_in(out, {"report.html"}); !s) return s;
+  if (Status s = o.docs.empty() ? Status() : check_output_path(o.docs); !s) return s;
   Result<CsvFile> csv = CsvFile::open(path, o.resume);
   if (!csv) return csv.status();
   Row stamp;

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "../../tools/common/canvas.hpp"
+#include "../../tools/common/check_values.hpp"
 #include "../../tools/common/parse_options.hpp"
 #include "crowd.hpp"
 #include "gsnav/core/replace_file.hpp"
@@ -113,10 +114,9 @@ int main(int argc, char** argv) {
   app.add_option("--out", out, "folder for the images");
   app.add_flag("--frames", frames, "also write an image of each tick");
   if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
-  if (const Status s = out.empty() ? Status() : make_output_folder(out); !s) {
-    std::fprintf(stderr, "crowd: --out %s\n", s.message().c_str());
-    return 1;
-  }
+  Status ready = out.empty() ? Status() : make_output_folder(out);
+  if (ready && !out.empty()) ready = gsnav_tools::check_files_in(out, {".png"});
+  if (!ready) return gsnav_tools::fail("crowd", "--out " + ready.message());
 
   const DefaultScene flat = make_default_scene(0.05).value();
   const NavMesh mesh = NavMesh::build({}, flat.vertices, flat.triangles).value();

@@ -4,6 +4,7 @@
 // same for any number of ranks. Run again, with any number of ranks, it plays the missing episodes.
 #include <mpi.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <exception>
@@ -13,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "../../tools/common/parse_options.hpp"
 #include "../../tools/eval/run.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/core/replace_file.hpp"
@@ -145,7 +147,7 @@ int main(int argc, char** argv) {
   gsnav_eval::add_world_options(app, o);
   app.add_flag("--draw", draw,
                "draw what the agent sees at each step; the ranks of a machine share its GPUs");
-  CLI11_PARSE(app, argc, argv);
+  if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
   Status s;
   try {
     s = run(ranks, o, draw);

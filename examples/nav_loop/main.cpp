@@ -6,6 +6,7 @@
 #include <exception>
 #include <string>
 
+#include "../../tools/common/check_values.hpp"
 #include "../../tools/common/parse_options.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/device/simulator.hpp"
@@ -120,6 +121,7 @@ int main(int argc, char** argv) try {
       ->capture_default_str()
       ->check(CLI::Range(1, 1000000));
   gsnav_tools::add_scene_options(app, o);
+  gsnav_tools::refuse_value(app, "--navmesh", "none", "agents need one; use auto");
   const auto check = [&o] {
     if (o.shown_episode < o.episodes) return;
     throw CLI::ValidationError("--show " + std::to_string(o.shown_episode) + ": of " +

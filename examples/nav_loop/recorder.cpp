@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "../../tools/common/check_values.hpp"
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/image_file.hpp"
 
@@ -19,8 +20,12 @@ constexpr std::size_t kMostShots = 64;  // frames kept in memory for the strip
 }  // namespace
 
 gsnav::Status Recorder::open() {
-  gsnav::Status s =
-      gsnav::make_output_folder(options_.frame_every > 0 ? options_.out + "/frames" : options_.out);
+  const std::string frames = options_.out + "/frames";
+  gsnav::Status s = gsnav::make_output_folder(options_.frame_every > 0 ? frames : options_.out);
+  if (s)
+    s = gsnav_tools::check_files_in(options_.out,
+                                    {"strip.png", "map.png", "metrics.json", "timings.json"});
+  if (s) s = gsnav_tools::check_files_in(frames, {"_rgb.png", "_depth.png"});
   return s ? s : gsnav::Status(s.code(), "--out " + s.message());
 }
 

@@ -6,7 +6,6 @@
 
 namespace nav_loop {
 
-using gsnav::Errc;
 using gsnav::Result;
 
 std::vector<gsnav::SensorSpec> sensors_of(const Options& options) {
@@ -20,9 +19,6 @@ Result<Setup> prepare(const Options& options) {
   auto opened = gsnav_tools::open_scene(options, how, stderr);
   if (!opened) return opened.status();
   const gsnav::SimulatorScene& scene = *opened->scene;
-  if (scene.navmesh == nullptr) {
-    return {Errc::invalid_argument, "--navmesh " + options.navmesh + ": agents need one; use auto"};
-  }
   Setup setup;
   setup.scene = opened->scene;
   setup.detail = gsnav_tools::detail_of(options, *opened);

@@ -15,9 +15,6 @@
 #include "triangle_heights.hpp"
 
 namespace gsnav {
-namespace {
-
-using detail::VoxelGrid;
 
 Status validate(const GaussianNavOptions& o) {
   struct Field {
@@ -32,9 +29,10 @@ Status validate(const GaussianNavOptions& o) {
   if (o.crop) {
     for (int k = 0; k < 3; ++k) {
       if (!(o.crop->low[k] < o.crop->high[k])) {
-        return {Errc::invalid_argument, "GaussianNavOptions.crop: low " +
-                                            std::to_string(o.crop->low[k]) + " is not below high " +
-                                            std::to_string(o.crop->high[k])};
+        const char axis = "xyz"[k];
+        return {Errc::invalid_argument, std::string("GaussianNavOptions.crop: low.") + axis + " = " +
+                                            std::to_string(o.crop->low[k]) + " is not below high." +
+                                            axis + " = " + std::to_string(o.crop->high[k])};
       }
     }
   }
@@ -51,6 +49,10 @@ Status validate(const GaussianNavOptions& o) {
   }
   return {};
 }
+
+namespace {
+
+using detail::VoxelGrid;
 
 /// Drops pieces of floor below `min_area`, m².
 struct Pruner {

@@ -123,6 +123,8 @@ Status open_navmesh(OpeningScene& s) {
   const OpenOptions& o = s.options;
   const auto choice = choose(s);
   if (!choice) return choice.status();
+  if (o.crop && (!*choice || !(*choice)->file.empty() || (*choice)->triangles))
+    s.warn("crop: no NavMesh is built from Gaussians, which alone are cropped");
   if (*choice) {
     const NavMeshChoice& c = **choice;
     auto mesh =

@@ -5,11 +5,15 @@
 #include <charconv>
 #include <cmath>
 
+#include "../common/check_values.hpp"
 #include "../common/parse_options.hpp"
 #include "gsnav/core/printable.hpp"
 
 namespace gsnav_avatar {
 namespace {
+
+using gsnav_tools::check_output_name;
+using gsnav_tools::ends_in;
 
 const char kDescription[] =
     "Makes Gaussian avatars from rigged meshes, plans their walks and draws them.\nLengths are metres, "
@@ -53,7 +57,10 @@ void add_mesh(CLI::App& app, MeshCommand& m, bool makehuman) {
   app.add_option("input", m.input,
                  makehuman ? "MakeHuman base mesh (.obj)" : "rigged glTF 2.0 file (.glb, .gltf)")
       ->required();
-  app.add_option("--out", m.out, "avatar file to write (.npz with the keys of Habitat-GS)")->required();
+  check_output_name(
+      app.add_option("--out", m.out, "avatar file to write (.npz with the keys of Habitat-GS)")
+          ->required(),
+      ends_in({".npz"}));
   if (makehuman) m.scale = 0.1;
   app.add_option("--scale", m.scale, "metres per unit of INPUT; 0.01 for a rig in centimetres")
       ->check(CLI::PositiveNumber)
@@ -63,8 +70,10 @@ void add_mesh(CLI::App& app, MeshCommand& m, bool makehuman) {
                    "name or index of a skin to read; may be repeated for skins of one rig; default: all "
                    "skins, which must share a rig");
   }
-  app.add_option("--driver", m.driver,
-                 "driver file to write (.npz): the clip at 40 frames per second, with its capsules");
+  check_output_name(
+      app.add_option("--driver", m.driver,
+                     "driver file to write (.npz): the clip at 40 frames per second, with its capsules"),
+      ends_in({".npz"}));
   app.add_option("--gaussians", m.gaussians, "approximate number of Gaussians")->capture_default_str();
   app.add_option("--seed", m.seed, "seed of the positions of the Gaussians")->capture_default_str();
   app.add_option("--influences", m.influences,
@@ -97,7 +106,8 @@ CLI::App* add_walk(CLI::App& app, WalkCommand& walk, std::string& from, std::str
   walks->add_option("--from", from, "start: X,Y,Z")->required();
   walks->add_option("--to", to, "end: X,Y,Z")->required();
   walks->add_option("--via", via, "point on the way: X,Y,Z; may be repeated, in order");
-  walks->add_option("--out", walk.out, "driver file to write (.npz)")->required();
+  check_output_name(walks->add_option("--out", walk.out, "driver file to write (.npz)")->required(),
+                    ends_in({".npz"}));
   walks
       ->add_option("--speed", walk.speed,
                    "walking speed, metres per second; 0 takes the speed of the clip")
@@ -148,7 +158,8 @@ CLI::App* add_strip(CLI::App& app, StripCommand& strip, std::string& eye, std::s
   strips
       ->add_option("--end", strip.end, "time of the last image, seconds; 0 takes the end of the driver")
       ->check(CLI::NonNegativeNumber);
-  strips->add_option("--out", strip.out, "image file to write (.png)")->required();
+  check_output_name(strips->add_option("--out", strip.out, "image file to write (.png)")->required(),
+                    ends_in({".png"}));
   return strips;
 }
 
@@ -193,13 +204,18 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   if (walks->parsed()) {
     if (!walk.flat && walk.navmesh.empty()) {
       std::fprintf(stderr, "gsnav-avatar: walk needs --navmesh or --flat\n");
-      exit_code = 1;
+      exit_code = gsnav_tools::kUsage;
       return std::nullopt;
     }
     if (!parse_point(from, walk.from)) return bad(from, "point X,Y,Z");
     if (!parse_point(to, walk.to)) return bad(to, "point X,Y,Z");
     out.walk = walk;
   } else if (strips->parsed()) {
+    if (strip.end > 0 && strip.begin > strip.end) {
+      std::fprintf(stderr, "gsnav-avatar: --begin %g is after --end %g\n", strip.begin, strip.end);
+      exit_code = gsnav_tools::kUsage;
+      return std::nullopt;
+    }
     if (!parse_point(eye, strip.eye)) return bad(eye, "point X,Y,Z");
     if (!parse_point(target, strip.target)) return bad(target, "point X,Y,Z");
     out.strip = strip;

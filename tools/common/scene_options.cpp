@@ -145,6 +145,12 @@ void add_scene_options(CLI::App& app, SceneOptions& o, bool* float64) {
   add_density_option(app, o,
                      "density of Gaussians in the embedded flat and in people, relative to the default");
   add_device_option(app, o.device, float64);
+  app.final_callback([&o] {
+    if (!o.visible_sets.empty() && o.profile == "exact") {
+      throw CLI::ValidationError("--visible-sets",
+                                 "sampled, so not for --profile exact; use fast or lod");
+    }
+  });
 }
 
 void refuse_scene_options(CLI::App& app, std::initializer_list<UnusedOption> unused) {
@@ -180,10 +186,6 @@ gsnav::OpenOptions open_options(const SceneOptions& o) {
 
 gsnav::Result<gsnav::OpenedScene> open_scene(const SceneOptions& o, const gsnav::OpenOptions& how,
                                              std::FILE* notes) {
-  if (!o.visible_sets.empty() && o.profile == "exact") {
-    return {gsnav::Errc::invalid_argument,
-            "--visible-sets: sampled, so not for --profile exact; use fast or lod"};
-  }
   gsnav::OpenOptions asked = how;
   asked.progress = progress_printer();
   auto scene = gsnav::open_scene(o.scene, asked);

@@ -67,7 +67,7 @@ void refuse_scene_options(CLI::App& app, std::initializer_list<UnusedOption> unu
 gsnav::OpenOptions open_options(const SceneOptions& o);
 
 /// Opens the scene. Prints information to `notes`, and warnings and progress to stderr.
-/// @return invalid_argument for options that cannot be combined; the errors of gsnav::open_scene.
+/// @return the errors of gsnav::open_scene.
 gsnav::Result<gsnav::OpenedScene> open_scene(const SceneOptions& o, const gsnav::OpenOptions& how,
                                              std::FILE* notes);
 

@@ -3,6 +3,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "check_values.hpp"
+
 namespace gsnav_tools {
 
 void add_voxel_options(CLI::App& app, double& cell_size, std::vector<double>& crop,
@@ -12,10 +14,9 @@ void add_voxel_options(CLI::App& app, double& cell_size, std::vector<double>& cr
                  "height too, if it is 0.05 or more")
       ->capture_default_str()
       ->group(group);
-  app.add_option("--crop", crop,
-                 "build the NavMesh in this box only: X0 Y0 Z0 X1 Y1 Z1, metres, world frame (Y up)")
-      ->expected(6)
-      ->group(group);
+  add_crop_option(app, crop,
+                  "build the NavMesh in this box only: X0 Y0 Z0 X1 Y1 Z1, metres, world frame (Y up)",
+                  group);
 }
 
 gsnav::Aabb<double> box_of(const std::vector<double>& corners) {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "../common/check_values.hpp"
 #include "../common/parse_options.hpp"
 #include "../common/scene_options.hpp"
 #include "../common/voxel_options.hpp"
@@ -62,25 +63,26 @@ Result<GaussianCloud> load(const Options& o) {
   return all;
 }
 
-/// Checks that a scene can be edited with these values.
-/// @return an error with the option.
-Status validate(const Options& o) {
-  const std::pair<const char*, std::vector<double>> all[] = {{"--crop", o.crop},
-                                                             {"--rotate", o.rotate},
+/// Takes the inputs from the names, and checks that a scene can be edited and written with these values.
+/// Throws CLI::ValidationError with the option.
+void check_options(Options& o) {
+  if (o.inputs.size() + o.paths.size() < 2 || o.paths.empty())
+    throw CLI::ValidationError("IN... OUT", "an input and an output are needed");
+  o.inputs.insert(o.inputs.end(), o.paths.begin(), o.paths.end() - 1);
+  const Status out = io::check_scene_output(o.paths.back());
+  if (out.code() == Errc::unsupported) throw CLI::ValidationError("OUT", out.message());
+  const std::pair<const char*, std::vector<double>> all[] = {{"--rotate", o.rotate},
                                                              {"--translate", o.translate},
                                                              {"--scale", {o.scale}},
                                                              {"--min-opacity", {o.min_opacity}},
                                                              {"--max-scale", {o.max_scale}}};
   for (const auto& [name, values] : all) {
     for (const double v : values) {
-      if (!std::isfinite(v))
-        return {Errc::invalid_argument,
-                std::string(name) + " " + std::to_string(v) + ": must be finite"};
+      if (!std::isfinite(v)) throw CLI::ValidationError(name, std::to_string(v) + ": must be finite");
     }
   }
-  if (o.max_scale < 0)
-    return {Errc::invalid_argument, "--max-scale " + std::to_string(o.max_scale) + ": must be positive"};
-  return {};
+  if (!o.rotate.empty() && !(norm(Vec3d{o.rotate[0], o.rotate[1], o.rotate[2]}) > 0))
+    throw CLI::ValidationError("--rotate", "the axis is zero");
 }
 
 /// Turns the scene upright, crops and prunes. Then rotates, scales and moves, in this order.
@@ -105,7 +107,6 @@ Status edit(GaussianCloud& cloud, const Options& o) {
   by.scale = o.scale;
   if (!o.rotate.empty()) {
     const Vec3d axis{o.rotate[0], o.rotate[1], o.rotate[2]};
-    if (!(norm(axis) > 0)) return {Errc::invalid_argument, "--rotate: the axis is zero"};
     by.rotation = axis_angle(normalized(axis), o.rotate[3] * 3.14159265358979323846 / 180);
   }
   if (!o.translate.empty()) by.translation = {o.translate[0], o.translate[1], o.translate[2]};
@@ -206,15 +207,15 @@ void add_inputs(CLI::App& app, Options& o) {
                  "it from the ground; keep leaves the axes of the file")
       ->check(CLI::IsMember({"keep", "auto", "x", "y", "z", "+x", "+y", "+z", "-x", "-y", "-z"}))
       ->capture_default_str();
-  app.add_option("--crop", o.crop,
-                 "keep Gaussians with their centre in X0 Y0 Z0 X1 Y1 Z1, metres, axes of --up")
-      ->expected(6);
+  gsnav_tools::add_crop_option(
+      app, o.crop, "keep Gaussians with their centre in X0 Y0 Z0 X1 Y1 Z1, metres, axes of --up");
 }
 
 void add_edits(CLI::App& app, Options& o) {
   app.add_option("--min-opacity", o.min_opacity, "drop Gaussians with a lower opacity")
       ->check(CLI::Range(0.0, 1.0));
-  app.add_option("--max-scale", o.max_scale, "drop Gaussians with a larger standard deviation, metres");
+  app.add_option("--max-scale", o.max_scale, "drop Gaussians with a larger standard deviation, metres")
+      ->check(CLI::NonNegativeNumber);
   app.add_option("--sh", o.degree, "keep SH bands up to this degree")
       ->check(CLI::Range(0, kMaxShDegree));
   app.add_option("--rotate", o.rotate, "then turn about the axis X Y Z by DEGREES")->expected(4);
@@ -271,15 +272,10 @@ int main(int argc, char** argv) {
   add_edits(app, o);
   add_output(app, o);
   refuse_others(app);
-  const auto status = gsnav_tools::parse_options(app, argc, argv, [&o] {
-    if (o.inputs.size() + o.paths.size() < 2 || o.paths.empty())
-      throw CLI::ValidationError("IN... OUT", "an input and an output are needed");
-    o.inputs.insert(o.inputs.end(), o.paths.begin(), o.paths.end() - 1);
-  });
+  const auto status = gsnav_tools::parse_options(app, argc, argv, [&o] { check_options(o); });
   if (status) return *status;
 
   const std::string out = o.paths.back();
-  if (Status s = validate(o); !s) return fail(s.message());
   if (Status s = io::check_scene_output(out); !s) return fail(s.message());
   auto cloud = load(o);
   if (!cloud) return fail(cloud.message());

@@ -6,6 +6,7 @@
 #include <exception>
 #include <nlohmann/json.hpp>
 
+#include "../common/check_values.hpp"
 #include "../common/parse_options.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/core/replace_file.hpp"
@@ -25,6 +26,8 @@ using Json = nlohmann::ordered_json;
 double seconds_since(Clock::time_point t) {
   return std::chrono::duration<double>(Clock::now() - t).count();
 }
+
+constexpr const char *kStripEnding = "_strip.png", *kMapEnding = "_map.png";
 
 /// Seconds of this run.
 struct Timings {
@@ -70,6 +73,7 @@ Status run(const Options& o, int pictures, bool restart) {
        {"journal.jsonl", "episodes.json.gz", "index.html", "metrics.json", "timings.json"}) {
     if (Status s = gsnav::check_output_path(out / name); !s) return s;
   }
+  if (Status s = gsnav_tools::check_files_in(episode_folder, {kStripEnding, kMapEnding}); !s) return s;
   if (Status s = restart ? Status() : Journal::check_options(out, o); !s) return s;
   Timings timings;
   Clock::time_point from = Clock::now();
@@ -110,7 +114,7 @@ Status run(const Options& o, int pictures, bool restart) {
     Entry e{&record, {}, {}};
     if (pictures < 0 || static_cast<std::size_t>(pictures) > number) {
       const fs::path base = episode_folder / std::to_string(number);
-      const fs::path strip = base.string() + "_strip.png", map = base.string() + "_map.png";
+      const fs::path strip = base.string() + kStripEnding, map = base.string() + kMapEnding;
       if (!fs::exists(strip) || !fs::exists(map)) {
         if (Status w = draw(*sim, *stage, record, strip, map); !w) return w;
       }

@@ -9,6 +9,8 @@
 #include <string_view>
 #include <type_traits>
 
+#include "../common/check_values.hpp"
+
 namespace gsnav_eval {
 namespace {
 
@@ -119,6 +121,9 @@ void add_scene_options(CLI::App& app, Options& o) {
       ->check(CLI::IsMember({"v1", "v2", "avatar"}));
   gsnav_tools::add_view_options(app, o);
   gsnav_tools::add_scene_options(app, o);
+  gsnav_tools::refuse_value(app, "--navmesh", "none", "agents need one; use auto");
+  gsnav_tools::refuse_value(app, "--storage", "packed",
+                            "journals and maps read the floats; use full or compact");
 }
 
 void add_world_options(CLI::App& app, Options& o) {

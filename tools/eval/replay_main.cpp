@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "../common/check_values.hpp"
 #include "../common/overlay.hpp"
 #include "../common/parse_options.hpp"
 #include "gsnav/core/printable.hpp"
@@ -208,6 +209,8 @@ Status run(const Options& o, const ReplayOptions& r) {
   if (Status s = r.video.empty() ? Status() : gsnav::check_output_path(r.video); !s) return s;
   if (Status s = gsnav::make_output_folder(r.frames); !s) return s;
   if (Status s = gsnav::check_output_path(fs::path(r.frames) / "track.npz"); !s) return s;
+  if (Status s = r.video.empty() ? gsnav_tools::check_files_in(r.frames, {".png"}) : Status(); !s)
+    return s;
   const auto stage = prepare(o);
   if (!stage) return stage.status();
   const auto journal = Journal::load(o.out, o, *stage);
@@ -258,8 +261,11 @@ int main(int argc, char** argv) try {
       ->needs("--eye");
   app.get_option("--eye")->needs("--target");
   app.add_option("--frames", r.frames, "folder for images and track.npz")->capture_default_str();
-  app.add_option("--video", r.video,
-                 "video file to write instead of PNG files: .webp (animated), or .mp4 (needs ffmpeg)");
+  gsnav_tools::check_output_name(
+      app.add_option(
+          "--video", r.video,
+          "video file to write instead of PNG files: .webp (animated), or .mp4 (needs ffmpeg)"),
+      gsnav_tools::ends_in({".webp", ".mp4"}));
   app.add_option("--every", r.every, "draw one frame per this number of actions")
       ->capture_default_str()
       ->check(CLI::Range(1, 100000));
@@ -270,7 +276,11 @@ int main(int argc, char** argv) try {
   app.add_option("--first", r.first, "first action to draw; 0 is the start")->capture_default_str();
   app.add_option("--last", r.last, "last action to draw (default: the end)");
   app.add_flag("--inset", r.inset, "draw the agent's own view in the corner")->needs("--eye");
-  if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
+  const auto check = [&r] {
+    gsnav_tools::check_eye_and_target(r.eye, r.target);
+    if (r.first > r.last) throw CLI::ValidationError("--first", "is after --last");
+  };
+  if (const auto status = gsnav_tools::parse_options(app, argc, argv, check)) return *status;
   gsnav::Status s = gsnav_eval::can_write_video(r.video);
   if (!s) {
     std::fprintf(stderr, "gsnav-replay: %s\n", s.message().c_str());

@@ -16,10 +16,6 @@ using gsnav::Result;
 using gsnav::Status;
 
 Result<Stage> prepare(const Options& o) {
-  if (o.storage == "packed") {
-    return {gsnav::Errc::invalid_argument,
-            "--storage packed: journals and maps read the floats; use full or compact"};
-  }
   gsnav::OpenOptions how = gsnav_tools::open_options(o);
   const std::vector<gsnav::SensorSpec> sensors =
       gsnav::rgbd_sensors(o.height, o.width, o.hfov, {0, o.eye_height, 0});
@@ -27,9 +23,6 @@ Result<Stage> prepare(const Options& o) {
   gsnav_tools::print_device(o.device, stderr);
   auto opened = gsnav_tools::open_scene(o, how, stderr);
   if (!opened) return opened.status();
-  if (opened->scene->navmesh == nullptr) {
-    return {gsnav::Errc::invalid_argument, "--navmesh " + o.navmesh + ": agents need one; use auto"};
-  }
   Stage stage;
   stage.config.task = o.preset == "v2"       ? gsnav::TaskConfig::pointnav_v2()
                       : o.preset == "avatar" ? gsnav::TaskConfig::avatar_pointnav()

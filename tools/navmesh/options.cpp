@@ -9,6 +9,7 @@
 #include <sstream>
 #include <string>
 
+#include "../common/check_values.hpp"
 #include "../common/parse_options.hpp"
 #include "../common/progress.hpp"
 #include "../common/voxel_options.hpp"
@@ -72,19 +73,24 @@ void add_input(CLI::App& app, Options& o, Given& given) {
 
 void add_outputs(CLI::App& app, Options& o) {
   const char* write = "Write";
-  auto* out =
-      app.add_option("--out", o.out, "NavMesh file to write (MSET, which Habitat reads)")->group(write);
+  auto* out = app.add_option("--out", o.out,
+                             "NavMesh file to write (.navmesh or .bin; MSET, which Habitat reads)")
+                  ->group(write);
   app.add_option("--mset-version", o.mset_version,
                  "version of the file of --out: 2, or 1, which holds no settings")
       ->check(CLI::IsMember({1, 2}))
       ->needs(out)
       ->capture_default_str()
       ->group(write);
-  app.add_option("--settings-out", o.settings_out, "settings file to write (.json, which Habitat reads)")
-      ->group(write);
-  app.add_option("--obj", o.obj, "file for the surface as triangles, one group per island")
-      ->group(write);
-  app.add_option("--png", o.png, "image of the surface from above, one colour per island")->group(write);
+  const auto output = [&](const char* name, std::string& file, const char* text, const char* extension) {
+    gsnav_tools::check_output_name(app.add_option(name, file, text)->group(write),
+                                   gsnav_tools::ends_in({extension}));
+  };
+  gsnav_tools::check_output_name(out, gsnav_tools::ends_in({".navmesh", ".bin"}));
+  output("--settings-out", o.settings_out, "settings file to write (.json, which Habitat reads)",
+         ".json");
+  output("--obj", o.obj, "file for the surface as triangles, one group per island (.obj)", ".obj");
+  output("--png", o.png, "image of the surface from above, one colour per island (.png)", ".png");
   auto* height =
       app.add_option("--height", o.height, "draw the surface near this height, metres")->group(write);
   app.add_option("--level", o.level,
@@ -250,6 +256,12 @@ void check_together(const CLI::App& app, Options& o, const Given& given) {
     refuse({"--visible-sets", "--crop", "--mesh"}, o.scene + " has no Gaussians");
   if (kind == InputKind::triangles && o.navmesh == "gaussians")
     throw CLI::ValidationError("--navmesh", o.scene + " has no Gaussians");
+  const auto valid = [](const gsnav::Status& s) {
+    if (!s) throw CLI::ValidationError(s.message());
+  };
+  if (kind != InputKind::navmesh) valid(o.settings.validate());
+  valid(validate(o.gaussians));
+  valid(validate(o.visible));
   for (const std::string& text : given.objects) {
     const auto one = parse_object(text);
     if (!one) throw CLI::ValidationError("--object", text + " is not FILE[@X,Y,Z[,YAW[,SCALE]]]");

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "../common/check_values.hpp"
 #include "gsnav/backends/serial.hpp"
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/io/image_file.hpp"
@@ -30,6 +31,17 @@ using gsnav_render::DepthChoice;
 using gsnav_render::fail;
 using gsnav_render::Options;
 using gsnav_render::Scene;
+
+constexpr const char *kRgbNpy = ".rgb.npy", *kDepthNpy = ".depth.npy", *kAlphaNpy = ".alpha.npy",
+                     *kRgbPng = ".rgb.png", *kDepthPng = ".depth.png";
+
+/// Makes the folder of the images, and checks that they can be written.
+Status make_room(const Options& o) {
+  Status s = make_output_folder(o.out);
+  if (s && o.npy) s = gsnav_tools::check_files_in(o.out, {kRgbNpy, kDepthNpy, kAlphaNpy});
+  if (s && o.png) s = gsnav_tools::check_files_in(o.out, {kRgbPng, kDepthPng});
+  return s ? s : Status(s.code(), "--out " + s.message());
+}
 
 /// Colours depth over the requested range, or over the image's own range from its 2nd to its 98th
 /// percentile.
@@ -65,14 +77,14 @@ Status write_images(const Frames<S>& f, const Camera& camera, std::size_t index,
     if (s.ok()) s = std::move(next);
   };
   if (o.npy) {
-    keep(io::save_npy(stem.string() + ".rgb.npy", rgb, color));
-    keep(io::save_npy(stem.string() + ".depth.npy", metres, image));
-    keep(io::save_npy(stem.string() + ".alpha.npy", alpha, image));
+    keep(io::save_npy(stem.string() + kRgbNpy, rgb, color));
+    keep(io::save_npy(stem.string() + kDepthNpy, metres, image));
+    keep(io::save_npy(stem.string() + kAlphaNpy, alpha, image));
   }
   if (o.png) {
     const int w = camera.width, h = camera.height;
-    keep(io::save_png_rgb(stem.string() + ".rgb.png", rgb, w, h));
-    keep(io::save_png_rgb8(stem.string() + ".depth.png", depth_picture(metres, o), w, h));
+    keep(io::save_png_rgb(stem.string() + kRgbPng, rgb, w, h));
+    keep(io::save_png_rgb8(stem.string() + kDepthPng, depth_picture(metres, o), w, h));
   }
   return s;
 }
@@ -171,7 +183,7 @@ int run(const Options& o, const Scene& scene, HostView& host, const Draw& draw) 
 int main(int argc, char** argv) {
   Options o;
   if (const auto status = gsnav_render::parse_options(argc, argv, o)) return *status;
-  if (Status s = make_output_folder(o.out); !s) return fail("--out " + s.message());
+  if (Status s = make_room(o); !s) return fail(s.message());
   const auto scene = gsnav_render::load_scene(o);
   if (!scene) return fail(scene.message());
   if (o.ledger && scene->opened.scene->assets.empty())

@@ -2,10 +2,10 @@
 #include "options.hpp"
 
 #include <CLI/CLI.hpp>
-#include <cmath>
 #include <cstdio>
 #include <exception>
 
+#include "../common/check_values.hpp"
 #include "../common/parse_options.hpp"
 
 namespace gsnav_render {
@@ -75,10 +75,14 @@ void add_images(CLI::App& app, Options& o) {
   app.add_option("--depth", o.depth,
                  "kind of depth: median, expected, accumulated, first, or first:TAU with 0 < TAU < 1")
       ->capture_default_str();
-  app.add_option("--depth-near", o.depth_near, "depth PNG: distance of the brightest colour, metres");
-  app.add_option("--depth-far", o.depth_far,
-                 "depth PNG: distance of the darkest colour, metres; 0 uses the range of each image "
-                 "(2nd to 98th percentile)");
+  auto* near =
+      app.add_option("--depth-near", o.depth_near, "depth PNG: distance of the brightest colour, metres")
+          ->check(CLI::NonNegativeNumber);
+  auto* far = app.add_option("--depth-far", o.depth_far,
+                             "depth PNG: distance of the darkest colour, metres; 0 uses the range of "
+                             "each image (2nd to 98th percentile)")
+                  ->check(CLI::NonNegativeNumber);
+  near->needs(far);
   app.add_option("--max-alpha", o.max_alpha, "largest alpha of one Gaussian at a pixel")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
@@ -97,11 +101,7 @@ std::string refused(const Options& o) {
   }
   if ((o.width > 0) != (o.height > 0)) return "--width and --height go together";
   if (o.eye.empty() != o.target.empty()) return "--eye and --target go together";
-  for (std::size_t k = 0; k < o.eye.size(); ++k) {
-    if (!std::isfinite(o.eye[k]) || !std::isfinite(o.target[k])) {
-      return std::string(std::isfinite(o.eye[k]) ? "--target" : "--eye") + ": must be finite numbers";
-    }
-  }
+  if (o.depth_far != 0 && !(o.depth_near < o.depth_far)) return "--depth-near must be below --depth-far";
   return "";
 }
 
@@ -123,6 +123,7 @@ std::optional<int> parse_options(int argc, char** argv, Options& o) {
   gsnav_tools::add_scene_options(app, o, &o.float64);
   const auto check = [&o] {
     if (const std::string why = refused(o); !why.empty()) throw CLI::ValidationError(why);
+    gsnav_tools::check_eye_and_target(o.eye, o.target);
   };
   if (const auto status = gsnav_tools::parse_options(app, argc, argv, check)) return *status;
   if (!o.npy && !o.png) o.npy = o.png = true;

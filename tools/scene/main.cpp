@@ -14,7 +14,6 @@
 namespace gsnav_scene {
 namespace {
 
-using gsnav::Errc;
 using gsnav::Result;
 using gsnav::Status;
 
@@ -27,13 +26,6 @@ Status outputs_status(const Outputs& o) {
   for (const std::string* path : {&o.mesh, &o.cameras}) {
     if (path->empty()) continue;
     if (Status s = gsnav::check_output_path(*path); !s) return s;
-  }
-  if (!o.mesh.empty() && !gsnav::lower_case(o.mesh).ends_with(".obj")) {
-    return {Errc::unsupported, o.mesh + ": meshes are written as .obj; name one for --mesh"};
-  }
-  const auto same = [](const std::string& a, const std::string& b) { return !a.empty() && a == b; };
-  if (same(o.scene, o.cameras) || same(o.mesh, o.cameras) || same(o.scene, o.mesh)) {
-    return {Errc::invalid_argument, "--out, --mesh and --cameras must name different files"};
   }
   return {};
 }

@@ -4,7 +4,10 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 
+#include "../common/check_values.hpp"
 #include "../common/parse_options.hpp"
+#include "gsnav/core/lower_case.hpp"
+#include "gsnav/io/scene_file.hpp"
 
 namespace gsnav_scene {
 namespace {
@@ -16,9 +19,16 @@ const char kDescription[] =
 
 constexpr std::size_t kLeastGaussians = 10'000;
 
+using gsnav::io::check_scene_output;
+using gsnav_tools::check_output_name;
+using gsnav_tools::ends_in;
+
 void add_outputs(CLI::App& app, SceneCommand& c) {
-  app.add_option("--mesh", c.out.mesh, "file for the surfaces as triangles (.obj)");
-  app.add_option("--cameras", c.out.cameras, "file for views inside the rooms (INRIA cameras.json)");
+  check_output_name(app.add_option("--mesh", c.out.mesh, "file for the surfaces as triangles (.obj)"),
+                    ends_in({".obj"}));
+  check_output_name(
+      app.add_option("--cameras", c.out.cameras, "file for views inside the rooms (INRIA cameras.json)"),
+      ends_in({".json"}));
   app.add_option("--views", c.views.count, "number of views")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
@@ -34,9 +44,11 @@ void add_outputs(CLI::App& app, SceneCommand& c) {
 }
 
 void add_scene_file(CLI::App& app, SceneCommand& c) {
-  app.add_option("--out", c.out.scene,
-                 "scene file to write: .ply, .compressed.ply, .splat, .spz, .sog or .glb")
-      ->required();
+  CLI::Option* out =
+      app.add_option("--out", c.out.scene,
+                     "scene file to write: .ply, .compressed.ply, .splat, .spz, .sog or .glb")
+          ->required();
+  check_output_name(out, check_scene_output);
 }
 
 CLI::Option* add_gaussians(CLI::App& app, SceneCommand& c, const char* what) {
@@ -87,13 +99,23 @@ CLI::App* add_rooms(CLI::App& app, SceneCommand& c) {
   return rooms;
 }
 
+/// Whether `default --out` is a folder.
+bool names_folder(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return !path.has_extension() || std::filesystem::is_directory(path, ignored);
+}
+
 CLI::App* add_default(CLI::App& app, SceneCommand& c) {
   CLI::App* flat =
       app.add_subcommand("default", "the embedded flat, which programs open as --scene default");
-  flat->add_option("--out", c.out.scene,
-                   "folder for flat.ply, flat.obj and cameras.json, made if it does not exist; or a "
-                   "scene file, by its extension")
-      ->required();
+  CLI::Option* out =
+      flat->add_option("--out", c.out.scene,
+                       "folder for flat.ply, flat.obj and cameras.json, made if it does not exist; or a "
+                       "scene file, by its extension")
+          ->required();
+  check_output_name(out, [](const std::string& path) {
+    return names_folder(path) ? gsnav::Status() : check_scene_output(path);
+  });
   add_outputs(*flat, c);
   return flat;
 }
@@ -101,11 +123,15 @@ CLI::App* add_default(CLI::App& app, SceneCommand& c) {
 CLI::App* add_humanoid(CLI::App& app, HumanoidCommand& c) {
   CLI::App* person =
       app.add_subcommand("humanoid", "a person: Gaussians, skeleton, skinning weights and capsules");
-  person
-      ->add_option("--out", c.out,
-                   "avatar file to write (.npz with the keys of Habitat-GS); the extension of a scene "
-                   "file writes the Gaussians of the standing person only")
-      ->required();
+  CLI::Option* out =
+      person
+          ->add_option("--out", c.out,
+                       "avatar file to write (.npz with the keys of Habitat-GS); the extension of a "
+                       "scene file writes the Gaussians of the standing person only")
+          ->required();
+  check_output_name(out, [](const std::string& path) {
+    return gsnav::lower_case(path).ends_with(".npz") ? gsnav::Status() : check_scene_output(path);
+  });
   person
       ->add_option("--seed", c.seed,
                    "seed of height, build, hair and clothes; 0 is the person of the demo")
@@ -119,12 +145,18 @@ CLI::App* add_humanoid(CLI::App& app, HumanoidCommand& c) {
 /// Sets the names of the files in the folder of `default --out`, if it is used.
 void name_files_in_folder(Outputs& out) {
   const std::filesystem::path path(out.scene);
-  std::error_code ignored;
-  if (path.has_extension() && !std::filesystem::is_directory(path, ignored)) return;
+  if (!names_folder(path)) return;
   out.folder = path.string();
   out.scene = (path / "flat.ply").string();
   if (out.mesh.empty()) out.mesh = (path / "flat.obj").string();
   if (out.cameras.empty()) out.cameras = (path / "cameras.json").string();
+}
+
+/// Throws CLI::ValidationError if two outputs are one file.
+void check_different(const Outputs& out) {
+  const auto same = [](const std::string& a, const std::string& b) { return !a.empty() && a == b; };
+  if (same(out.scene, out.cameras) || same(out.mesh, out.cameras) || same(out.scene, out.mesh))
+    throw CLI::ValidationError("--out, --mesh and --cameras", "must name different files");
 }
 
 }  // namespace
@@ -139,7 +171,11 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   const CLI::App* rooms_command = add_rooms(app, rooms);
   const CLI::App* default_command = add_default(app, embedded);
   add_humanoid(app, humanoid);
-  if (const auto status = gsnav_tools::parse_options(app, argc, argv)) {
+  const auto check = [&] {
+    if (default_command->parsed()) name_files_in_folder(embedded.out);
+    for (const SceneCommand* c : {&flat, &rooms, &embedded}) check_different(c->out);
+  };
+  if (const auto status = gsnav_tools::parse_options(app, argc, argv, check)) {
     exit_code = *status;
     return {};
   }
@@ -149,7 +185,6 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     out.scene = rooms;
     out.scene->views.seed = rooms.plan.seed;
   } else if (default_command->parsed()) {
-    name_files_in_folder(embedded.out);
     out.scene = embedded;
   } else {
     out.humanoid = humanoid;

@@ -42,6 +42,9 @@ struct GaussianNavOptions {
   std::function<void(const char* stage, double share)> progress;
 };
 
+/// Returns invalid_argument naming the field that is out of range, or ok.
+Status validate(const GaussianNavOptions& options);
+
 /// Statistics of a NavMesh built from Gaussians.
 struct GaussianNavReport {
   /// A floor that is at least 2 m above or below other floors.
