@@ -81,8 +81,7 @@ void add_crop_option(CLI::App& app, std::vector<double>& crop, const std::string
     }
     crop = corners;
   };
-  CLI::Option* option =
-      app.add_option_function<std::vector<double>>("--crop", read, what)->expected(6);
+  CLI::Option* option = app.add_option_function<std::vector<double>>("--crop", read, what)->expected(6);
   if (!group.empty()) option->group(group);
 }
 
