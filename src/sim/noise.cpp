@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/detail/sim/noise.hpp"
 
+#include <array>
+#include <bitset>
 #include <cmath>
 #include <string>
 
@@ -14,6 +16,63 @@ constexpr double kSteps = 8.0;        // Quantization steps per unit of disparit
 constexpr double kDisparitySigma = 1.0 / 36.0;
 constexpr double kShiftSigma = 0.25;  // Standard deviation of the shift, pixels.
 
+/// Logarithms of factorials. lgamma is not safe in threads.
+const std::array<double, 1024>& log_factorials() {
+  static const std::array<double, 1024> table = [] {
+    std::array<double, 1024> out{};
+    for (std::size_t k = 1; k < out.size(); ++k) out[k] = out[k - 1] + std::log(static_cast<double>(k));
+    return out;
+  }();
+  return table;
+}
+
+/// A Poisson number, for means up to 256, the number of bytes' values. Small means count uniform numbers
+/// until their product is below exp(-mean). Others use transformed rejection (PTRS, Hoermann 1993).
+double poisson(Rng& rng, double mean) {
+  if (mean < 10) {
+    const double least = std::exp(-mean);
+    double k = 0;
+    for (double product = rng.uniform(); product > least; product *= rng.uniform()) ++k;
+    return k;
+  }
+  const double root = std::sqrt(mean), b = 0.931 + 2.53 * root, a = -0.059 + 0.02483 * b;
+  const double inverse_alpha = 1.1239 + 1.1328 / (b - 3.4), quick = 0.9277 - 3.6224 / (b - 2.0);
+  const auto& factorials = log_factorials();
+  for (;;) {
+    const double u = rng.uniform() - 0.5, v = 1.0 - rng.uniform(), s = 0.5 - std::abs(u);
+    const double k = std::floor((2.0 * a / s + b) * u + mean + 0.43);
+    if (s >= 0.07 && v <= quick) return k;
+    if (k < 0 || k >= static_cast<double>(factorials.size()) || (s < 0.013 && v > s)) continue;
+    if (std::log(v * inverse_alpha / (a / (s * s) + b)) <=
+        k * std::log(mean) - mean - factorials[static_cast<std::size_t>(k)]) {
+      return k;
+    }
+  }
+}
+
+float in_range(double c) { return static_cast<float>(clamp(c, 0.0, 1.0)); }
+
+void add_poisson(Rng& rng, std::span<float> rgb) {
+  std::bitset<256> seen;
+  for (float& c : rgb) {
+    c = in_range(static_cast<double>(c));
+    seen.set(static_cast<std::size_t>(255.0f * c + 0.5f));
+  }
+  double levels = 1;
+  while (levels < static_cast<double>(seen.count())) levels *= 2;
+  for (float& c : rgb) c = in_range(poisson(rng, levels * static_cast<double>(c)) / levels);
+}
+
+void add_salt_and_pepper(const NoiseModel& model, Rng& rng, std::span<float> rgb) {
+  if (rgb.empty()) return;
+  const auto draw = [&](double fraction, float value) {
+    const double count = std::ceil(model.amount * fraction * static_cast<double>(rgb.size()));
+    for (double i = 0; i < count; ++i) rgb[rng.below(rgb.size())] = value;
+  };
+  draw(model.salt, 1.0f);
+  draw(1.0 - model.salt, 0.0f);
+}
+
 }  // namespace
 
 Status validate(const NoiseModel& m, const char* sensor) {
@@ -26,14 +85,19 @@ Status validate(const NoiseModel& m, const char* sensor) {
   if (!(m.sigma >= 0) || !is_finite(m.sigma)) return bad("sigma", m.sigma, "must be >= 0");
   if (!(m.multiplier >= 0) || !is_finite(m.multiplier))
     return bad("multiplier", m.multiplier, "must be >= 0");
+  if (!(m.amount >= 0 && m.amount <= 1)) return bad("amount", m.amount, "must be in [0, 1]");
+  if (!(m.salt >= 0 && m.salt <= 1)) return bad("salt", m.salt, "must be in [0, 1]");
   return {};
 }
 
-void add_gaussian_noise(const NoiseModel& model, std::uint64_t seed, std::span<float> rgb) {
+void add_color_noise(const NoiseModel& model, std::uint64_t seed, std::span<float> rgb) {
   Rng rng(seed);
+  if (model.kind == NoiseKind::poisson) return add_poisson(rng, rgb);
+  if (model.kind == NoiseKind::salt_and_pepper) return add_salt_and_pepper(model, rng, rgb);
   for (float& c : rgb) {
+    const double clean = static_cast<double>(c);
     const double noise = model.intensity * (model.mean + model.sigma * rng.normal());
-    c = static_cast<float>(clamp(static_cast<double>(c) + noise, 0.0, 1.0));
+    c = in_range(clean + (model.kind == NoiseKind::speckle ? clean * noise : noise));
   }
 }
 

@@ -42,7 +42,7 @@ Status validate(const SensorSpec& s) {
     return bad("kind", std::to_string(static_cast<int>(s.kind)), "not a value of the enum");
   if (s.model > SensorModel::fisheye)
     return bad("model", std::to_string(static_cast<int>(s.model)), "not a value of the enum");
-  if (s.noise.kind > NoiseKind::redwood_depth) {
+  if (s.noise.kind > NoiseKind::salt_and_pepper) {
     return bad("noise.kind", std::to_string(static_cast<int>(s.noise.kind)), "not a value of the enum");
   }
   for (const int side : s.resolution) {
@@ -86,11 +86,10 @@ Status validate(const SensorSpec& s) {
     return bad("model", "not pinhole", "sensors of normals are pinholes");
   }
   if (Status noise = validate(s.noise, s.uuid.c_str()); !noise) return noise;
-  const SensorKind noisy =
-      s.noise.kind == NoiseKind::redwood_depth ? SensorKind::depth : SensorKind::rgb;
+  const SensorKind noisy = is_color_noise(s.noise.kind) ? SensorKind::rgb : SensorKind::depth;
   if (s.noise.kind != NoiseKind::none && s.kind != noisy) {
-    return bad("noise.kind", s.noise.kind == NoiseKind::gaussian ? "gaussian" : "redwood_depth",
-               "gaussian noise is for colour, redwood_depth for depth");
+    return bad("noise.kind", noisy == SensorKind::rgb ? "noise of colour" : "redwood_depth",
+               "redwood_depth is for depth, other noise for colour");
   }
   if (!is_finite(s.position)) return bad("position", "not finite", "must be finite");
   if (!is_finite(s.orientation)) return bad("orientation", "not finite", "must be finite");

@@ -19,7 +19,7 @@ TEST_CASE("Gaussian noise has the mean and the deviation asked for and stays wit
   m.mean = 0.4;
   m.sigma = 1.5;
   std::vector<float> c(200000, 0.5f);
-  add_gaussian_noise(m, 3, c);
+  add_color_noise(m, 3, c);
   double sum = 0.0, squares = 0.0;
   for (const float v : c) {
     sum += static_cast<double>(v) - 0.5;
@@ -30,12 +30,92 @@ TEST_CASE("Gaussian noise has the mean and the deviation asked for and stays wit
   CHECK(mean == doctest::Approx(0.02).epsilon(0.02));  // 0.05 * 0.4; five standard errors are 0.0008
   CHECK(deviation == doctest::Approx(0.075).epsilon(0.01));  // 0.05 * 1.5
   std::vector<float> white(1000, 1.0f), again(1000, 1.0f);
-  add_gaussian_noise(m, 4, white);
-  add_gaussian_noise(m, 4, again);
+  add_color_noise(m, 4, white);
+  add_color_noise(m, 4, again);
   CHECK(*std::max_element(white.begin(), white.end()) == 1.0f);
   CHECK(white == again);
-  add_gaussian_noise(m, 5, again);
+  add_color_noise(m, 5, again);
   CHECK(white != again);
+}
+
+TEST_CASE("speckle is Gaussian noise in proportion to the colour") {
+  NoiseModel m;
+  m.kind = NoiseKind::speckle;
+  m.intensity = 0.05;
+  m.mean = 0.4;
+  m.sigma = 1.5;
+  NoiseModel flat = m;
+  flat.kind = NoiseKind::gaussian;
+  std::vector<float> speckled(1000), added(1000, 0.0f);
+  for (std::size_t i = 0; i < added.size(); ++i) {
+    speckled[i] = 0.0005f * static_cast<float>(i) + 0.2f;
+    added[i] = 0.5f;
+  }
+  const std::vector<float> clean = speckled;
+  add_color_noise(m, 7, speckled);
+  add_color_noise(flat, 7, added);  // The same draws.
+  for (std::size_t i = 0; i < added.size(); ++i) {
+    const double noise = static_cast<double>(added[i]) - 0.5, c = static_cast<double>(clean[i]);
+    CHECK(static_cast<double>(speckled[i]) == doctest::Approx(c + c * noise).epsilon(1e-5));
+  }
+}
+
+TEST_CASE("Poisson noise has the probabilities of its formula, for small and large means") {
+  NoiseModel m;
+  m.kind = NoiseKind::poisson;
+  // Sixteen different bytes: v is 16 there. 256: v is 256. Means of the values under test: v c.
+  for (const double v : {2.0, 16.0, 256.0}) {
+    for (const double c : {0.25, 0.5, 0.75}) {
+      const std::size_t n = 200000;
+      std::vector<float> image(n, static_cast<float>(c));
+      // So many different bytes that v is as asked. c is one of them or none.
+      for (int k = 0; k < static_cast<int>(v) - 1; ++k) image.push_back(static_cast<float>(k) / 255.0f);
+      add_color_noise(m, 11, image);
+      std::vector<double> count(1024);
+      for (std::size_t i = 0; i < n; ++i) {
+        const double k = static_cast<double>(image[i]) * v;
+        REQUIRE(std::abs(k - std::round(k)) < 1e-4);
+        count[static_cast<std::size_t>(std::lround(k))] += 1;
+      }
+      // Each probability by the recurrence p(k) = p(k - 1) mean / k. All above v are clamped to v.
+      const double mean = v * c;
+      double p = std::exp(-mean), rest = 1.0;
+      for (std::size_t k = 0; k < static_cast<std::size_t>(v); ++k) {
+        if (k > 0) p *= mean / static_cast<double>(k);
+        rest -= p;
+        const double expected = p * static_cast<double>(n);
+        CHECK(std::abs(count[k] - expected) < 5 * std::sqrt(expected) + 3);
+      }
+      const double clamped = std::max(rest, 0.0) * static_cast<double>(n);
+      CHECK(std::abs(count[static_cast<std::size_t>(v)] - clamped) < 5 * std::sqrt(clamped) + 3);
+    }
+  }
+  std::vector<float> black(100, 0.0f);
+  add_color_noise(m, 1, black);
+  CHECK(black == std::vector<float>(100, 0.0f));
+}
+
+TEST_CASE("salt and pepper draws as many white and black values as asked for, and no others") {
+  NoiseModel m;
+  m.kind = NoiseKind::salt_and_pepper;
+  m.amount = 0.1;
+  m.salt = 0.25;
+  const double n = 300000;
+  std::vector<float> image(static_cast<std::size_t>(n), 0.5f);
+  add_color_noise(m, 2, image);
+  const auto white = static_cast<double>(std::count(image.begin(), image.end(), 1.0f));
+  const auto black = static_cast<double>(std::count(image.begin(), image.end(), 0.0f));
+  CHECK(static_cast<double>(std::count(image.begin(), image.end(), 0.5f)) + white + black == n);
+  // A place that is drawn twice counts once; black comes last.
+  const double hit = 1 - std::exp(-0.075);
+  CHECK(black / n == doctest::Approx(hit).epsilon(0.02));
+  CHECK(white / n == doctest::Approx((1 - std::exp(-0.025)) * (1 - hit)).epsilon(0.03));
+  m.salt = 1.0;
+  m.amount = 1e-9;
+  std::vector<float> three(3, 0.5f);
+  add_color_noise(m, 2, three);
+  CHECK(std::count(three.begin(), three.end(), 1.0f) == 1);  // The number of draws is rounded up.
+  add_color_noise(m, 2, std::span<float>());
 }
 
 TEST_CASE(

@@ -288,7 +288,14 @@ TEST_CASE("impossible sensors name their field") {
   CHECK(has(message([](auto& s) { s.fisheye.focal_length = {-1, 0}; }), "focal_length"));
   CHECK(has(message([](auto& s) { s.cube_size = -1; }), "cube_size"));
   CHECK(has(message([](auto& s) { s.noise.kind = NoiseKind::redwood_depth; }), "noise.kind"));
+  CHECK(has(message([](auto& s) {
+              s.noise.kind = NoiseKind::speckle;
+              s.kind = SensorKind::depth;
+            }),
+            "noise.kind"));
   CHECK(has(message([](auto& s) { s.noise.sigma = -1; }), "noise.sigma"));
+  CHECK(has(message([](auto& s) { s.noise.amount = 1.5; }), "noise.amount"));
+  CHECK(has(message([](auto& s) { s.noise.salt = -0.1; }), "noise.salt"));
 }
 
 TEST_CASE("a semantic sensor says whose each pixel is") {

@@ -62,6 +62,8 @@ from ._gsnav import (
     NavMeshSettings,
     NavPath,
     NavPoint,
+    NoiseKind,
+    NoiseModel,
     Observations,
     ObstacleHit,
     OpenOptions,
@@ -124,6 +126,7 @@ from ._gsnav import (
     try_step,
     upright,
     views_around,
+    with_noise,
 )
 from ._spaces import HAVE_GYMNASIUM as _HAVE_GYMNASIUM
 from ._vector_env import VectorEnv
@@ -179,6 +182,8 @@ __all__ = [
     "NavMeshSettings",
     "NavPath",
     "NavPoint",
+    "NoiseKind",
+    "NoiseModel",
     "NothingNavigable",
     "Observations",
     "ObstacleHit",
@@ -249,6 +254,7 @@ __all__ = [
     "try_step",
     "upright",
     "views_around",
+    "with_noise",
 ]
 
 if _HAVE_GYMNASIUM:

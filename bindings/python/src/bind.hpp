@@ -19,6 +19,7 @@ void bind_levels(nb::module_& m);
 void bind_eval(nb::module_& m);
 void bind_render_settings(nb::module_& m);
 void bind_renderer(nb::module_& m);
+void bind_noise(nb::module_& m);
 void bind_task(nb::module_& m);
 void bind_episodes(nb::module_& m);
 void bind_planned_scene(nb::module_& m);

@@ -26,6 +26,7 @@ NB_MODULE(_gsnav, m) {
   bind_levels(m);
   bind_eval(m);
   bind_renderer(m);
+  bind_noise(m);
   bind_task(m);
   bind_episodes(m);
   bind_settings(m);

@@ -122,6 +122,7 @@ void bind_sensors(nb::module_& m) {
       .field("fisheye", &S::fisheye, "Lens of SensorModel.fisheye.")
       .field("cube_size", &S::cube_size,
              "Pixels of the cube that other models are resampled from; 0: auto.")
+      .field("noise", &S::noise, "Noise that is added to the image.")
       .done()
       .def(
           "validate", [](const S& s) { validate(s).throw_if_error(); },

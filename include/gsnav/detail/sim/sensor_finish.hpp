@@ -102,7 +102,7 @@ class SensorFinish {
         redwood_depth(sensor.noise, seed, sensor.resolution[0], sensor.resolution[1], clean, out);
       } else {
         std::copy(clean.begin(), clean.end(), out.begin());
-        add_gaussian_noise(sensor.noise, seed, out);
+        add_color_noise(sensor.noise, seed, out);
       }
     }
   }
