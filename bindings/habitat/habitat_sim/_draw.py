@@ -36,8 +36,12 @@ def check(spec: Any) -> None:
         raise NotImplementedError(
             _shared.message(f"{what} of type {type(spec).__name__} with sensor_subtype {spec.sensor_subtype!r}")
         )
-    if spec.noise_model and registry.get_noise_model(spec.noise_model) is None:
-        raise NotImplementedError(_shared.message(f"{what} with noise_model {spec.noise_model!r}"))
+    if spec.noise_model:
+        noise = registry.get_noise_model(spec.noise_model)
+        if noise is None:
+            raise NotImplementedError(_shared.message(f"{what} with noise_model {spec.noise_model!r}"))
+        if not noise.is_valid_sensor_type(spec.sensor_type):
+            raise ValueError(f"{what}: noise_model = {spec.noise_model!r} is not for {spec.sensor_type!r}")
     if spec.gpu2gpu_transfer:
         raise NotImplementedError(_shared.message(f"{what} with gpu2gpu_transfer"))
     if len(spec.resolution) != 2 or min(spec.resolution) < 1:

@@ -38,7 +38,8 @@ Status check(const NoiseModel& model, bool depth) {
 nb::object noisy_colors(const NoiseModel& model, std::uint64_t seed, const Array<std::uint8_t>& image) {
   check(model, false).throw_if_error();
   const auto channels = image.ndim() == 3 ? image.shape(2) : 0;
-  const auto shape = shape_of(image, "[H][W][3] or [H][W][4], contiguous", channels == 3 || channels == 4);
+  const auto shape =
+      shape_of(image, "[H][W][3] or [H][W][4], contiguous", channels == 3 || channels == 4);
   std::vector<std::uint8_t> out(image.data(), image.data() + image.size());
   if (model.kind != NoiseKind::none) {
     const ReleaseGil release;
@@ -90,14 +91,16 @@ void bind_noise(nb::module_& m) {
       .field("salt", &N::salt, "Fraction of the draws that are white, for salt_and_pepper.")
       .done();
   m.def("with_noise", noisy_colors, nb::arg("model"), nb::arg("seed"), nb::arg("image").noconvert(),
-        nb::sig("def with_noise(model: NoiseModel, seed: int, image: numpy.typing.NDArray[numpy.uint8]) -> "
-                "numpy.typing.NDArray[numpy.uint8]"),
+        nb::sig(
+            "def with_noise(model: NoiseModel, seed: int, image: numpy.typing.NDArray[numpy.uint8]) -> "
+            "numpy.typing.NDArray[numpy.uint8]"),
         "A copy of colours, uint8 [H][W][3] or [H][W][4], with noise. A fourth channel stays. Raises "
         "InvalidArgument naming the field, ValueError for another shape.");
-  m.def("with_noise", noisy_depth, nb::arg("model"), nb::arg("seed"), nb::arg("image").noconvert(),
-        nb::sig("def with_noise(model: NoiseModel, seed: int, image: numpy.typing.NDArray[numpy.float32]) "
-                "-> numpy.typing.NDArray[numpy.float32]"),
-        "A copy of depths, float32 [H][W] or [H][W][1] in metres, with noise. Raises as above.");
+  m.def(
+      "with_noise", noisy_depth, nb::arg("model"), nb::arg("seed"), nb::arg("image").noconvert(),
+      nb::sig("def with_noise(model: NoiseModel, seed: int, image: numpy.typing.NDArray[numpy.float32]) "
+              "-> numpy.typing.NDArray[numpy.float32]"),
+      "A copy of depths, float32 [H][W] or [H][W][1] in metres, with noise. Raises as above.");
 }
 
 }  // namespace gsnav::python
