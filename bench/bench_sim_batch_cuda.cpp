@@ -43,6 +43,7 @@ using Flats = std::vector<std::shared_ptr<const SimulatorScene>>;
 /// visible sets for a sensor of `side` pixels.
 Flats make_flats(int side) {
   OpenOptions options;
+  options.device = Device::parse("cuda").value();
   options.navmesh = "auto";
   options.levels = SceneLevels::built;
   options.visible_sets = "auto";

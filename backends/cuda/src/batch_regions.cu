@@ -68,13 +68,11 @@ bool CudaBatchRenderer::State::uses_regions(std::span<const GaussianSet> sets,
                                             const BatchImages& images) const {
   const Camera& first = cameras[0].camera;
   const FrameImages<float>& f = images.floats;
-  const bool depth_alone = f.rgb == nullptr && images.rgb8 == nullptr && f.alpha == nullptr;
   std::uint64_t gaussians = 0;
   for (const CameraSet& v : camera_sets) gaussians += sets[v.set].gaussians.size();
-  const bool many = depth_alone && gaussians >= Policy::kManyGaussians * cameras.size();
   if (cameras.size() < Policy::kLeastCameras || gaussians == 0 ||
       gaussians < least_gaussians_of_regions * cameras.size() ||
-      std::max(first.width, first.height) > (many ? Policy::kSideOfDepth : Policy::kSide) ||
+      std::max(first.width, first.height) > Policy::kSide ||
       config.response != Response::ewa || config.compat != Compat::none ||
       config.sort_order != SortOrder::z_depth || config.quality.key_bits < 32 ||
       config.quality.alpha_min >= 1 || f.depth_mode() == DepthMode::all) {

@@ -95,10 +95,8 @@ struct BlendSmall {
 
 /// Small images of many cameras, drawn by lists of regions.
 struct Regions {
-  /// Largest width and height of an image, and of depth alone if cameras see kManyGaussians or more
-  /// each. In larger images, too many tiles project the same row.
-  static constexpr int kSide = 64, kSideOfDepth = 128;
-  static constexpr std::uint64_t kManyGaussians = 600'000;
+  /// Largest width and height of an image. In larger ones, too many tiles project the same row.
+  static constexpr int kSide = 64;
   /// Cameras that see fewer Gaussians each, on average, are drawn by tiles: lists of regions then cost
   /// more than they save.
   static constexpr std::uint64_t kLeastGaussians = 100'000;
