@@ -173,6 +173,57 @@ TEST_CASE("lod cut: the larger Gaussians are for a pixel, the less is merged") {
   CHECK(validate(choice).message().find("grain") != std::string::npos);
 }
 
+TEST_CASE("lod cut: cameras in a box share a cut that is fine enough for each of them") {
+  SerialBackend backend;
+  const GaussianCloud cloud = small_wall(17, 20000);
+  const LodTree tree = build_lod(backend, cloud).value();
+  LodChoice choice;
+  choice.grain = 4;
+  Rng rng(5);
+  std::uint64_t merged = 0, checked = 0;
+  for (int round = 0; round < 12; ++round) {
+    CAPTURE(round);
+    const Vec3d low{rng.uniform(-2, 2), rng.uniform(-2, 2), rng.uniform(-4, 3)};
+    const Aabb<double> box{low, low + Vec3d{0.5, 0.5, 0.5}};
+    const int width = round % 2 == 0 ? 32 : 96, height = 64;
+    const auto camera_in_box = [&] {
+      const Vec3d eye{rng.uniform(box.low.x, box.high.x), rng.uniform(box.low.y, box.high.y),
+                      rng.uniform(box.low.z, box.high.z)};
+      const Vec3d to{rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)};
+      return Camera::look_at(eye, eye + to, {0.1, -1, 0.05}, width, height, 60 + 3.0 * round);
+    };
+    LodCut cut(tree, cloud);
+    static_cast<void>(cut.select_from(box, camera_in_box(), choice));
+    for (const int n : shown(tree, cut)) CHECK(n == 1);
+    merged += cut.stats().merged;
+    for (int c = 0; c < 10; ++c) {
+      const Camera camera = camera_in_box();
+      for (const std::uint32_t m : cut.merged_chunks()) {
+        const LodNode& n = tree.nodes[m + tree.leaves()];
+        // The point of the node that is largest in the image is nearest: random points, by the
+        // definition.
+        for (int k = 0; k < 20; ++k) {
+          Vec3d p;
+          for (int i = 0; i < 3; ++i)
+            p[i] =
+                rng.uniform(static_cast<double>(n.reach.low[i]), static_cast<double>(n.reach.high[i]));
+          const Vec3d seen = camera.viewmat.linear * p + camera.viewmat.translation;
+          const double x = camera.fx * seen.x / seen.z + camera.cx,
+                       y = camera.fy * seen.y / seen.z + camera.cy;
+          if (seen.z < 0.2 || x < 0 || y < 0 || x > width || y > height) continue;
+          ++checked;
+          const double pixels = std::max(camera.fx, camera.fy) / seen.z;
+          REQUIRE(static_cast<double>(n.error) * pixels <= choice.pixels * 1.001);
+          REQUIRE(static_cast<double>(n.error) * static_cast<double>(n.grain) * pixels * pixels <=
+                  choice.pixels * choice.grain * 1.001);
+        }
+      }
+    }
+  }
+  CHECK(merged > 0);
+  CHECK(checked > 1000);
+}
+
 TEST_CASE("lod tree: the same bits for any number of threads") {
   const GaussianCloud cloud = small_wall(5, 9000);
   SerialBackend serial;

@@ -2,6 +2,7 @@
 // Simulators that draw levels of detail.
 #include <doctest/doctest.h>
 
+#include <cmath>
 #include <memory>
 #include <span>
 #include <vector>
@@ -49,10 +50,19 @@ LodChoice coarse() {
   return c;
 }
 
+/// The cell of 0.5 m that a camera is in.
+Aabb<double> cell_of(const Camera& camera) {
+  Aabb<double> box;
+  for (int k = 0; k < 3; ++k) {
+    box.low[k] = 0.5 * std::floor(camera.position()[k] / 0.5);
+    box.high[k] = box.low[k] + 0.5;
+  }
+  return box;
+}
+
 }  // namespace
 
-TEST_CASE(
-    "a simulator with levels of detail sees what the cut of its camera draws, people as they are") {
+TEST_CASE("a simulator with levels of detail sees what the cut of its cell draws, people as they are") {
   OpenMPBackend backend(2);
   bool shipped = false;
   SUBCASE("built") {}
@@ -73,9 +83,7 @@ TEST_CASE(
   REQUIRE(by_hand.pose(0, sim.clock()).ok());
   const Camera camera = sensor_camera(config.sensors[0], sim.agent().position, sim.agent().rotation());
   LodCut cut(*scene.assets[0].lod, *scene.assets[0].cloud);
-  LodChoice choice = coarse();
-  choice.hysteresis = 0;
-  const auto chosen = cut.select(camera, choice);
+  const auto chosen = cut.select_from(cell_of(camera), camera, coarse());
   CHECK(cut.stats().merged > 0);
   std::vector<GaussianSet> sets(chosen.begin(), chosen.end());
   for (std::size_t i = 1; i < by_hand.sets(0).size(); ++i) sets.push_back(by_hand.sets(0)[i]);
@@ -196,9 +204,8 @@ TEST_CASE(
   LodCut cut(*scene.assets[0].lod, *scene.assets[0].cloud);
   std::vector<GaussianSet> sets;
   if (levels) {
-    LodChoice choice = coarse();
-    choice.hysteresis = 0;
-    const auto chosen = cut.select(camera, choice, {}, visible->seen_from(*cell));
+    const auto chosen =
+        cut.select_from(cell_of(camera), camera, coarse(), {}, visible->seen_from(*cell));
     sets.assign(chosen.begin(), chosen.end());
   } else {
     sets.push_back(by_hand.sets(0)[0]);
@@ -246,4 +253,30 @@ TEST_CASE("visible sets that a scene does not have are refused, by name") {
   other.assets[0].visible = std::make_shared<const VisibleSets>(foreign);
   CHECK(refused(other).message().find("assets[0].visible is of another cloud") != std::string::npos);
   CHECK(refused(other).code() == Errc::invalid_argument);
+}
+
+TEST_CASE("levels of detail: cameras of one cell share a cut, other cameras and assets do not") {
+  const SimulatorScene scene = detailed_scene();
+  const LodTree& tree = *scene.assets[0].lod;
+  const GaussianCloud& cloud = *scene.assets[0].cloud;
+  LodCells cells;
+  const auto at = [&](const Vec3d& eye, int side = 32, std::size_t asset = 0, double pixels = 2,
+                      const Similarity& placed = {}) {
+    LodChoice choice = coarse();
+    choice.pixels = pixels;
+    const Camera camera = Camera::look_at(eye, eye + Vec3d{1, 0, 0.5}, {0, 1, 0}, side, side, 90);
+    return cells.at(asset, tree, cloud, camera, choice, placed, {}, {});
+  };
+  const auto first = at({1.1, 1.5, 1.1});
+  CHECK(at({1.4, 1.6, 1.3}) == first);
+  CHECK(at({1.6, 1.6, 1.3}) != first);
+  CHECK(at({1.1, 1.5, 1.1}, 64) != first);
+  CHECK(at({1.1, 1.5, 1.1}, 32, 1) != first);
+  CHECK(at({1.1, 1.5, 1.1}, 32, 0, 1) != first);
+  CHECK(at({1e12, 0, 0}) != nullptr);
+  // Another placement: cells are those of the asset, half a metre in the world.
+  const Similarity twice{{1, 0, 0, 0}, {0, 0, 0}, 2};
+  const auto large = at({1.1, 1.5, 1.1}, 32, 2, 2, twice);
+  CHECK(at({1.4, 1.6, 1.3}, 32, 2, 2, twice) == large);
+  CHECK(at({1.6, 1.6, 1.3}, 32, 2, 2, twice) != large);
 }

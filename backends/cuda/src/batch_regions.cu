@@ -72,10 +72,10 @@ bool CudaBatchRenderer::State::uses_regions(std::span<const GaussianSet> sets,
   for (const CameraSet& v : camera_sets) gaussians += sets[v.set].gaussians.size();
   if (cameras.size() < Policy::kLeastCameras || gaussians == 0 ||
       gaussians < least_gaussians_of_regions * cameras.size() ||
-      std::max(first.width, first.height) > Policy::kSide ||
-      config.response != Response::ewa || config.compat != Compat::none ||
-      config.sort_order != SortOrder::z_depth || config.quality.key_bits < 32 ||
-      config.quality.alpha_min >= 1 || f.depth_mode() == DepthMode::all) {
+      std::max(first.width, first.height) > Policy::kSide || config.response != Response::ewa ||
+      config.compat != Compat::none || config.sort_order != SortOrder::z_depth ||
+      config.quality.key_bits < 32 || config.quality.alpha_min >= 1 ||
+      f.depth_mode() == DepthMode::all) {
     return false;
   }
   for (const BatchCamera& c : cameras) {

@@ -32,14 +32,41 @@ inline RenderConfig lod_config(RenderConfig config) noexcept {
   return config;
 }
 
+namespace detail {
+
+/// Tells whether a camera may see a node, and the nearest depth of the node. Depths are in asset units.
+struct SeenByCamera {
+  const ProjectionCamera<double>& camera;
+  bool shows(const ChunkBounds& reach) const noexcept { return may_be_visible(camera, reach); }
+  double nearest(const ChunkBounds& reach) const noexcept { return ChunkInView(camera, reach).z_min(); }
+};
+
+/// The same for all cameras of one kind that are in a box, whatever their rotations.
+struct SeenFromBox {
+  Aabb<double> box;      ///< Positions of the cameras.
+  double cosine;         ///< Cosine of the largest angle between the view axis and a ray of the image.
+  double nearest_depth;  ///< Least depth of a Gaussian that is drawn.
+  static bool shows(const ChunkBounds&) noexcept { return true; }
+  double nearest(const ChunkBounds& reach) const noexcept {
+    double squared = 0;
+    for (int k = 0; k < 3; ++k) {
+      const double gap = std::max({0.0, static_cast<double>(reach.low[k]) - box.high[k],
+                                   box.low[k] - static_cast<double>(reach.high[k])});
+      squared += gap * gap;
+    }
+    return std::max(std::sqrt(squared) * cosine * (1 - 1e-6), nearest_depth);
+  }
+};
+
+}  // namespace detail
+
 /// Chooses for one sensor which nodes of a level-of-detail tree are drawn. A cut remembers its last
 /// choice, for hysteresis; otherwise it depends on the camera only. The same sequence of calls gives the
 /// same cuts.
 class LodCut {
  public:
   /// `tree` and the cloud from which it was built must outlive the cut.
-  LodCut(const LodTree& tree, const GaussianCloud& cloud)
-      : tree_(&tree), cloud_(&cloud), refined_(tree.nodes.size()) {}
+  LodCut(const LodTree& tree, const GaussianCloud& cloud) : tree_(&tree), cloud_(&cloud) {}
   /// Deleted: a temporary tree would not outlive the cut.
   LodCut(const LodTree&& tree, const GaussianCloud& cloud) = delete;
   /// Deleted: a temporary cloud would not outlive the cut.
@@ -56,30 +83,29 @@ class LodCut {
   std::span<const GaussianSet> select(const Camera& camera, const LodChoice& choice = {},
                                       const Similarity& world_from_asset = {},
                                       View<const std::uint32_t> seen = {}) {
-    seen_ = seen.empty()
-                ? seen
-                : View<const std::uint32_t>{seen.data, seen_chunk_words(cloud_->view().chunk_count())};
-    leaf_chunks_.clear();
-    merged_chunks_.clear();
-    sets_.clear();
-    stats_ = {};
-    if (tree_->nodes.empty()) return {};
-    const GaussianSet whole = photo_set(*cloud_, choice, world_from_asset);
-    const auto p = make_projection_camera<double>(camera, whole);
-    const double per_metre = std::max(p.fx, p.fy) / choice.pixels;
-    if (tree_->boxes.empty()) {
-      visit(tree_->levels() - 1, tree_->nodes.size() - 1, p, per_metre, choice);
-    } else {
-      for (const std::uint32_t root : tree_->roots) {
-        if (seen_.empty() || shows_seen(root)) descend(root, p, per_metre, choice);
-      }
-    }
-    add(*cloud_, leaf_chunks_, choice, world_from_asset, seen);
-    add(tree_->merged, merged_chunks_, choice, world_from_asset);
-    return sets_;
+    const auto p = make_projection_camera<double>(camera, photo_set(*cloud_, choice, world_from_asset));
+    refined_.resize(tree_->nodes.size());
+    return choose(detail::SeenByCamera{p}, std::max(p.fx, p.fy), choice, world_from_asset, seen);
+  }
+
+  /// Chooses the nodes for all cameras in a box that have the size, focal lengths and near plane of
+  /// `camera`, whatever their rotations. No node has a larger error for one of them than select()
+  /// allows, so that they can share the cut. It has no hysteresis.
+  /// @param box positions of the cameras in the asset's frame.
+  std::span<const GaussianSet> select_from(const Aabb<double>& box, const Camera& camera,
+                                           LodChoice choice = {},
+                                           const Similarity& world_from_asset = {},
+                                           View<const std::uint32_t> seen = {}) {
+    choice.hysteresis = 0;
+    refined_.clear();
+    const auto p = make_projection_camera<double>(camera, photo_set(*cloud_, choice, world_from_asset));
+    const double x = std::max(camera.cx, camera.width - camera.cx) / camera.fx,
+                 y = std::max(camera.cy, camera.height - camera.cy) / camera.fy;
+    return choose(detail::SeenFromBox{box, 1 / std::sqrt(1 + x * x + y * y), p.near_plane / p.scale},
+                  std::max(p.fx, p.fy), choice, world_from_asset, seen);
   }
   /// Forgets the last choice, and with it the hysteresis.
-  void reset() { std::fill(refined_.begin(), refined_.end(), std::uint8_t{0}); }
+  void reset() { refined_.clear(); }
 
   /// Numbers of the last select().
   const LodStats& stats() const noexcept { return stats_; }
@@ -109,6 +135,30 @@ class LodCut {
                                const Similarity& world_from_asset = {}) = delete;
 
  private:
+  template <class Viewer>
+  std::span<const GaussianSet> choose(const Viewer& viewer, double focal, const LodChoice& choice,
+                                      const Similarity& world_from_asset,
+                                      View<const std::uint32_t> seen) {
+    seen_ = seen.empty()
+                ? seen
+                : View<const std::uint32_t>{seen.data, seen_chunk_words(cloud_->view().chunk_count())};
+    leaf_chunks_.clear();
+    merged_chunks_.clear();
+    sets_.clear();
+    stats_ = {};
+    if (tree_->nodes.empty()) return {};
+    const double per_metre = focal / choice.pixels;
+    if (tree_->boxes.empty()) {
+      visit(tree_->levels() - 1, tree_->nodes.size() - 1, viewer, per_metre, choice);
+    } else {
+      for (const std::uint32_t root : tree_->roots) {
+        if (seen_.empty() || shows_seen(root)) descend(root, viewer, per_metre, choice);
+      }
+    }
+    add(*cloud_, leaf_chunks_, choice, world_from_asset, seen);
+    add(tree_->merged, merged_chunks_, choice, world_from_asset);
+    return sets_;
+  }
   void add(const GaussianCloud& cloud, const std::vector<std::uint32_t>& chunks, const LodChoice& choice,
            const Similarity& world_from_asset, View<const std::uint32_t> seen = {}) {
     if (chunks.empty()) return;
@@ -134,16 +184,13 @@ class LodCut {
     const LodBox& box = tree_->boxes[node];
     return any_seen(box.first_chunk, std::uint64_t{box.first_chunk} + box.chunks);
   }
-  /// Size of a metre at the node's nearest depth, in units of choice.pixels.
-  static double scale_of(const LodNode& n, const ProjectionCamera<double>& camera,
-                         double per_metre) noexcept {
-    return per_metre / detail::ChunkInView(camera, n.reach).z_min();
-  }
-  /// Whether the node is too coarse, so that its children are drawn instead.
+  /// Whether the node is too coarse, so that its children are drawn instead. `scale`: size of a metre
+  /// at the node's nearest depth, in units of choice.pixels.
   bool refine(std::size_t node, double scale, const LodChoice& choice) {
     const LodNode& n = tree_->nodes[node];
     const double grain = static_cast<double>(n.grain) * scale * choice.pixels / choice.grain;
     const double error = static_cast<double>(n.error) * scale * std::max(grain, 1.0);
+    if (refined_.empty()) return error > 1;
     const bool finer = error > (refined_[node] != 0 ? 1 - choice.hysteresis : 1 + choice.hysteresis);
     refined_[node] = finer ? 1 : 0;
     return finer;
@@ -152,13 +199,13 @@ class LodCut {
     stats_.error_px = std::max(stats_.error_px, static_cast<double>(n.error) * scale * choice.pixels);
   }
   /// Chooses the level of one box of a forest, from its coarsest node down.
-  void descend(std::uint32_t node, const ProjectionCamera<double>& camera, double per_metre,
-               const LodChoice& choice) {
+  template <class Viewer>
+  void descend(std::uint32_t node, const Viewer& viewer, double per_metre, const LodChoice& choice) {
     for (;;) {
       const LodNode& n = tree_->nodes[node];
       const LodBox& box = tree_->boxes[node];
-      if (!may_be_visible(camera, n.reach)) return;
-      const double scale = scale_of(n, camera, per_metre);
+      if (!viewer.shows(n.reach)) return;
+      const double scale = per_metre / viewer.nearest(n.reach);
       const bool leaf = box.finer == LodBox::kNone;
       if (!leaf && refine(node, scale, choice)) {
         node = box.finer;
@@ -173,21 +220,22 @@ class LodCut {
       return;
     }
   }
-  void visit(std::size_t level, std::size_t node, const ProjectionCamera<double>& camera,
-             double per_metre, const LodChoice& choice) {
+  template <class Viewer>
+  void visit(std::size_t level, std::size_t node, const Viewer& viewer, double per_metre,
+             const LodChoice& choice) {
     const LodNode& n = tree_->nodes[node];
     const std::uint64_t place = node - tree_->level_begin[level];
     if (!seen_.empty() && !any_seen(place << level, (place + 1) << level)) return;
-    if (!may_be_visible(camera, n.reach)) return;
-    const double scale = scale_of(n, camera, per_metre);
+    if (!viewer.shows(n.reach)) return;
+    const double scale = per_metre / viewer.nearest(n.reach);
     if (!(level > 0 && refine(node, scale, choice))) {
       draw(level, node);
       note_error(n, scale, choice);
       return;
     }
     const std::size_t first = tree_->level_begin[level - 1] + 2 * place;
-    visit(level - 1, first, camera, per_metre, choice);
-    if (first + 1 < tree_->level_begin[level]) visit(level - 1, first + 1, camera, per_metre, choice);
+    visit(level - 1, first, viewer, per_metre, choice);
+    if (first + 1 < tree_->level_begin[level]) visit(level - 1, first + 1, viewer, per_metre, choice);
   }
 
   void draw(std::size_t level, std::size_t node) {
@@ -210,7 +258,7 @@ class LodCut {
   const LodTree* tree_;
   const GaussianCloud* cloud_;
   View<const std::uint32_t> seen_;
-  std::vector<std::uint8_t> refined_;
+  std::vector<std::uint8_t> refined_;  // Last choice of select(), per node; else empty.
   std::vector<std::uint32_t> leaf_chunks_, merged_chunks_;
   std::vector<GaussianSet> sets_;
   LodStats stats_;

@@ -3,8 +3,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
+#include <tuple>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
@@ -12,6 +18,63 @@
 #include "gsnav/scene/visible_sets.hpp"
 
 namespace gsnav {
+
+/// Cuts of levels of detail, one per cell of space, shared by the cameras in it. A cut is found when a
+/// camera first needs it. Thread-safe.
+class LodCells {
+ public:
+  /// Edge of a cell, metres in the world.
+  static constexpr double kEdge = 0.5;
+  /// Limit of the memory of the cuts that are kept, in chunk numbers: 256 MB.
+  static constexpr std::size_t kMostChunks = std::size_t{1} << 26;
+
+  /// The cut of the cell of `camera`. Beyond the cells that have a number, the camera gets its own.
+  /// @param asset number of the asset, with its tree and cloud.
+  /// @param seen, seen_cell set of VisibleSets that applies to the camera, and its number. Empty:
+  /// everything may be seen.
+  std::shared_ptr<const LodCut> at(std::size_t asset, const LodTree& tree, const GaussianCloud& cloud,
+                                   const Camera& camera, const LodChoice& choice,
+                                   const Similarity& world_from_asset, View<const std::uint32_t> seen,
+                                   std::optional<std::size_t> seen_cell) {
+    const Vec3d eye = camera.position_in(world_from_asset);
+    const double edge = kEdge / world_from_asset.scale;
+    const auto cell = VisibleSets::key_of(eye, edge);
+    const auto make = [&](const Aabb<double>& box) {
+      auto cut = std::make_shared<LodCut>(tree, cloud);
+      cut->select_from(box, camera, choice, world_from_asset, seen);
+      return cut;
+    };
+    if (!cell) return make({eye, eye});
+    const Key key{
+        asset,        &tree,       *cell,        seen_cell,     camera.fx,         camera.fy,
+        camera.cx,    camera.cy,   camera.width, camera.height, camera.near_plane, choice.pixels,
+        choice.grain, choice.photo};
+    {
+      const std::scoped_lock lock(mutex_);
+      if (const auto found = cuts_.find(key); found != cuts_.end()) return found->second;
+    }
+    Aabb<double> box;
+    for (int k = 0; k < 3; ++k) {
+      box.low[k] = edge * (*cell)[static_cast<std::size_t>(k)];
+      box.high[k] = box.low[k] + edge;
+    }
+    auto cut = make(box);
+    const std::scoped_lock lock(mutex_);
+    chunks_ += cut->leaf_chunks().size() + cut->merged_chunks().size();
+    if (chunks_ > kMostChunks) {
+      cuts_.clear();
+      chunks_ = 0;
+    }
+    return cuts_.emplace(key, std::move(cut)).first->second;
+  }
+
+ private:
+  using Key = std::tuple<std::size_t, const LodTree*, VisibleSets::Key, std::optional<std::size_t>,
+                         double, double, double, double, int, int, double, double, double, int>;
+  std::mutex mutex_;
+  std::map<Key, std::shared_ptr<const LodCut>> cuts_;
+  std::size_t chunks_ = 0;  // In all cuts.
+};
 
 /// Selects which part of a scene's assets is drawn: by level of detail (docs/concepts/scene.md), by
 /// visibility from the camera's cell, or both.
@@ -28,25 +91,22 @@ struct SceneDetail {
         nullptr;  ///< `visible->bits` in the backend's own memory. Null if it uses host memory.
   };
   std::vector<Asset> assets;  ///< In the order of the scene's sets. Empty: draw all assets whole.
-  LodChoice choice{};         ///< Settings of the levels of detail.
+  LodChoice choice{};         ///< Settings of the levels of detail. Without hysteresis.
+  std::shared_ptr<LodCells> cells = std::make_shared<LodCells>();  ///< Cuts found so far.
 };
 
 /// The sets that one camera draws with levels of detail and visible sets. They depend only on the
-/// camera, not on earlier views. A simulator that was restored to a state, or is part of a batch,
-/// therefore renders the same bits.
+/// camera and the cell that it is in, not on earlier views. A simulator that was restored to a state, or
+/// is part of a batch, therefore renders the same bits.
 class DetailSets {
  public:
   /// Selects the sets for a camera. The result is valid until the next call.
   /// @param sets Sets of the scene: assets first, then avatars, which are not changed.
   std::span<const GaussianSet> select(const SceneDetail& detail, std::span<const GaussianSet> sets,
                                       const Camera& camera) {
-    LodChoice choice = detail.choice;
-    choice.hysteresis = 0;
-    cuts_.resize(detail.assets.size());
+    cuts_.assign(detail.assets.size(), nullptr);
     sets_.clear();
-    chunks_.clear();
     to_place_.clear();
-    stats_ = {};
     looked_from_.clear();
     for (std::size_t a = 0; a < detail.assets.size(); ++a) {
       const SceneDetail::Asset& asset = detail.assets[a];
@@ -62,20 +122,13 @@ class DetailSets {
         if (cell) sets_.back().selection.seen = asset.visible->seen_from(*cell, asset.visible_there);
         continue;
       }
-      Cut& cut = cuts_[a];
-      if (cut.tree != asset.tree || cut.cloud != asset.cloud) {
-        cut = {asset.tree, asset.cloud, LodCut(*asset.tree, *asset.cloud)};
-      }
-      const auto chosen = cut.cut->select(camera, choice, asset.world_from_asset, seen);
-      for (const GaussianSet& set : chosen) {
+      const LodCut& cut =
+          *(cuts_[a] = detail.cells->at(a, *asset.tree, *asset.cloud, camera, detail.choice,
+                                        asset.world_from_asset, seen, cell));
+      for (const GaussianSet& set : cut.sets()) {
         sets_.push_back(set);
-        if (asset.cloud_there.size() != 0) {
-          move(asset, sets_.back(), cell);
-          to_place_.push_back(sets_.size() - 1);
-        }
+        if (asset.cloud_there.size() != 0) move(asset, sets_.back(), cell);
       }
-      stats_.shown += cut.cut->stats().shown;
-      stats_.merged += cut.cut->stats().merged;
     }
     const auto others =
         sets.subspan(detail.assets.size() < sets.size() ? detail.assets.size() : sets.size());
@@ -93,7 +146,7 @@ class DetailSets {
 
   /// How the last select() cut asset `a`. The asset must have a tree. The sets of the cut refer to host
   /// arrays.
-  const LodCut& cut(std::size_t a) const noexcept { return *cuts_[a].cut; }
+  const LodCut& cut(std::size_t a) const noexcept { return *cuts_[a]; }
   /// Number of Gaussians that the last select() left out because they are invisible from the camera's
   /// cell. If visibility is known only per chunk, it may be less than a chunk too low.
   std::uint64_t unseen() const noexcept {
@@ -102,38 +155,31 @@ class DetailSets {
     return sum;
   }
 
-  /// Chunk lists of the last select() that a backend with its own memory needs.
-  std::span<const std::uint32_t> chunks() const noexcept { return chunks_; }
-  /// Sets where the chunk lists are in the backend's memory.
-  void place_chunks(const std::uint32_t* there) noexcept {
-    for (const std::size_t s : to_place_) {
-      View<const std::uint32_t>& drawn = sets_[s].selection.drawn_chunks;
-      drawn.data = there;
-      there += drawn.size;
-    }
+  /// Calls f with each chunk list of the last select() that a backend with its own memory needs. f
+  /// returns the address of a copy there.
+  template <class F>
+  void place_chunks(const F& f) {
+    for (const auto& [set, list] : to_place_) sets_[set].selection.drawn_chunks.data = f(list);
   }
 
  private:
-  /// Changes a set from host arrays to the backend's arrays.
+  /// Changes the last set from host arrays to the backend's arrays.
   void move(const SceneDetail::Asset& asset, GaussianSet& set, std::optional<std::size_t> cell) {
     const View<const std::uint32_t> drawn = set.selection.drawn_chunks;
-    chunks_.insert(chunks_.end(), drawn.data, drawn.data + drawn.size);
+    to_place_.push_back({sets_.size() - 1, drawn});
     const bool is_cloud = set.gaussians.shape.means.data[0] == asset.cloud->means[0].data();
     set.gaussians = is_cloud ? asset.cloud_there : asset.merged_there;
     set.selection = {{nullptr, drawn.size}, {}};
     if (is_cloud && cell) set.selection.seen = asset.visible->seen_from(*cell, asset.visible_there);
   }
 
-  struct Cut {
-    const LodTree* tree = nullptr;
-    const GaussianCloud* cloud = nullptr;
-    std::optional<LodCut> cut;
-  };
-  std::vector<Cut> cuts_;
+  std::vector<std::shared_ptr<const LodCut>> cuts_;  // Per asset.
   std::vector<GaussianSet> sets_;
-  std::vector<std::uint32_t> chunks_;
-  std::vector<std::size_t> to_place_;  // Indices of the sets that own chunks_.
-  LodStats stats_;                     // Totals of all cuts.
+  struct ToPlace {
+    std::size_t set;  // Index in sets_.
+    View<const std::uint32_t> chunks;
+  };
+  std::vector<ToPlace> to_place_;
   struct LookedFrom {
     const VisibleSets* sets;
     std::size_t cell, rows;  // Cell, and number of rows of the asset's cloud.
@@ -149,24 +195,34 @@ class ChosenChunks {
  public:
   explicit ChosenChunks(B& backend) : there_(backend) {}
 
-  /// Uploads the lists of these cuts. Their sets can be drawn until the next call.
+  /// Uploads the lists of these cuts. Their sets can be drawn until the next call. Cameras that share a
+  /// cut share its lists.
   void place(std::span<DetailSets> cuts) {
     if constexpr (!is_host_backend<B>) {
       all_.clear();
-      for (const DetailSets& cut : cuts)
-        all_.insert(all_.end(), cut.chunks().begin(), cut.chunks().end());
+      begins_.clear();
+      const auto begin_of = [this](View<const std::uint32_t> list) {
+        const auto [at, is_new] = begins_.emplace(list.data, all_.size());
+        if (is_new) all_.insert(all_.end(), list.data, list.data + list.size);
+        return at->second;
+      };
+      for (DetailSets& cut : cuts) {
+        cut.place_chunks([&](View<const std::uint32_t> list) {
+          begin_of(list);
+          return static_cast<const std::uint32_t*>(nullptr);
+        });
+      }
       there_.resize_discard(all_.size());
       there_.upload(all_.data(), all_.size());
-      const std::uint32_t* at = there_.data();
       for (DetailSets& cut : cuts) {
-        cut.place_chunks(at);
-        at += cut.chunks().size();
+        cut.place_chunks([&](View<const std::uint32_t> list) { return there_.data() + begin_of(list); });
       }
     }
   }
 
  private:
   std::vector<std::uint32_t> all_;
+  std::unordered_map<const std::uint32_t*, std::size_t> begins_;  // Places of the lists in all_.
   Buffer<std::uint32_t, B> there_;
 };
 
