@@ -463,6 +463,8 @@ def make(out, doxygen):
         print("\n".join(wrong))
         return 1
     site_search.widen(out / "html/search", searchable())
+    with open(out / "html/search/search.css", "a", encoding="utf-8") as style:
+        style.write((SITE / "search.css").read_text(encoding="utf-8"))
     print(f"{out}/html/index.html")
     return 0
 

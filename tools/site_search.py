@@ -2,8 +2,8 @@
 """Makes every word of the pages' titles, headings and terms known to the search field of the site.
 
 Doxygen 1.9.4 compares the typed text with the beginning of a name or title only. widen() adds an entry for each
-heading and for each later word, so that "gpu" finds the page "On a GPU". terms() finds the words that a page
-explains.
+heading and for each later word, so that "gpu" finds the page "On a GPU". Among equal words, names of the library
+come first. terms() finds the words that a page explains.
 """
 import json
 import re
@@ -64,7 +64,7 @@ def widen(search, headings):
     letters = re.search(r'0: "([^"]*)"', (search / "searchdata.js").read_text(encoding="utf-8")).group(1)
     for number, letter in enumerate(letters):
         path = search / f"all_{number:x}.js"
-        entries = dict.fromkeys(ENTRY.findall(path.read_text(encoding="utf-8")))
-        entries |= added.get(letter, {})
-        lines = (f"  ['{name}_{k}',{script}]" for k, (name, script) in enumerate(sorted(entries)))
+        names = set(ENTRY.findall(path.read_text(encoding="utf-8")))
+        entries = sorted(names | added.get(letter, {}).keys(), key=lambda e: (e[0], e not in names, e[1]))
+        lines = (f"  ['{name}_{k}',{script}]" for k, (name, script) in enumerate(entries))
         path.write_text("var searchData=\n[\n" + ",\n".join(lines) + "\n];\n", encoding="utf-8")
