@@ -3,15 +3,14 @@
 """Makes the table of CPU renderers in docs/benchmarks.md: time, error and memory of gsnav and baselines.
 
     tools/cpu_table.py --build build/dev            # the flats that gsnav-scene makes
-    tools/cpu_table.py --build build/dev
     tools/cpu_table.py --build build/dev --scene flat=flat.ply:cameras.json --baseline NAME=BINARY
 
 A scene is any file that gsnav-convert reads; all renderers get the same PLY. A baseline is a binary or a
 C++ source. It is called as `CAMERAS=cameras.json BINARY SCENE.ply WIDTH HEIGHT THREADS REPEATS`, and
-prints `total X ms` (median over views) and `RSS X MB`. Baselines and gsnav take turns for each size.
+prints `total X ms` (median over views) and `RSS X MB`. It may compare its images with those of the folder
+that REFERENCE names, and print `PSNR X dB`. Baselines and gsnav take turns for each size.
 Scenes, binaries and float64 references are kept in --cache. Times are medians over all views of the
-fastest turn; errors are those of the worst of four evenly spread
-views.
+fastest turn; errors are those of the worst of four evenly spread views.
 """
 import argparse
 import collections
@@ -29,6 +28,7 @@ PROFILES = ("exact", "fast")
 Baseline = collections.namedtuple("Baseline", "source least_gain")
 BASELINES = {"prototype": Baseline("proto.cpp", 2), "row renderer": Baseline("surrogate.cpp", 4)}
 FLATS = {"flat 100K": 100_000, "flat 300K": 300_000, "flat 1M": 1_000_000}
+BASELINE_LINES = {"ms": r"total ([\d.]+) ms", "MB": r"RSS (\d+) MB", "psnr": r"PSNR (-?[\d.]+) dB"}
 TIMEOUT_S = 900
 # Bound on spinning in GNU's OpenMP, for all renderers alike. Without it a waiting thread may occupy the core that
 # the working thread needs, for 8 ms at every barrier.
@@ -125,12 +125,31 @@ def parse_baseline(text, cache):
     return name, compiled(path, cache, ["-march=native"]) if path.suffix == ".cpp" else path.resolve()
 
 
-def time_baseline(binary, ply, cameras, size, threads, repeats):
-    out = run([binary, ply, *size, threads, repeats], env={"CAMERAS": cameras})
-    total, memory = re.search(r"total ([\d.]+) ms", out), re.search(r"RSS (\d+) MB", out)
-    if not total:
+def reference_images(build, name, ply, cameras, size, cache):
+    """Folder of NNNN.rgb.npy: float64 images of four evenly spread views, or of all if there are fewer."""
+    folder = cache / "images" / (re.sub(r"\W+", "_", name) + f"_{size[0]}x{size[1]}")
+    if not folder.exists():
+        views = json.loads(pathlib.Path(cameras).read_text())
+        judged = [views[i * len(views) // 4] for i in range(4)] if len(views) > 4 else views
+        for view in judged:
+            scale = size[0] / view["width"]  # square pixels, as bench_render
+            view.update(width=size[0], height=size[1], fx=view["fx"] * scale, fy=view["fy"] * scale)
+        made = folder.with_name(folder.name + ".part")
+        made.mkdir(parents=True, exist_ok=True)
+        (made / "cameras.json").write_text(json.dumps(judged))
+        run([program(build, "gsnav-render"), "--scene", ply, "--cameras", made / "cameras.json", "--device",
+             "serial64", "--up", "keep", "--npy", "--out", made])
+        made.rename(folder)
+    return folder
+
+
+def time_baseline(binary, ply, cameras, size, threads, repeats, reference):
+    out = run([binary, ply, *size, threads, repeats],
+              env={"CAMERAS": cameras, **({"REFERENCE": str(reference)} if reference else {})})
+    row = {key: float(found.group(1)) for key, pattern in BASELINE_LINES.items() if (found := re.search(pattern, out))}
+    if "ms" not in row:
         stop(f"{binary} printed no `total X ms`: {out[-300:]}")
-    return {"ms": float(total.group(1)), "MB": float(memory.group(1)) if memory else None}
+    return row
 
 
 def time_gsnav(bench, ply, cameras, size, threads, repeats, cache, judged):
@@ -177,8 +196,10 @@ def measure(options, scenes, baselines):
                                                options.cache, number == 0).items():
                             ours.setdefault(k, []).append(v)
                     else:
-                        theirs.setdefault(turn[0], []).append(
-                            time_baseline(turn[1], ply, cameras, size, options.threads[-1], options.repeats))
+                        reference = number == 0 and reference_images(options.build, name, ply, cameras, size,
+                                                                     options.cache)
+                        theirs.setdefault(turn[0], []).append(time_baseline(
+                            turn[1], ply, cameras, size, options.threads[-1], options.repeats, reference))
             rows.append({"scene": name, "size": f"{size[0]}x{size[1]}", "busy_before": busy,
                          "gsnav": {k: best(v) for k, v in ours.items()},
                          "baselines": {k: best(v) for k, v in theirs.items()}})
@@ -199,8 +220,10 @@ def table(rows, threads, baselines):
         return " / ".join(number(row["gsnav"][f"{p} {most}"][key]) for p in PROFILES)
 
     counts = " / ".join(map(str, threads))
+    judged = [b for b in baselines if all("psnr" in row["baselines"][b] for row in rows)]
     head = ["scene", "size", *(f"{p}, ms on {counts} threads" for p in PROFILES), "times the floor",
-            *(f"{b}, ms (times gsnav's)" for b in baselines), "PSNR, dB", "memory, MB"]
+            *(f"{b}, ms (times gsnav's)" for b in baselines), "PSNR, dB", *(f"PSNR of {b}, dB" for b in judged),
+            "memory, MB"]
     lines = [" | ".join(head), "|".join(["---"] * 2 + ["---:"] * (len(head) - 2))]
     for row in rows:
         ours = row["gsnav"]
@@ -212,6 +235,7 @@ def table(rows, threads, baselines):
             ratios = " / ".join(number(ms / ours[f"{p} {most}"]["median_ms"]) for p in PROFILES)
             cells.append(f"{number(ms)} ({ratios})")
         cells.append(" / ".join(f"{ours[f'{p} {most}']['rgb_psnr']:.0f}" for p in PROFILES))
+        cells += [f"{row['baselines'][b]['psnr']:.0f}" for b in judged]
         fast = ours[f"fast {most}"]
         cells.append(f"{fast['scene_MB'] + fast['scratch_MB']:.0f}")
         lines.append(" | ".join(cells))
@@ -226,8 +250,8 @@ def caption(options, baselines):
             " The floor is what a frame's work would take at the measured bandwidth and clock and the best unit costs"
             " known (`bench/floor.hpp`). PSNR: the worst of four evenly spread views, against float64."
             " Memory: scene and scratch.")
-    if baselines:
-        text += (f" {' and '.join(baselines).capitalize()}: throwaway AVX-512 baselines with the same near plane,"
+    if made := [b for b in baselines if b in BASELINES]:
+        text += (f" {' and '.join(made).capitalize()}: throwaway AVX-512 baselines with the same near plane,"
                  " guard band, cuts and stop.")
     return "\n".join(textwrap.wrap(text, 110))
 
