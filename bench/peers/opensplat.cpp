@@ -99,7 +99,8 @@ Scene load_scene(const fs::path& path) {
   const auto width = static_cast<int64_t>(columns.size());
   Tensor all = torch::empty({rows, width});
   const auto bytes = static_cast<std::streamsize>(rows * width * 4);
-  if (!file.read(static_cast<char*>(all.data_ptr()), bytes)) throw std::runtime_error("the PLY is too short");
+  if (!file.read(static_cast<char*>(all.data_ptr()), bytes))
+    throw std::runtime_error("the PLY is too short");
   const auto pick = [&](std::initializer_list<std::string> names) {
     std::vector<Tensor> out;
     for (const std::string& name : names) out.push_back(all.index({Slice(), columns.at(name)}));
@@ -113,7 +114,8 @@ Scene load_scene(const fs::path& path) {
     sh.push_back(pick({name(0), name(1), name(2)}));
   }
   return {pick({"x", "y", "z"}), pick({"scale_0", "scale_1", "scale_2"}),
-          pick({"rot_0", "rot_1", "rot_2", "rot_3"}), pick({"opacity"}), torch::stack(sh, 1).contiguous()};
+          pick({"rot_0", "rot_1", "rot_2", "rot_3"}), pick({"opacity"}),
+          torch::stack(sh, 1).contiguous()};
 }
 
 /// Draws one image [height][width][3] and puts the milliseconds that it took into `ms`.
@@ -144,9 +146,11 @@ Tensor draw(const Scene& scene, const View& view, int width, int height, double&
   directions = directions / directions.norm(2, {-1}, true);
   const int bands = static_cast<int>(scene.sh.size(1));
   const int degree = bands == 1 ? 0 : bands == 4 ? 1 : bands == 9 ? 2 : 3;
-  const Tensor colors = torch::clamp_min(
-      compute_sh_forward_tensor_cpu(static_cast<int>(means.size(0)), degree, degree, directions, scene.sh) + 0.5f,
-      0.0f);
+  const Tensor colors =
+      torch::clamp_min(compute_sh_forward_tensor_cpu(static_cast<int>(means.size(0)), degree, degree,
+                                                     directions, scene.sh) +
+                           0.5f,
+                       0.0f);
   const auto [image, transmittance, lists] =
       rasterize_forward_tensor_cpu(width, height, xys, conics, colors, torch::sigmoid(scene.opacities),
                                    torch::zeros({3}), cov2d, depths.contiguous());
@@ -163,7 +167,8 @@ double psnr(const Tensor& image, const fs::path& file) {
   if (text.size() < bytes) throw std::runtime_error(file.string() + ": has another size");
   Tensor truth = torch::empty_like(image);
   std::copy_n(text.data() + (text.size() - bytes), bytes, static_cast<char*>(truth.data_ptr()));
-  return -10 * torch::log10((image.to(torch::kFloat64) - truth.to(torch::kFloat64)).pow(2).mean()).item<double>();
+  return -10 * torch::log10((image.to(torch::kFloat64) - truth.to(torch::kFloat64)).pow(2).mean())
+                   .item<double>();
 }
 
 void run(char** argv) {
@@ -183,7 +188,8 @@ void run(char** argv) {
       times.push_back(ms);
     }
   }
-  std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2), times.end());
+  std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2),
+                   times.end());
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   std::printf("total %.3f ms\nRSS %ld MB\n", times[times.size() / 2], usage.ru_maxrss / 1024);
@@ -206,7 +212,8 @@ void run(char** argv) {
 
 int main(int argc, char** argv) try {
   if (argc != 6) {
-    std::fprintf(stderr, "usage: CAMERAS=cameras.json opensplat SCENE.ply WIDTH HEIGHT THREADS REPEATS\n");
+    std::fprintf(stderr,
+                 "usage: CAMERAS=cameras.json opensplat SCENE.ply WIDTH HEIGHT THREADS REPEATS\n");
     return 2;
   }
   run(argv);
