@@ -71,9 +71,9 @@ struct RegionArgs {
   const RegionView* views;           ///< Per instance.
   const PlainCamera* cameras;        ///< Per instance.
   const std::uint32_t* camera_rows;  ///< Per camera: number of rows of its sets.
-  std::uint32_t groups;              ///< Number for all sets, with padding.
+  std::uint32_t groups;              ///< Number of groups of all sets, with padding.
   int columns, rows;                 ///< Regions of an image.
-  std::uint32_t bins;                ///< Per region.
+  std::uint32_t bins;                ///< Number of bins per region.
   int shift;                         ///< A bin covers 2^shift keys.
   float radius_unit;                 ///< Step of the squared radius in row_word().
   RegionCounters* counters;

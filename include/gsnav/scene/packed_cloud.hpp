@@ -41,8 +41,8 @@ struct PackedCloud {
   std::vector<std::int8_t> shN;      ///< [N][(degree+1)^2 - 1][3]; empty if `rest` has the bands.
   std::vector<PackedChunk> chunks;   ///< [ceil(N / kProjectChunk)].
   std::size_t count = 0;             ///< N, the number of Gaussians.
-  /// Everything that is not packed: ids, origins, chunk bounds, settings of the asset, and planes that a
-  /// limit kept.
+  /// Everything that is not packed: ids, origins, chunk bounds, settings of the asset, and arrays that
+  /// stay as they are because packing them would exceed a limit of PackLimits.
   GaussianCloud rest;
 
   /// Number of Gaussians, N.

@@ -134,9 +134,9 @@ inline GroundSearch search_ground(const std::vector<Vec3d>& points, const std::v
 }  // namespace detail
 
 /// Guesses the up axis from the ground: the largest surface across an axis, of Gaussians that face along
-/// the axis. Up is the side on which more lies. If there are a floor and a ceiling, the floor is the one
-/// with more things near it. Where that is undecided, up is +z or has the sign of `usual`. Where there
-/// is no ground (an object), the result is `usual`.
+/// the axis. Up is the side of the ground with more Gaussians. If there are a floor and a ceiling, the
+/// floor is the one with more Gaussians near it. Where that is undecided, up is +z or has the sign of
+/// `usual`. Where there is no ground (an object), the result is `usual`.
 ///
 /// The guess is one of +y, -y and +z, which are all that tools produce. It is for people to check and
 /// for default cameras. It depends on the Gaussians only, not on the order of their rows.
