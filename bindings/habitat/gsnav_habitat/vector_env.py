@@ -1,63 +1,88 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Environments of habitat-baselines in the process of the trainer, which share scenes and renderers' memory."""
+"""Environments of habitat-baselines in the process of the trainer, which share scenes and renderers."""
 
-import random
+import collections
+import copy
+import queue
 import threading
 from typing import Any, Callable
 
-import numpy as np
 from habitat.core import vector_env as _theirs
 from habitat_baselines.common import habitat_env_factory as _factory
+from habitat_sim import _engine
+
+from ._turns import Turns
 
 _lock = threading.Lock()
 
 
 class _Worker:
-    """An environment that answers the commands of habitat.VectorEnv when an answer is read.
+    """An environment on a thread, which answers the commands of habitat.VectorEnv when an answer is read."""
 
-    Processes have random numbers of their own, so each worker keeps the states of `random` and `numpy.random`.
-    """
-
-    def __init__(self, make: Callable[..., Any], arguments: tuple[Any, ...], auto_reset: bool) -> None:
-        self._auto_reset = auto_reset
-        self._asked: list[tuple[str, Any]] = []
-        self._random = random.getstate(), np.random.get_state()
+    def __init__(self, turns: Turns, auto_reset: bool) -> None:
+        self._turns, self._auto_reset = turns, auto_reset
+        self._asked: collections.deque[tuple[str, Any]] = collections.deque()
+        self._answers: collections.deque[tuple[Any, BaseException | None]] = collections.deque()
+        self._wake: queue.SimpleQueue[None] = queue.SimpleQueue()
+        self._rest: queue.SimpleQueue[None] = queue.SimpleQueue()
         self._env: Any = None
-        self._env = self._alone(
-            lambda: _theirs.EnvCountEpisodeWrapper(_theirs.EnvObsDictWrapper(make(*arguments)))
-        )
-
-    def _alone(self, call: Callable[[], Any]) -> Any:
-        outside = random.getstate(), np.random.get_state()
-        random.setstate(self._random[0])
-        np.random.set_state(self._random[1])
-        try:
-            return call()
-        finally:
-            self._random = random.getstate(), np.random.get_state()
-            random.setstate(outside[0])
-            np.random.set_state(outside[1])
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
 
     def ask(self, command: tuple[str, Any]) -> None:
-        """Takes a command. All but the last one are carried out by `answer`."""
-        if command[0] != _theirs.CLOSE_COMMAND:
-            self._asked.append(command)
-        elif self._env is not None:
-            self._alone(self._env.close)
-            self._env = None
+        """Takes a command. It is carried out when it or one of another worker is awaited."""
+        self._asked.append(command)
+        if command[0] == _theirs.CLOSE_COMMAND:
+            self._wake.put(None)
 
-    def answer(self) -> Any:
-        """Carries out the oldest command and returns its result."""
-        command, data = self._asked.pop(0)
-        return self._alone(lambda: self._do(command, data))
+    def begin(self) -> bool:
+        """Lets the thread carry out the commands so far. Returns whether there are any."""
+        if not self._asked:
+            return False
+        self._wake.put(None)
+        return True
+
+    def wait(self) -> None:
+        """Waits until the commands are carried out, after `begin`."""
+        self._rest.get()
+
+    def take(self) -> Any:
+        """Result of the oldest command that was carried out. Raises what the environment raised."""
+        value, error = self._answers.popleft()
+        if error is not None:
+            raise error
+        return value
+
+    def has_answer(self) -> bool:
+        """Whether `take` has a result."""
+        return bool(self._answers)
 
     def join(self) -> None:
-        """Nothing to wait for."""
+        """Waits for the thread to end, after it was asked to close."""
+        self._thread.join()
+
+    def _serve(self) -> None:
+        while True:
+            self._wake.get()
+            with self._turns.turn(self):
+                while self._asked:
+                    command, data = self._asked.popleft()
+                    if command == _theirs.CLOSE_COMMAND:
+                        if self._env is not None:
+                            self._env.close()
+                        self._env = None
+                        return
+                    try:
+                        self._answers.append((self._do(command, data), None))
+                    except BaseException as error:  # It is raised where the result is read.
+                        self._answers.append((None, error))
+            self._rest.put(None)
 
     def _do(self, command: str, data: Any) -> Any:
         env = self._env
         if command == _theirs.STEP_COMMAND:
             seen, reward, done, info = env.step(data)
+            info = copy.deepcopy(info)  # Measures change their arrays in place.
             return (env.reset() if done and self._auto_reset else seen), reward, done, info
         if command == _theirs.RESET_COMMAND:
             return env.reset()
@@ -69,19 +94,58 @@ class _Worker:
             return found(**(arguments or {})) if arguments or callable(found) else found
         if command == _theirs.COUNT_EPISODES_COMMAND:
             return len(env.episodes)
+        if command == "make":
+            make, arguments = data
+            self._env = _theirs.EnvCountEpisodeWrapper(_theirs.EnvObsDictWrapper(make(*arguments)))
+            return None
         raise NotImplementedError(f"gsnav.habitat: habitat.VectorEnv's command {command!r}")
 
 
 class BatchVectorEnv(_theirs.VectorEnv):
-    """habitat.VectorEnv without processes: environments take turns, and each image is drawn by all cores."""
+    """habitat.VectorEnv without processes.
+
+    The first read carries out the commands of all environments: one runs Python at a time, and meanwhile others draw
+    their images on the cores of the CPU.
+    """
 
     def _spawn_workers(
         self, env_fn_args: Any, make_env_fn: Any, workers_ignore_signals: bool = False
     ) -> tuple[list[Any], list[Any]]:
-        self._workers = [_Worker(make_env_fn, arguments, self._auto_reset_done) for arguments in env_fn_args]
-        reads = [_theirs._ReadWrapper(worker.answer, rank) for rank, worker in enumerate(self._workers)]
-        writes = [_theirs._WriteWrapper(worker.ask, read) for worker, read in zip(self._workers, reads)]
+        cores, count = _engine.threads(), len(env_fn_args)
+        self._turns = Turns(drawers=min(cores, count), share=max(1, cores // count))
+        self._everyone = [_Worker(self._turns, self._auto_reset_done) for _ in range(count)]
+        self._workers = list(self._everyone)
+        reads = [_theirs._ReadWrapper(self._reader(worker), rank) for rank, worker in enumerate(self._everyone)]
+        writes = [_theirs._WriteWrapper(worker.ask, read) for worker, read in zip(self._everyone, reads)]
+        try:
+            for worker, arguments in zip(self._everyone, env_fn_args):
+                worker.ask(("make", (make_env_fn, arguments)))
+                self._run()  # One after the other: they open the same scenes.
+                worker.take()
+        except BaseException:
+            for worker in self._everyone:
+                worker.ask((_theirs.CLOSE_COMMAND, None))
+            raise
         return reads, writes
+
+    def _reader(self, worker: _Worker) -> Callable[[], Any]:
+        def read() -> Any:
+            if not worker.has_answer():
+                self._run()
+            return worker.take()
+
+        return read
+
+    def _run(self) -> None:
+        begun = collections.deque([w for w in self._everyone if w.begin()])
+        try:
+            while begun:
+                begun[0].wait()
+                begun.popleft()
+        finally:
+            for worker in begun:  # After Ctrl-C, so that each answer has its command.
+                worker.wait()
+            self._turns.finish()
 
 
 class BatchVectorEnvFactory(_factory.HabitatVectorEnvFactory):

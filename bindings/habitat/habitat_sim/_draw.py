@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 import gsnav_habitat as _shared
+from gsnav_habitat import _turns
 
 from . import _engine
 from .registry import registry
@@ -80,8 +81,9 @@ class Painter:
 
     def __init__(self, stage: Any, device: Any) -> None:
         self._stage, self._device = stage, device
-        self._free: Any = None
-        self._sensors: list[Any] = []  # Those of `_free`.
+        self._sensors: list[Any] = []
+        self._natives: list[Any] = []  # Their specifications.
+        self._key = ""
 
     def draw(self, sensors: Any, seconds: float) -> dict[str, np.ndarray]:
         """New arrays by the names of the sensors, at a time on the scene's clock: colour uint8 [height][width][4],
@@ -96,18 +98,13 @@ class Painter:
             else:
                 drawn.append(sensor)
         if drawn:
-            images.update(self._drawer(drawn).render([_pose(s) for s in drawn], seconds))
+            poses = [_pose(s) for s in drawn]
+            if self._sensors != drawn:
+                self._sensors, self._natives = drawn, [_native(s.specification()) for s in drawn]
+                self._key = repr(self._natives)
+            with _turns.drawing(), self._stage.drawer(self._device, self._key, self._natives) as drawer:
+                images.update(drawer.render(poses, seconds))
         return {s.uuid: _noisy(images[s.uuid], s.specification()) for s in sensors}
-
-    def _drawer(self, sensors: Any) -> Any:
-        if self._sensors != sensors:
-            natives = [_native(s.specification()) for s in sensors]
-            if self._free is None:
-                self._free = _engine.library().FreeSensors(self._device, self._stage.scene, natives)
-            else:
-                self._free.set_sensors(natives)
-            self._sensors = list(sensors)
-        return self._free
 
 
 def _pose(sensor: Any) -> Any:

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The package gsnav, imported when it is first needed, and the scenes that simulators of a process share."""
 
+import contextlib
 import logging
 import os
 import threading
 import weakref
-from typing import Any
+from typing import Any, Iterator
+
+from gsnav_habitat import _turns
 
 logger = logging.getLogger("habitat_sim")
 _lock = threading.Lock()
@@ -24,6 +27,24 @@ class Stage:
     def __init__(self, opened: Any) -> None:
         self.opened = opened
         self.scene = None if opened is None else opened.scene
+        self._idle: dict[Any, list[tuple[str, Any]]] = {}
+        self._gpu = threading.Lock()
+
+    @contextlib.contextmanager
+    def drawer(self, device: Any, key: str, specs: list[Any]) -> Iterator[Any]:
+        """A gsnav.FreeSensors of these gsnav.SensorSpec, for one thread at a time. Specifications with equal keys are
+        equal. A GPU has one drawer, a CPU one per thread."""
+        with self._gpu if device.kind == library().DeviceKind.cuda else contextlib.nullcontext():
+            with _lock:
+                idle = self._idle.setdefault(device, [])
+                fitting = [i for i, (had, _) in enumerate(idle) if had == key]
+                before, found = idle.pop(fitting[0] if fitting else -1) if idle else ("", None)
+            if found is None:
+                found = library().FreeSensors(device, self.scene, specs)
+            elif before != key:
+                found.set_sensors(specs)
+            yield found
+            idle.append((key, found))  # Not after an error.
 
     @property
     def navmesh(self) -> Any:
@@ -91,10 +112,19 @@ def device(gpu_device_id: int) -> Any:
     gsnav = library()
     chosen = os.environ.get("GSNAV_DEVICE")
     if chosen:
-        return gsnav.Device.parse(chosen)
-    if gpu_device_id >= 0:
-        try:
-            return gsnav.Device.parse(f"cuda:{gpu_device_id}")
-        except gsnav.Error:
-            pass
-    return gsnav.Device.parse("cpu")
+        found = gsnav.Device.parse(chosen)
+    else:
+        found = gsnav.Device.parse("cpu")
+        if gpu_device_id >= 0:
+            with contextlib.suppress(gsnav.Error):
+                found = gsnav.Device.parse(f"cuda:{gpu_device_id}")
+    share = _turns.share()
+    return gsnav.Device.parse(f"cpu:{share}") if share and found.kind == gsnav.DeviceKind.cpu else found
+
+
+def threads() -> int:
+    """Threads of the CPU that a process draws on: those of GSNAV_DEVICE or OMP_NUM_THREADS, or else its cores."""
+    for text in (os.environ.get("GSNAV_DEVICE", "").removeprefix("cpu:"), os.environ.get("OMP_NUM_THREADS", "")):
+        if text.isdecimal() and int(text) > 0:
+            return int(text)
+    return len(os.sched_getaffinity(0))

@@ -12,10 +12,12 @@ from magnum import Matrix4, Quaternion, Vector3
 class SceneNode:
     """A node with a rotation and a translation relative to its parent, metres."""
 
+    _world: "tuple[Vector3, Quaternion] | None"
+
     def __init__(self, parent: "SceneNode | None" = None) -> None:
-        self._translation, self._rotation = Vector3(), Quaternion()
-        self.parent = parent
         self.children: list[SceneNode] = []
+        self.parent = parent
+        self._put(Vector3(), Quaternion())
         self.node_sensors: dict[str, Any] = {}
         if parent is not None:
             parent.children.append(self)
@@ -30,6 +32,7 @@ class SceneNode:
         if self.parent is not None:
             self.parent.children.remove(self)
             self.parent = None
+            self._forget()
 
     def _subtree(self) -> Iterator["SceneNode"]:
         yield self
@@ -42,6 +45,15 @@ class SceneNode:
         return {uuid: s for node in self._subtree() for uuid, s in node.node_sensors.items()}
 
     # ---- Pose relative to the parent
+    def _put(self, translation: Vector3, rotation: Quaternion) -> None:
+        self._translation, self._rotation = translation, rotation
+        self._forget()
+
+    def _forget(self) -> None:
+        """Poses in the world are kept until a node above changes."""
+        for node in self._subtree():
+            node._world = None
+
     @property
     def translation(self) -> Vector3:
         """Translation, a copy. Assign any sequence of three numbers."""
@@ -49,7 +61,7 @@ class SceneNode:
 
     @translation.setter
     def translation(self, value: Any) -> None:
-        self._translation = Vector3(*(float(x) for x in value))
+        self._put(Vector3(*(float(x) for x in value)), self._rotation)
 
     @property
     def rotation(self) -> Quaternion:
@@ -58,7 +70,7 @@ class SceneNode:
 
     @rotation.setter
     def rotation(self, value: Any) -> None:
-        self._rotation = Quaternion._of(value).normalized()
+        self._put(self._translation, Quaternion._of(value).normalized())
 
     @property
     def transformation(self) -> Matrix4:
@@ -67,8 +79,7 @@ class SceneNode:
 
     @transformation.setter
     def transformation(self, value: Any) -> None:
-        self._rotation = Quaternion.from_matrix(value.rotation()).normalized()
-        self._translation = value.translation
+        self._put(value.translation, Quaternion.from_matrix(value.rotation()).normalized())
 
     def set_translation(self, value: Any) -> "SceneNode":
         """Assigns `translation`."""
@@ -82,29 +93,28 @@ class SceneNode:
 
     def reset_transformation(self) -> "SceneNode":
         """Puts the node at its parent."""
-        self._translation, self._rotation = Vector3(), Quaternion()
+        self._put(Vector3(), Quaternion())
         return self
 
     def translate(self, vector: Any) -> "SceneNode":
         """Moves along the parent's axes, metres."""
-        self._translation = self._translation + vector
+        self._put(self._translation + vector, self._rotation)
         return self
 
     def translate_local(self, vector: Any) -> "SceneNode":
         """Moves along the node's own axes, metres."""
-        self._translation = self._translation + self._rotation.transform_vector(vector)
+        self._put(self._translation + self._rotation.transform_vector(vector), self._rotation)
         return self
 
     def rotate(self, angle: Any, axis: Any) -> "SceneNode":
         """Turns about an axis of the parent, with its origin."""
         turn = Quaternion.rotation(angle, axis)
-        self._rotation = (turn * self._rotation).normalized()
-        self._translation = turn.transform_vector(self._translation)
+        self._put(turn.transform_vector(self._translation), (turn * self._rotation).normalized())
         return self
 
     def rotate_local(self, angle: Any, axis: Any) -> "SceneNode":
         """Turns about an axis of the node."""
-        self._rotation = (self._rotation * Quaternion.rotation(angle, axis)).normalized()
+        self._put(self._translation, (self._rotation * Quaternion.rotation(angle, axis)).normalized())
         return self
 
     def rotate_x_local(self, angle: Any) -> "SceneNode":
@@ -120,20 +130,24 @@ class SceneNode:
         return self.rotate_local(angle, Vector3.z_axis())
 
     # ---- Pose in the world
+    def _in_world(self) -> tuple[Vector3, Quaternion]:
+        if self._world is None:
+            if self.parent is None:
+                self._world = self._translation, self._rotation
+            else:
+                at, turn = self.parent._in_world()
+                self._world = at + turn.transform_vector(self._translation), (turn * self._rotation).normalized()
+        return self._world
+
     @property
     def absolute_rotation(self) -> Quaternion:
-        """Rotation in the world."""
-        if self.parent is None:
-            return self.rotation
-        return (self.parent.absolute_rotation * self._rotation).normalized()
+        """Rotation in the world, a copy."""
+        return Quaternion(self._in_world()[1])
 
     @property
     def absolute_translation(self) -> Vector3:
-        """Position in the world, metres."""
-        if self.parent is None:
-            return self.translation
-        parent = self.parent
-        return parent.absolute_translation + parent.absolute_rotation.transform_vector(self._translation)
+        """Position in the world in metres, a copy."""
+        return Vector3(self._in_world()[0])
 
     def absolute_transformation(self) -> Matrix4:
         """Pose in the world."""

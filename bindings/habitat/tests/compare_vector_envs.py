@@ -2,9 +2,12 @@
 """Plays the same actions in forkserver workers and in one process, and prints whether all results agree.
 
     compare_vector_envs.py STEPS [overrides of habitat-baselines]
+
+Workers draw on one thread each. The single process draws on all cores.
 """
 
 import hashlib
+import os
 import random
 import sys
 import time
@@ -12,9 +15,28 @@ import time
 import numpy as np
 
 
+def memory():
+    """Megabytes of this process and its children. Shared memory is divided by the number of its processes."""
+
+    def tree(pid):
+        found = [pid]
+        for thread in os.listdir(f"/proc/{pid}/task"):
+            with open(f"/proc/{pid}/task/{thread}/children") as file:
+                for child in file.read().split():
+                    found += tree(child)
+        return found
+
+    total = 0
+    for pid in tree(os.getpid()):
+        with open(f"/proc/{pid}/smaps_rollup") as file:
+            total += next(int(line.split()[1]) for line in file if line.startswith("Pss:"))
+    return total / 1024
+
+
 def play(factory, config, steps):
-    """Digest of every result, steps per second, and the ids of the episodes."""
+    """Digest of every result, steps per second, the ids of the episodes, and megabytes of the environments."""
     random.seed(11)
+    before = memory()
     envs = factory().construct_envs(config)
     digest, episodes = hashlib.sha256(), []
     seen = envs.reset()
@@ -38,8 +60,9 @@ def play(factory, config, steps):
         digest.update(repr([(r[1], r[2], sorted(r[3].items())) for r in rows]).encode())
         episodes.append([e.episode_id for e in envs.current_episodes()])
     count = envs.num_envs
+    used = memory() - before
     envs.close()
-    return digest.hexdigest(), steps * count / seconds, episodes
+    return digest.hexdigest(), steps * count / seconds, episodes, used
 
 
 if __name__ == "__main__":
@@ -48,7 +71,14 @@ if __name__ == "__main__":
     from habitat_baselines.config.default import get_config
 
     settings = get_config("pointnav/ppo_pointnav_example.yaml", sys.argv[2:])
-    results = [play(f, settings, int(sys.argv[1])) for f in (HabitatVectorEnvFactory, BatchVectorEnvFactory)]
+    cores = os.environ.pop("OMP_NUM_THREADS", None)
+    results = []
+    for kind, threads in ((HabitatVectorEnvFactory, "1"), (BatchVectorEnvFactory, cores)):
+        if threads is not None:
+            os.environ["OMP_NUM_THREADS"] = threads
+        results.append(play(kind, settings, int(sys.argv[1])))
+        os.environ.pop("OMP_NUM_THREADS", None)
     print("steps/s of workers and of one process:", *(f"{r[1]:.1f}" for r in results))
+    print("MB of workers and of one process:", *(f"{r[3]:.0f}" for r in results))
     print("episodes agree" if results[0][2] == results[1][2] else "episodes DIFFER", len({*map(str, results[0][2])}))
     print("bits agree" if results[0][0] == results[1][0] else "bits DIFFER")

@@ -47,21 +47,24 @@ void make_sensors(PythonFreeSensors* self, const DeviceArg& device, const SceneA
   new (self) PythonFreeSensors{std::move(sensors), std::move(renderer), {}};
 }
 
-/// Colours as bytes with alpha 255, other images as they are.
-nb::object image_of(const FreeSensors& sensors, std::size_t i) {
-  const SensorSpec& spec = sensors.sensors()[i];
+/// An image for Python, made without the GIL.
+struct Seen {
+  std::vector<std::uint8_t> colors;  ///< Colours as bytes with alpha 255; empty for other kinds.
+  std::vector<float> numbers;        ///< Images of other kinds.
+};
+
+Seen seen_by(const FreeSensors& sensors, std::size_t i) {
   const std::span<const float> image = sensors.image(i);
-  const auto rows = static_cast<std::size_t>(spec.resolution[0]);
-  const auto columns = static_cast<std::size_t>(spec.resolution[1]);
-  if (spec.kind != SensorKind::rgb) {
-    return array_copy(image, {rows, columns});
+  Seen out;
+  if (sensors.sensors()[i].kind != SensorKind::rgb) {
+    out.numbers.assign(image.begin(), image.end());
+    return out;
   }
-  std::vector<std::uint8_t> bytes(image.size()), out(4 * rows * columns, 255);
-  to_bytes(image, bytes);
-  for (std::size_t p = 0; p < rows * columns; ++p) {
-    for (std::size_t c = 0; c < 3; ++c) out[4 * p + c] = bytes[3 * p + c];
+  out.colors.assign(image.size() / 3 * 4, 255);
+  for (std::size_t p = 0; p < image.size() / 3; ++p) {
+    for (std::size_t c = 0; c < 3; ++c) out.colors[4 * p + c] = to_byte(image[3 * p + c]);
   }
-  return array_from(std::move(out), {rows, columns, 4});
+  return out;
 }
 
 void set_sensors(PythonFreeSensors& self, std::vector<SensorSpec> specs) {
@@ -75,16 +78,23 @@ nb::dict draw(PythonFreeSensors& self, const std::vector<std::pair<Vec3d, Quatd>
   check_fork(self.renderer.device(), "FreeSensors.render");
   std::vector<SensorPose> places;
   for (const auto& [position, rotation] : poses) places.push_back({position, rotation});
+  std::vector<Seen> seen;
   {
     const ReleaseGil release;
     self.sensors
         .render(places, [&](std::span<const Camera> cameras,
                             Frames<float>& out) { return self.renderer.render(cameras, out, time); })
         .throw_if_error();
+    for (std::size_t i = 0; i < places.size(); ++i) seen.push_back(seen_by(self.sensors, i));
   }
   nb::dict out;
   for (std::size_t i = 0; i < places.size(); ++i) {
-    out[nb::str(self.sensors.sensors()[i].uuid.c_str())] = image_of(self.sensors, i);
+    const SensorSpec& spec = self.sensors.sensors()[i];
+    const auto rows = static_cast<std::size_t>(spec.resolution[0]);
+    const auto columns = static_cast<std::size_t>(spec.resolution[1]);
+    out[nb::str(spec.uuid.c_str())] = spec.kind == SensorKind::rgb
+                                          ? array_from(std::move(seen[i].colors), {rows, columns, 4})
+                                          : array_from(std::move(seen[i].numbers), {rows, columns});
   }
   return out;
 }
