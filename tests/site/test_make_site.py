@@ -109,7 +109,7 @@ class Tree(unittest.TestCase):
     def test_the_search_finds_each_word_of_a_heading(self):
         self.write("docs/a.md", "# Page\n\nRun `render_scan` on a `Box<S>`.\n\n## Two words\n\n"
                                 "| name | what |\n|---|---|\n"
-                                "| **median depth** | of `x` |\n\n    pip install a\n\n## On a [GPU](../README.md)\n")
+                                "| **median depth** | of `x` |\n\n    pip install a\n\n## On a [GPU](../README.md)\n\n## A place\n")
         self.assertEqual(self.run_doxygen().returncode, 0)
         found = "".join(p.read_text() for p in (self.root / "out/html/search").glob("all_*.js"))
         self.assertIn("""['gpu_""", found)
@@ -119,6 +119,7 @@ class Tree(unittest.TestCase):
         self.assertIn("""['pip_20install_""", found)
         self.assertIn("""["Box&lt;S&gt;",""", found)
         self.assertIn("""['here_""", found)  # names of the library stay
+        self.assertLess(found.index("structgsnav_1_1Place.html"), found.index("""["A place","""))  # and come first
         self.assertIn("""['on_20a_20gpu_""", found)
         self.assertNotIn("""['a_20gpu_""", found)
 
