@@ -109,7 +109,8 @@ class Tree(unittest.TestCase):
     def test_the_search_finds_each_word_of_a_heading(self):
         self.write("docs/a.md", "# Page\n\nRun `render_scan` on a `Box<S>`.\n\n## Two words\n\n"
                                 "| name | what |\n|---|---|\n"
-                                "| **median depth** | of `x` |\n\n    pip install a\n\n## On a [GPU](../README.md)\n\n## A place\n")
+                                "| **median depth** | of `x` |\n\n    pip install a\n\n"
+                                "## On a [GPU](../README.md)\n\n## A place\n")
         self.assertEqual(self.run_doxygen().returncode, 0)
         found = "".join(p.read_text() for p in (self.root / "out/html/search").glob("all_*.js"))
         self.assertIn("""['gpu_""", found)
