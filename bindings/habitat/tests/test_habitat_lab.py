@@ -119,10 +119,11 @@ if __name__ == "__main__":
 """
 
 
-def run_module(arguments, folder):
+def run_module(arguments, folder, **more):
+    """Output of a program of Python in a folder. `more` are variables of its environment."""
     here = str(pathlib.Path(__file__).resolve().parents[1])
     path = os.pathsep.join([here, *filter(None, [os.environ.get("PYTHONPATH")])])
-    environment = {**os.environ, "PYTHONPATH": path, "OMP_NUM_THREADS": "1"}
+    environment = {**os.environ, "PYTHONPATH": path, "OMP_NUM_THREADS": "1", **more}
     done = subprocess.run(
         [sys.executable, *arguments], cwd=folder, env=environment, capture_output=True, text=True, timeout=600
     )
