@@ -18,7 +18,8 @@ RANK = {"base": 0, "math": 1, "core": 2, "image": 3, "frame": 4, "skin": 4, "swe
 # headers that avatar may include too
 DATA_ONLY = {"scene/gaussian_cloud.hpp", "scene/load_report.hpp", "scene/surface_material.hpp"}
 # Headers that are not standard, but exist on every platform that compiles the code that includes them.
-PLATFORM_HEADERS = {"emmintrin.h", "immintrin.h", "arm_neon.h", "fcntl.h", "sys/mman.h", "sys/stat.h", "unistd.h"}
+PLATFORM_HEADERS = {"emmintrin.h", "immintrin.h", "arm_neon.h", "fcntl.h", "sched.h", "sys/mman.h", "sys/stat.h",
+                    "unistd.h"}
 # modules with a header <module>.hpp that includes their public headers
 MODULES = {"render", "avatar", "rigging", "nav", "sim", "io", "eval", "demo", "open", "gsnav"}
 # Largest number of public headers: of the library in include/, and those that backends add.

@@ -12,6 +12,7 @@
 #endif
 #include "gsnav/io.hpp"
 #include "gsnav/scene/lod_cut.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
 #include "runner_images.hpp"
 #include "runner_reference.hpp"
 #include "runner_system.hpp"

@@ -184,4 +184,16 @@ fs::path lod_path(const std::string& spec, const GaussianCloud& cloud, const Lod
   return detail::path_beside(spec) + "." + hash_of(cloud, settings).hex().substr(0, 16) + ".lod";
 }
 
+Status save_lod(const fs::path& path, const LodTree& tree, const GaussianCloud& cloud) {
+  return save_lod(path, tree, cloud, LodSettings{});
+}
+
+Result<LodTree> load_lod(const fs::path& path, const GaussianCloud& cloud) {
+  return load_lod(path, cloud, LodSettings{});
+}
+
+fs::path lod_path(const std::string& spec, const GaussianCloud& cloud) {
+  return lod_path(spec, cloud, LodSettings{});
+}
+
 }  // namespace gsnav::io

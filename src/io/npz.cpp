@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <utility>
+#include <variant>
 
 #include "file.hpp"
 #include "gsnav/core/replace_file.hpp"

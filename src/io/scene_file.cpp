@@ -22,6 +22,7 @@
 #include "gsnav/detail/scene/drop_bands.hpp"
 #include "gsnav/detail/scene/scene_bands.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
 #include "packed_file.hpp"
 #include "ply_temporal.hpp"
 #include "report_sum.hpp"

@@ -8,6 +8,7 @@
 #include "cache_file.hpp"
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/detail/scene/seen_cells.hpp"
+#include "gsnav/detail/scene/visible_settings.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -185,6 +186,11 @@ fs::path visible_sets_path(const std::string& spec, const GaussianCloud& cloud,
     for (int k = 0; k < 3; ++k) h.value(v[k]);
   }
   return detail::path_beside(spec) + "." + h.hex().substr(0, 16) + ".vis";
+}
+
+fs::path visible_sets_path(const std::string& spec, const GaussianCloud& cloud,
+                           std::span<const Vec3d> viewpoints) {
+  return visible_sets_path(spec, cloud, viewpoints, VisibleSettings{});
 }
 
 }  // namespace gsnav::io

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <compare>
+#include <functional>
 
 #include "height_mending.hpp"
 #include "navmesh_impl.hpp"

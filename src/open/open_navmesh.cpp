@@ -10,6 +10,7 @@
 #include "gsnav/detail/nav/gaussian_navmesh.hpp"
 #include "gsnav/detail/nav/navmesh_file.hpp"
 #include "gsnav/detail/nav/viewpoints.hpp"
+#include "gsnav/detail/scene/visible_settings.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/scene/prepare.hpp"
 #include "parts.hpp"

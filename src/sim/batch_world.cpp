@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/detail/sim/batch_world.hpp"
 
+#include <functional>
 #include <utility>
 
 namespace gsnav {

@@ -15,6 +15,7 @@
 #include "gsnav/device/device.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/device/simulator.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/sim/basic_batch.hpp"
 #include "gsnav/sim/basic_simulator.hpp"
 #include "gsnav/sim/follower.hpp"

@@ -2,6 +2,8 @@
 // What hard cases draw with, compiled once.
 #include "hard_cases/backends.hpp"
 
+#include <functional>
+
 #include "hard_cases/arrays.hpp"
 #include "support/image_hashes.hpp"
 

@@ -2,6 +2,7 @@
 // Meshes among Gaussians: docs/reference/composition.md.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>

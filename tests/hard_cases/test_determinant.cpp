@@ -2,6 +2,8 @@
 // N03 to N06: the determinant of the 2D covariance, and the compensation made of it.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+
 #include "gsnav/math/functions.hpp"
 #include "hard_cases/backends.hpp"
 #include "hard_cases/cases.hpp"

@@ -2,6 +2,7 @@
 // N63, N65: the same input gives the same bits, however the work is cut.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cstring>
 
 #include "hard_cases/arrays.hpp"

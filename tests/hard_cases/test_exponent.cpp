@@ -2,6 +2,8 @@
 // N07 to N10: the exponent of long needles, its sign, and projections that nearly overflow.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+
 #include "hard_cases/backends.hpp"
 #include "hard_cases/cases.hpp"
 #include "hard_cases/records.hpp"

@@ -2,6 +2,8 @@
 // N62: shapes that are no rotated ellipsoids' (ShapeRows::axes): any factor has a covariance.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+
 #include "hard_cases/arrays.hpp"
 #include "hard_cases/cases.hpp"
 #include "hard_cases/project_samples.hpp"

@@ -2,6 +2,8 @@
 // N12 to N15, N20: the screen-space filter and Gaussians smaller than a pixel.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+
 #include "hard_cases/backends.hpp"
 #include "hard_cases/cases.hpp"
 #include "support/oracle.hpp"

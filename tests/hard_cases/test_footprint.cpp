@@ -2,6 +2,8 @@
 // N11, N18, N19: which pixels a Gaussian covers.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+
 #include "gsnav/detail/math/pack_layout.hpp"
 #include "hard_cases/backends.hpp"
 #include "hard_cases/cases.hpp"

@@ -2,6 +2,7 @@
 // N25, N26: widths of keys and offsets, and counts at the edges.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <type_traits>
 
 #include "hard_cases/backends.hpp"

@@ -2,6 +2,8 @@
 // N16, N17: Gaussians at the near plane and around the camera.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+
 #include "hard_cases/backends.hpp"
 #include "hard_cases/cases.hpp"
 #include "support/oracle.hpp"

@@ -2,6 +2,7 @@
 // N27: how much a turning camera's image jumps where Gaussians change places.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "hard_cases/backends.hpp"

@@ -2,6 +2,7 @@
 // N60: poses between keys and forward kinematics.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <string>
 
 #include "gsnav/avatar/motion.hpp"

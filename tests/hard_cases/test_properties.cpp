@@ -3,6 +3,8 @@
 // seeds.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+
 #include "hard_cases/arrays.hpp"
 #include "hard_cases/cases.hpp"
 #include "support/scenes.hpp"

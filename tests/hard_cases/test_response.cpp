@@ -2,6 +2,8 @@
 // N01, N02: what a Gaussian off the axis of a wide camera looks like, by each response.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+
 #include "hard_cases/backends.hpp"
 #include "hard_cases/cases.hpp"
 #include "hard_cases/truth.hpp"

@@ -2,6 +2,7 @@
 // N30 to N34: what rows of a file may hold. N35 to N37 need files: tests/io/test_ply.cpp.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "hard_cases/arrays.hpp"

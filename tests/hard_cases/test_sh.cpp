@@ -2,6 +2,8 @@
 // N38 to N40, N61: colours from spherical harmonics.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "hard_cases/arrays.hpp"
 #include "hard_cases/cases.hpp"

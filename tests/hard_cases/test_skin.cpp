@@ -2,6 +2,7 @@
 // N54 to N58: linear blend skinning.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 #include <memory>
 

@@ -2,6 +2,7 @@
 // N41 to N44: opaque, saturating, faint and deep stacks of layers.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "hard_cases/arrays.hpp"

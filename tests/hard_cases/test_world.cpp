@@ -2,6 +2,8 @@
 // N28, N29: scenes far from zero and across cells of the lattice that positions are stored on.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+
 #include "hard_cases/arrays.hpp"
 #include "hard_cases/cases.hpp"
 #include "support/oracle.hpp"

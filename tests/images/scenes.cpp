@@ -14,6 +14,7 @@
 #include "gsnav/detail/scene/lod_build.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/scene/lod_cut.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 #include "hard_cases/cases.hpp"
 #include "lod/level_support.hpp"

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <algorithm>
+
 #include "allocations.hpp"
 #include "check_cloud.hpp"
 #include "check_refused.hpp"

@@ -2,6 +2,7 @@
 // The tree keeps what it merges, a cut shows each Gaussian once, and both are the same every time.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <vector>

@@ -2,6 +2,7 @@
 // Paths that keep away from a NavMesh's edges, against rooms whose clearances are known.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <limits>

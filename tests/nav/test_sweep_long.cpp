@@ -2,6 +2,7 @@
 // Sweeps of long, fast and growing capsules, judged in long double.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "cases.hpp"

@@ -3,6 +3,7 @@
 // covariances, tiles of 16 pixels, the Gaussian that would close a pixel left out.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "ops/backends.hpp"

@@ -2,6 +2,7 @@
 // Things that move as a whole among others, and ids of what a pixel shows.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>

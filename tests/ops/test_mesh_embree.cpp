@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 #include <embree3/rtcore.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>

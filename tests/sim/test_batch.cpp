@@ -2,6 +2,8 @@
 // A batch of environments is its single simulators: the same bits.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <functional>
 #include <iterator>
 #include <limits>
 #include <list>

@@ -3,6 +3,7 @@
 // bound.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 

@@ -2,6 +2,7 @@
 // Baselines, people and start times.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 #include <vector>
 

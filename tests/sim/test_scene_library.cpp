@@ -2,6 +2,7 @@
 // Scenes that are loaded when they are needed, and leave.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstring>

@@ -2,6 +2,7 @@
 // Meshes in a simulator's scene, and the sensor of their normals.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "gsnav/backends/serial.hpp"

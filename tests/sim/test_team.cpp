@@ -2,6 +2,7 @@
 // Several agents in one scene.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <numbers>
 
 #include "gsnav/backends/serial.hpp"

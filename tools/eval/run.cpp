@@ -2,6 +2,7 @@
 #include "run.hpp"
 
 #include <cstdio>
+#include <functional>
 #include <optional>
 #include <utility>
 

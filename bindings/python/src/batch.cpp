@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <optional>
+#include <variant>
 
 #include "actions.hpp"
 #include "batch_core.hpp"

@@ -3,11 +3,11 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <new>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
 #include <utility>
-#include <variant>
 
 #include "gsnav/core/printable.hpp"
 
@@ -105,39 +105,61 @@ template <class T>
 class [[nodiscard]] Result {
  public:
   /// Holds a value.
-  Result(T value) : content_(std::move(value)) {}
+  Result(T value) : has_value_(true) { ::new (static_cast<void*>(&value_)) T(std::move(value)); }
   /// Holds an error. `status` must not be ok.
-  Result(Status status) : content_(std::move(status)) {}
+  Result(Status status) : status_(std::move(status)), has_value_(false) {}
   /// Holds an error with a code and a message.
-  Result(Errc code, const std::string& message) : content_(Status(code, message)) {}
+  Result(Errc code, const std::string& message) : Result(Status(code, message)) {}
+  /// Copies the value or the error.
+  Result(const Result& other) requires std::is_copy_constructible_v<T> : status_(other.status_),
+                                                                         has_value_(other.has_value_) {
+    if (has_value_) ::new (static_cast<void*>(&value_)) T(other.value_);
+  }
+  /// Moves the value or the error.
+  Result(Result&& other) noexcept(std::is_nothrow_move_constructible_v<T>)
+      : status_(std::move(other.status_)), has_value_(other.has_value_) {
+    if (has_value_) ::new (static_cast<void*>(&value_)) T(std::move(other.value_));
+  }
+  /// Replaces the content by that of `other`.
+  Result& operator=(Result other) noexcept(std::is_nothrow_move_constructible_v<T>) {
+    if (has_value_) value_.~T();
+    has_value_ = false;
+    status_ = std::move(other.status_);
+    if (other.has_value_) ::new (static_cast<void*>(&value_)) T(std::move(other.value_));
+    has_value_ = other.has_value_;
+    return *this;
+  }
+  ~Result() {
+    if (has_value_) value_.~T();
+  }
 
   /// True if there is a value.
-  bool ok() const noexcept { return content_.index() == 0; }
+  bool ok() const noexcept { return has_value_; }
   /// True if there is a value.
   explicit operator bool() const noexcept { return ok(); }
   /// The error, or an ok Status if there is a value.
-  Status status() const { return ok() ? Status() : *std::get_if<1>(&content_); }
+  Status status() const { return status_; }
   /// Category of the error, Errc::ok if there is a value.
-  Errc code() const noexcept { return ok() ? Errc::ok : std::get_if<1>(&content_)->code(); }
+  Errc code() const noexcept { return status_.code(); }
   /// Message of the error, empty if there is a value.
-  std::string message() const { return status().message(); }
+  std::string message() const { return status_.message(); }
 
   /// The value.
   /// @throws gsnav::Error if there is none (aborts under -fno-exceptions).
   T& value() & {
     require();
-    return *std::get_if<0>(&content_);
+    return value_;
   }
   /// The value, read-only. Throws as above.
   const T& value() const& {
     require();
-    return *std::get_if<0>(&content_);
+    return value_;
   }
   /// Moves the value out. It is returned by value, so that `for (auto& x : load().value())` does not
   /// iterate over a destroyed temporary. Throws as above.
   T value() && {
     require();
-    return std::move(*std::get_if<0>(&content_));
+    return std::move(value_);
   }
   /// Access to a member of the value. Throws as above.
   T* operator->() { return &value(); }
@@ -152,12 +174,14 @@ class [[nodiscard]] Result {
 
  private:
   void require() const {
-    if (!ok()) {
-      const Status& s = *std::get_if<1>(&content_);
-      detail::fail(s.code(), s.message());
-    }
+    if (!has_value_) detail::fail(status_.code(), status_.message());
   }
-  std::variant<T, Status> content_;
+
+  Status status_;  ///< Ok if there is a value.
+  bool has_value_;
+  union {
+    T value_;  ///< Alive if has_value_.
+  };
 };
 
 }  // namespace gsnav

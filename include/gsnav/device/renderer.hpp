@@ -5,6 +5,7 @@
 #include <span>
 
 #include "gsnav/core/status.hpp"
+#include "gsnav/detail/scene/lod_settings.hpp"
 #include "gsnav/device/device.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/render/config.hpp"

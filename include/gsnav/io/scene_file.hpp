@@ -9,8 +9,8 @@
 #include "gsnav/core/status.hpp"
 #include "gsnav/detail/io/lod_set.hpp"
 #include "gsnav/detail/io/read_limits.hpp"
+#include "gsnav/detail/scene/packed_rows.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
-#include "gsnav/scene/packed_cloud.hpp"
 
 namespace gsnav::io {
 

@@ -203,8 +203,8 @@ class GaussianCloudBuilder {
     for (std::size_t k = 0; k < 4; ++k) cloud_.quats[k].push_back(g.quat[k]);
     for (std::size_t k = 0; k < 3; ++k) cloud_.scales[k].push_back(g.scales[k]);
     cloud_.opacities.push_back(g.opacity);
-    cloud_.sh0.insert(cloud_.sh0.end(), raw.sh0.begin(), raw.sh0.end());
-    if (rest_ != 0) cloud_.shN.insert(cloud_.shN.end(), raw.shN, raw.shN + rest_);
+    for (const float value : raw.sh0) cloud_.sh0.push_back(value);
+    for (std::size_t k = 0; k < rest_; ++k) cloud_.shN.push_back(raw.shN[k]);
     report_.bounds.add(raw.mean);
     return true;
   }
@@ -257,7 +257,7 @@ inline Status append(GaussianCloud& a, const GaussianCloud& b) {
     return {Errc::invalid_argument, "compact clouds cannot be merged: expand_sh first"};
   }
   if (a.size() == 0) {
-    a = b;
+    a = GaussianCloud(b);
     return {};
   }
   if (a.filter != b.filter || a.eps2d != b.eps2d || a.sort_order != b.sort_order ||
@@ -265,6 +265,12 @@ inline Status append(GaussianCloud& a, const GaussianCloud& b) {
     return {Errc::invalid_argument,
             "clouds with different filters, sort orders or colour spaces cannot be merged"};
   }
+  // A range insertion takes longer to compile, in each file that includes this.
+  const auto join = [](auto& to, const auto& from) {
+    std::size_t at = to.size();
+    to.resize(at + from.size());
+    for (const auto& value : from) to[at++] = value;
+  };
   const int degree = max(a.sh_degree, b.sh_degree);
   const auto widen = [degree](const GaussianCloud& c) {
     const std::size_t from = 3 * static_cast<std::size_t>(sh_coefficient_count(c.sh_degree) - 1);
@@ -279,7 +285,7 @@ inline Status append(GaussianCloud& a, const GaussianCloud& b) {
   std::vector<float> rest = widen(b);
   if (a.sh_degree != degree) a.shN = widen(a);
   a.sh_degree = degree;
-  a.shN.insert(a.shN.end(), rest.begin(), rest.end());
+  join(a.shN, rest);
   if (!a.origins.empty() || !b.origins.empty()) {
     if (a.origins.empty()) {
       a.origins.push_back({});
@@ -288,9 +294,9 @@ inline Status append(GaussianCloud& a, const GaussianCloud& b) {
     const std::uint32_t shift = static_cast<std::uint32_t>(a.origins.size());
     if (b.origins.empty()) {
       a.origins.push_back({});
-      a.origin_ids.insert(a.origin_ids.end(), b.size(), shift);
+      a.origin_ids.resize(a.origin_ids.size() + b.size(), shift);
     } else {
-      a.origins.insert(a.origins.end(), b.origins.begin(), b.origins.end());
+      join(a.origins, b.origins);
       for (const std::uint32_t id : b.origin_ids) a.origin_ids.push_back(shift + id);
     }
   }
@@ -306,7 +312,6 @@ inline Status append(GaussianCloud& a, const GaussianCloud& b) {
     a.row_ids = ids(a);
     for (const std::uint32_t id : ids(b)) a.row_ids.push_back(shift + id);
   }
-  const auto join = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
   for (std::size_t k = 0; k < 3; ++k) join(a.means[k], b.means[k]);
   for (std::size_t k = 0; k < 4; ++k) join(a.quats[k], b.quats[k]);
   for (std::size_t k = 0; k < 3; ++k) join(a.scales[k], b.scales[k]);

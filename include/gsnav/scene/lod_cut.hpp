@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -10,6 +9,7 @@
 #include "gsnav/detail/frame/cull.hpp"
 #include "gsnav/detail/frame/projection_camera.hpp"
 #include "gsnav/detail/scene/lod_choice.hpp"
+#include "gsnav/math/aabb.hpp"
 #include "gsnav/render/config.hpp"
 #include "gsnav/scene/lod_tree.hpp"
 
@@ -27,7 +27,7 @@ struct LodStats {
 inline RenderConfig lod_config(RenderConfig config) noexcept {
   const Quality fast = Quality::fast();
   config.quality.exponential = fast.exponential;
-  config.quality.transmittance_min = std::max(config.quality.transmittance_min, fast.transmittance_min);
+  config.quality.transmittance_min = max(config.quality.transmittance_min, fast.transmittance_min);
   config.quality.normalize_closed = fast.normalize_closed;
   return config;
 }
@@ -50,11 +50,11 @@ struct SeenFromBox {
   double nearest(const ChunkBounds& reach) const noexcept {
     double squared = 0;
     for (int k = 0; k < 3; ++k) {
-      const double gap = std::max({0.0, static_cast<double>(reach.low[k]) - box.high[k],
-                                   box.low[k] - static_cast<double>(reach.high[k])});
+      const double gap = max(0.0, max(static_cast<double>(reach.low[k]) - box.high[k],
+                                      box.low[k] - static_cast<double>(reach.high[k])));
       squared += gap * gap;
     }
-    return std::max(std::sqrt(squared) * cosine * (1 - 1e-6), nearest_depth);
+    return max(sqrt(squared) * cosine * (1 - 1e-6), nearest_depth);
   }
 };
 
@@ -85,7 +85,7 @@ class LodCut {
                                       View<const std::uint32_t> seen = {}) {
     const auto p = make_projection_camera<double>(camera, photo_set(*cloud_, choice, world_from_asset));
     refined_.resize(tree_->nodes.size());
-    return choose(detail::SeenByCamera{p}, std::max(p.fx, p.fy), choice, world_from_asset, seen);
+    return choose(detail::SeenByCamera{p}, max(p.fx, p.fy), choice, world_from_asset, seen);
   }
 
   /// Chooses the nodes for all cameras in a box that have the size, focal lengths and near plane of
@@ -99,10 +99,10 @@ class LodCut {
     choice.hysteresis = 0;
     refined_.clear();
     const auto p = make_projection_camera<double>(camera, photo_set(*cloud_, choice, world_from_asset));
-    const double x = std::max(camera.cx, camera.width - camera.cx) / camera.fx,
-                 y = std::max(camera.cy, camera.height - camera.cy) / camera.fy;
-    return choose(detail::SeenFromBox{box, 1 / std::sqrt(1 + x * x + y * y), p.near_plane / p.scale},
-                  std::max(p.fx, p.fy), choice, world_from_asset, seen);
+    const double x = max(camera.cx, camera.width - camera.cx) / camera.fx,
+                 y = max(camera.cy, camera.height - camera.cy) / camera.fy;
+    return choose(detail::SeenFromBox{box, 1 / sqrt(1 + x * x + y * y), p.near_plane / p.scale},
+                  max(p.fx, p.fy), choice, world_from_asset, seen);
   }
   /// Forgets the last choice, and with it the hysteresis.
   void reset() { refined_.clear(); }
@@ -167,10 +167,10 @@ class LodCut {
   }
   /// Whether any of the chunks [first, end) is seen. The range may extend beyond the cloud's chunks.
   bool any_seen(std::uint64_t first, std::uint64_t end) const noexcept {
-    end = std::min<std::uint64_t>(end, 32 * std::uint64_t{seen_.size});
+    end = min<std::uint64_t>(end, 32 * std::uint64_t{seen_.size});
     for (std::uint64_t c = first; c < end;) {
       const std::uint64_t in_word =
-          std::min<std::uint64_t>(end - c / 32 * 32, 32);  // where the range ends in this word
+          min<std::uint64_t>(end - c / 32 * 32, 32);  // where the range ends in this word
       const std::uint32_t below = in_word == 32 ? ~0u : (1u << in_word) - 1u;
       if ((seen_[c / 32] & below) >> (c % 32) != 0) return true;
       c = c / 32 * 32 + 32;
@@ -189,14 +189,14 @@ class LodCut {
   bool refine(std::size_t node, double scale, const LodChoice& choice) {
     const LodNode& n = tree_->nodes[node];
     const double grain = static_cast<double>(n.grain) * scale * choice.pixels / choice.grain;
-    const double error = static_cast<double>(n.error) * scale * std::max(grain, 1.0);
+    const double error = static_cast<double>(n.error) * scale * max(grain, 1.0);
     if (refined_.empty()) return error > 1;
     const bool finer = error > (refined_[node] != 0 ? 1 - choice.hysteresis : 1 + choice.hysteresis);
     refined_[node] = finer ? 1 : 0;
     return finer;
   }
   void note_error(const LodNode& n, double scale, const LodChoice& choice) noexcept {
-    stats_.error_px = std::max(stats_.error_px, static_cast<double>(n.error) * scale * choice.pixels);
+    stats_.error_px = max(stats_.error_px, static_cast<double>(n.error) * scale * choice.pixels);
   }
   /// Chooses the level of one box of a forest, from its coarsest node down.
   template <class Viewer>
@@ -240,10 +240,9 @@ class LodCut {
 
   void draw(std::size_t level, std::size_t node) {
     const std::uint64_t first = (node - tree_->level_begin[level]) << level;
-    const std::uint64_t end =
-        std::min<std::uint64_t>(first + (std::uint64_t{1} << level), tree_->leaves());
+    const std::uint64_t end = min<std::uint64_t>(first + (std::uint64_t{1} << level), tree_->leaves());
     const std::uint64_t shown =
-        std::min<std::uint64_t>(end * kProjectChunk, cloud_->size()) - first * kProjectChunk;
+        min<std::uint64_t>(end * kProjectChunk, cloud_->size()) - first * kProjectChunk;
     stats_.shown += shown;
     if (level == 0) {
       leaf_chunks_.push_back(static_cast<std::uint32_t>(node));

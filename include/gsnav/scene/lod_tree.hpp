@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <vector>
 
 #include "gsnav/scene/gaussian_cloud.hpp"
@@ -78,25 +76,14 @@ namespace detail {
 inline ChunkBounds both(const ChunkBounds& a, const ChunkBounds& b) noexcept {
   ChunkBounds out;
   for (int k = 0; k < 3; ++k) {
-    out.low[k] = std::min(a.low[k], b.low[k]);
-    out.high[k] = std::max(a.high[k], b.high[k]);
+    out.low[k] = min(a.low[k], b.low[k]);
+    out.high[k] = max(a.high[k], b.high[k]);
   }
-  out.scale_max = std::max(a.scale_max, b.scale_max);
-  out.opacity_max = std::max(a.opacity_max, b.opacity_max);
+  out.scale_max = max(a.scale_max, b.scale_max);
+  out.opacity_max = max(a.opacity_max, b.opacity_max);
   return out;
 }
 
 }  // namespace detail
-
-/// Settings of build_lod.
-struct LodSettings {
-  int sh_degree = kMaxShDegree;  ///< SH degree of merged Gaussians; the degree of the cloud is an upper
-                                 ///< limit.
-  int neighbours = 8;            ///< Nearest neighbours that each Gaussian is tried with for a merge, in
-                                 ///< [1, 16].
-  /// Called some hundred times with the share of the work that is done, in [0, 1], by the calling
-  /// thread.
-  std::function<void(double)> progress;
-};
 
 }  // namespace gsnav

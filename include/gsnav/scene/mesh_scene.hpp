@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -52,8 +51,8 @@ class MeshTexture {
       const std::size_t next = t.texels_.size();
       t.reduce(from, w, h);
       from = next;
-      w = std::max(w / 2, 1);
-      h = std::max(h / 2, 1);
+      w = max(w / 2, 1);
+      h = max(h / 2, 1);
     }
     return t;
   }
@@ -68,7 +67,7 @@ class MeshTexture {
   /// Appends the next coarser level to a level of w x h texels whose first texel is at `from`. If a side
   /// is odd, the last texel averages three texels instead of two.
   void reduce(std::size_t from, int w, int h) {
-    const int half_w = std::max(w / 2, 1), half_h = std::max(h / 2, 1);
+    const int half_w = max(w / 2, 1), half_h = max(h / 2, 1);
     for (int y = 0; y < half_h; ++y) {
       const int y1 = y + 1 == half_h ? h : 2 * y + 2;
       for (int x = 0; x < half_w; ++x) {
@@ -209,8 +208,8 @@ class MeshScene {
         held.high = {};
         return;
       }
-      held.low = {std::min(held.low.x, v.x), std::min(held.low.y, v.y), std::min(held.low.z, v.z)};
-      held.high = {std::max(held.high.x, v.x), std::max(held.high.y, v.y), std::max(held.high.z, v.z)};
+      held.low = {min(held.low.x, v.x), min(held.low.y, v.y), min(held.low.z, v.z)};
+      held.high = {max(held.high.x, v.x), max(held.high.y, v.y), max(held.high.z, v.z)};
     }
   }
   std::vector<Held> meshes_;

@@ -12,6 +12,7 @@
 #include "gsnav/detail/render/row_weights.hpp"
 #include "gsnav/detail/scene/seen_cells.hpp"
 #include "gsnav/detail/scene/view_cells.hpp"
+#include "gsnav/detail/scene/visible_settings.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -65,7 +64,7 @@ std::vector<To> moved_through(std::vector<From>& from, std::size_t n, const F& f
   out.reserve(n);
   advise_huge_pages(out.data(), n * sizeof(To));
   for (std::size_t first = 0; first < n; first += kPiece) {
-    const std::size_t last = std::min(n, first + kPiece);
+    const std::size_t last = n - first < kPiece ? n : first + kPiece;
     out.resize(last);
     for (std::size_t i = first; i < last; ++i) out[i] = f(from[i]);
     discard_pages(from.data() + first, (last - first) * sizeof(From));

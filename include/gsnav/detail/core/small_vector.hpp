@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <initializer_list>
 #include <memory>
@@ -59,7 +58,7 @@ class SmallVector {
   void reserve(std::size_t n) {
     if (n <= capacity_) return;
     auto more = std::make_unique<T[]>(n);
-    std::copy(begin(), end(), more.get());
+    for (std::size_t i = 0; i < size_; ++i) more[i] = (*this)[i];
     more_ = std::move(more);
     capacity_ = n;
   }

@@ -8,24 +8,36 @@
 #include "gsnav/detail/io/read_or_build.hpp"
 #include "gsnav/scene/lod_tree.hpp"
 
+namespace gsnav {
+struct LodSettings;  // detail/scene/lod_settings.hpp
+}
+
+// Functions without settings take the defaults of LodSettings.
+
 namespace gsnav::io {
 
 /// Writes a tree (build_lod), with a hash of the cloud and settings it was built from and a checksum.
 /// Errors: those of writing a file. Never throws.
+Status save_lod(const std::filesystem::path& path, const LodTree& tree, const GaussianCloud& cloud);
+/// Writes a tree that was built with `settings`. Errors as above.
 Status save_lod(const std::filesystem::path& path, const LodTree& tree, const GaussianCloud& cloud,
-                const LodSettings& settings = {});
+                const LodSettings& settings);
 
 /// Reads a tree that was built from `cloud` with `settings`. The allocated memory depends on the cloud
 /// only, never on the file. Never throws. Errors: file_not_found; invalid_argument (built from another
 /// cloud, or with other settings or another version of the builder); invalid_file (not a tree file,
 /// truncated, too long, wrong checksum, or a value out of range).
 Result<LodTree> load_lod(const std::filesystem::path& path, const GaussianCloud& cloud,
-                         const LodSettings& settings = {});
+                         const LodSettings& settings);
+/// Reads a tree that was built with the default settings. Errors as above.
+Result<LodTree> load_lod(const std::filesystem::path& path, const GaussianCloud& cloud);
 
 /// Path of the cached tree of a scene: next to the asset, under a name with a hash of the content.
 /// `spec` is that of load_scene; for several tiles the path is that of the first.
 std::filesystem::path lod_path(const std::string& spec, const GaussianCloud& cloud,
-                               const LodSettings& settings = {});
+                               const LodSettings& settings);
+/// Path of the cached tree with the default settings.
+std::filesystem::path lod_path(const std::string& spec, const GaussianCloud& cloud);
 
 /// A tree, and how cached_lod got it.
 struct CachedLod {

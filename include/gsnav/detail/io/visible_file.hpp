@@ -10,6 +10,10 @@
 #include "gsnav/detail/scene/view_cells.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
+namespace gsnav {
+struct VisibleSettings;  // detail/scene/visible_settings.hpp
+}
+
 namespace gsnav::io {
 
 /// Writes the visible sets of a cloud (build_visible_sets), with a checksum and a hash of the cloud
@@ -26,8 +30,11 @@ Result<VisibleSets> load_visible_sets(const std::filesystem::path& path, const G
 /// that determines them. `spec` is that of load_scene; for several tiles the path is that of the first.
 std::filesystem::path visible_sets_path(const std::string& spec, const GaussianCloud& cloud,
                                         std::span<const Vec3d> viewpoints,
-                                        const VisibleSettings& settings = {},
+                                        const VisibleSettings& settings,
                                         const Similarity& world_from_asset = {});
+/// Path of the cached visible sets with the default settings, for a cloud that stands as in its file.
+std::filesystem::path visible_sets_path(const std::string& spec, const GaussianCloud& cloud,
+                                        std::span<const Vec3d> viewpoints);
 
 /// Visible sets, and how cached_visible_sets got them.
 struct CachedVisibleSets {

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <sched.h>
+
 #include <atomic>
 #include <concepts>
 #include <cstddef>
 #include <memory>
 #include <mutex>
 #include <span>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -94,7 +95,7 @@ class ThreadFrames {
       for (const auto& worker : workers_) {
         if (!worker->taken.exchange(true, std::memory_order_acquire)) return *worker;
       }
-      std::this_thread::yield();
+      ::sched_yield();
     }
   }
 

@@ -13,6 +13,7 @@
 #include "gsnav/detail/math/svd.hpp"
 #include "gsnav/detail/scene/lod_greedy.hpp"
 #include "gsnav/detail/scene/lod_merge.hpp"
+#include "gsnav/detail/scene/lod_settings.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/math/quat.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"

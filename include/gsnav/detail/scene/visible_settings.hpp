@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "gsnav/core/status.hpp"
+#include "gsnav/image/camera.hpp"
+#include "gsnav/math/functions.hpp"
+
+namespace gsnav {
+
+/// Settings of build_visible_sets. Lengths are metres in the world.
+struct VisibleSettings {
+  double cell = 0.5;         ///< Side of a cell.
+  double margin = 0.25;      ///< A viewpoint counts for a cell if it is at most this far outside of it.
+  double min_weight = 1e-3;  ///< Least share of a pixel that a Gaussian must have to count as seen.
+  /// Consecutive rows that are seen or not together: 1, 2, 4, 8, 16 or 32. 0: all rows of a chunk.
+  int rows = 8;
+  int face = 256;  ///< Pixels along a side of the six images that are rendered for each viewpoint.
+  double near_plane =
+      0.2;  ///< Near plane of these images. Chunks nearer to a cell than this are always in its set.
+  double near_sigma = 0;  ///< Camera::near_sigma of these images.
+  /// Largest mean share of the Gaussians that a cell may see, in (0, 1]. Above it, as in the open, sets
+  /// gain nothing and build_visible_sets returns unsupported. It decides early, on 16 cells spread
+  /// evenly that are finished first. 1: never refuse. With fewer than 64 cells it never refuses either.
+  double most_share = 0.9;
+
+  /// Recommended distance between viewpoints (navmesh_viewpoints). Each cell then has several, each with
+  /// its own directions.
+  double spacing() const noexcept { return 0.5 * cell; }
+  /// Sets `face`, `near_plane` and `near_sigma` so that the sets apply to this camera.
+  void serve(const Camera& camera) noexcept {
+    face = static_cast<int>(std::ceil(2 * max(camera.fx, camera.fy) - 1e-6));
+    near_plane = camera.near_plane;
+    near_sigma = camera.near_sigma;
+  }
+  /// Called after each viewpoint with the share of the work that is done, in [0, 1], by the calling
+  /// thread.
+  std::function<void(double)> progress{};
+};
+
+/// Returns invalid_argument naming the field that is out of range, or ok.
+inline Status validate(const VisibleSettings& s) {
+  const BadArgument bad{"VisibleSettings."};
+  if (!(s.cell > 0 && is_finite(s.cell))) return bad("cell", s.cell, "must be positive");
+  if (!(s.margin >= 0 && is_finite(s.margin))) return bad("margin", s.margin, "must be >= 0");
+  if (!(s.min_weight >= 0 && s.min_weight < 1))
+    return bad("min_weight", s.min_weight, "must be in [0, 1)");
+  if (s.rows != 0 && (s.rows < 1 || s.rows > 32 || 32 % s.rows != 0)) {
+    return {Errc::invalid_argument,
+            "VisibleSettings.rows = " + std::to_string(s.rows) + ": must be 0, 1, 2, 4, 8, 16 or 32"};
+  }
+  if (s.face < 16 || s.face > 4096) return bad("face", s.face, "must be in [16, 4096]");
+  if (!(s.near_plane > 0 && is_finite(s.near_plane)))
+    return bad("near_plane", s.near_plane, "must be positive");
+  if (!(s.near_sigma >= 0 && is_finite(s.near_sigma)))
+    return bad("near_sigma", s.near_sigma, "must be >= 0");
+  if (!(s.most_share > 0 && s.most_share <= 1))
+    return bad("most_share", s.most_share, "must be in (0, 1]");
+  return {};
+}
+
+}  // namespace gsnav
