@@ -3,11 +3,12 @@
 #
 # Installs the missing Debian or Ubuntu packages for a job.
 #
-# usage: tools/install_deps.sh demo|python|tests|ci
-#   demo   build and run the navigation loop
-#   python ... and headers and virtual environments of Debian's python3
-#   tests  demo, and the tests, benchmarks and packaging checks
-#   ci     tests, and clang with its OpenMP, sanitizers, fuzzer and clang-format, and Doxygen
+# usage: tools/install_deps.sh demo|python|tests|ci|aarch64
+#   demo     build and run the navigation loop
+#   python   ... and headers and virtual environments of Debian's python3
+#   tests    demo, and the tests, benchmarks and packaging checks
+#   ci       tests, and clang with its OpenMP, sanitizers, fuzzer and clang-format, and Doxygen
+#   aarch64  build the renderer for 64-bit ARM and run its tests under qemu (preset aarch64)
 #
 # These are optional and not installed: libopenmpi-dev (nav_eval_mpi), ffmpeg (gsnav-replay --video),
 # chromium (test of the page of gsnav-viewer), libfcl-dev (comparison in bench_kernels).
@@ -16,14 +17,17 @@
 set -euo pipefail
 
 job=${1:-demo}
-usage() { sed -n '4,14s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"; }
+usage() { sed -n '4,15s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"; }
 case $job in
-  demo | python | tests | ci) ;;
+  demo | python | tests | ci | aarch64) ;;
   --help | -h) usage; exit 0 ;;
   *) usage >&2; exit 2 ;;
 esac
 packages=(g++ cmake ninja-build libpng-dev libjpeg-dev libwebp-dev libzstd-dev zlib1g-dev nlohmann-json3-dev
           librecast-dev libcli11-dev)
+if [[ $job == aarch64 ]]; then
+  packages=(g++ g++-aarch64-linux-gnu qemu-user cmake ninja-build doctest-dev python3)
+fi
 if [[ $job == python ]]; then
   packages+=(python3-dev python3-venv)
 fi

@@ -7,8 +7,8 @@
 # --cuda (without a GPU, only to PTX). ccache is used if it is installed.
 #
 # GSNAV_NO_APT=1      never call apt-get
-# GSNAV_DEPS          set of packages (demo, tests or ci; default: by preset); see tools/install_deps.sh
-# GSNAV_PRESET        configure preset (default: tests, which compiles fastest)
+# GSNAV_DEPS          set of packages (default: by preset); see tools/install_deps.sh
+# GSNAV_PRESET        configure preset (default: tests, which compiles fastest); aarch64 runs tests under qemu
 # GSNAV_CUDA          AUTO (if nvcc is found), ON (as --cuda) or OFF
 # GSNAV_JOBS=N        compile N files and run N tests at a time (default: see tools/build_jobs.sh)
 # GSNAV_WERROR=ON     treat warnings as errors (default: as in the preset)
@@ -25,13 +25,14 @@ build=$root/build/$preset
 
 deps=tests
 [[ $preset == asan-ubsan ]] && deps=ci
+[[ $preset == aarch64 ]] && deps=aarch64
 "$root/tools/install_deps.sh" "${GSNAV_DEPS:-$deps}"
 jobs=${GSNAV_JOBS:-$("$root/tools/build_jobs.sh")}
 
 options=()
 [[ -n ${GSNAV_WERROR:-} ]] && options+=("-DGSNAV_WERROR=$GSNAV_WERROR")
 [[ -n ${GSNAV_DATA_DIR:-} ]] && options+=("-DGSNAV_DATA_DIR=$GSNAV_DATA_DIR")
-if [[ $preset != asan-ubsan && $preset != cuda ]]; then
+if [[ $preset != asan-ubsan && $preset != aarch64 && $preset != cuda ]]; then
   cuda=${GSNAV_CUDA:-}
   if [[ ${1:-} == --cuda ]]; then
     cuda=ON
