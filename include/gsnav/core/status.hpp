@@ -85,7 +85,7 @@ class [[nodiscard]] Status {
 struct BadArgument {
   const char* subject;  ///< prefix of the messages, such as "Camera."
 
-  /// Error with the message "`subject` `what`", without a space between them.
+  /// Error whose message is `subject` followed directly by `what`.
   Status operator()(const std::string& what) const { return {Errc::invalid_argument, subject + what}; }
   /// Error with the message "`subject` `field` = `value`: `rule`".
   template <class T>
