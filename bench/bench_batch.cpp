@@ -14,6 +14,7 @@
 // --balls N: N meshes of 4000 triangles stand in front of the first cameras, and all cameras see them.
 // --rgb: colours alone, without depth (its error is nan) and alpha, as most renderers measure.
 // --depth: median depth alone. Errors of colours are nan.
+// --device: prints the name of the GPU and draws nothing.
 // --visible: each camera draws only the Gaussians that are visible from its cell (VisibleSettings::rows,
 // min_weight). The images of all views are then compared with images of the whole scene.
 #include <cuda_runtime.h>
@@ -273,7 +274,7 @@ const char* drawn_images() {
 
 int main(int argc, char** argv) {
   std::vector<std::size_t> counts;
-  bool compact = false, visible = false;
+  bool compact = false, visible = false, name_alone = false;
   VisibleSettings sets_of;
   std::size_t balls = 0;
   for (int i = 1; i < argc; ++i) {
@@ -294,6 +295,9 @@ int main(int argc, char** argv) {
       continue;
     } else if (chooses_images(argv[i])) {
       continue;
+    } else if (std::string(argv[i]) == "--device") {
+      name_alone = true;
+      continue;
     } else if (std::string(argv[i]) == "--balls" && i + 1 < argc) {
       balls = std::strtoull(argv[++i], nullptr, 10);
       if (balls > 0) continue;
@@ -305,13 +309,17 @@ int main(int argc, char** argv) {
     }
     std::fprintf(stderr,
                  "bench_batch: '%s' is no size (256x256), batch size, --compact, --rgb, --depth, "
-                 "--visible, --visible-rows, --visible-weight or --balls\n",
+                 "--visible, --visible-rows, --visible-weight, --device or --balls\n",
                  argv[i]);
     return 2;
   }
   if (CudaBackend::device_count() == 0) {
     std::fprintf(stderr, "bench_batch: no GPU\n");
     return 1;
+  }
+  if (name_alone) {
+    std::puts(CudaBackend().device_name().c_str());
+    return 0;
   }
   CudaBackend cuda;
   GaussianCloud shown = gsnav_bench::workload().cloud;

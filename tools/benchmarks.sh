@@ -61,8 +61,14 @@ scene=$build/tools/gsnav-scene render=$build/bench/bench_render batch=$build/ben
 for program in "$scene" "$render"; do
   [[ -x $program ]] || stop "there is no $program; configure with -DGSNAV_BENCH=ON and build it"
 done
-[[ $gpu == 1 && -x $batch ]] || gpu=0
-[[ $cpu == 1 || $gpu == 1 ]] || stop "--no-cpu needs bench_batch (-DGSNAV_CUDA=ON), and no --no-gpu"
+if [[ $gpu == 0 ]]; then
+  no_gpu="--no-gpu was given"
+elif [[ ! -x $batch ]]; then
+  gpu=0 no_gpu="bench_batch is not built (-DGSNAV_CUDA=ON)"
+elif ! device=$("$batch" --device 2> /dev/null); then
+  gpu=0 no_gpu="this machine has no GPU that CUDA can use"
+fi
+[[ $cpu == 1 || $gpu == 1 ]] || stop "--no-cpu leaves nothing to measure: $no_gpu"
 
 mkdir -p "$out"
 out=$(cd "$out" && pwd)
@@ -114,8 +120,6 @@ if [[ $gpu == 1 ]]; then
       done
     done
   } > "$out/gpu.md"
-  first=${gaussians%%,*}
-  device=$(sed -n '1s/: .*//p' "$out/gpu_${first}_${sizes%%,*}_RGB-D.txt")
 fi
 
 {
@@ -131,7 +135,7 @@ fi
     printf 'PSNR is the worst of four evenly spread views (0, 16, 32 and 48 of 64).\n\n'
     cat "$out/gpu.md"
   else
-    printf '\nNo rows of a GPU: bench_batch is not built (-DGSNAV_CUDA=ON), or --no-gpu was given.\n'
+    printf '\nNo rows of a GPU: %s.\n' "$no_gpu"
   fi
 } > "$out/benchmarks.md"
 echo "$out/benchmarks.md"

@@ -28,6 +28,7 @@ BLOCK = re.compile(r"^( *)```(\w*)\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
 INDENTED = re.compile(r"(?:(?<=\n\n)|\A)(?: {4}.*\n(?:\n(?= {4}))?)+", re.MULTILINE)
 SPAN = re.compile(r"(?<!`)`([^`]+)`(?!`)")
 PATH = re.compile(r"(?:tools|examples/python|bench|tests|\.ci)/[\w/]*\w+\.(?:py|sh)$")
+OWN = re.compile(r"(?:^|/)(?:gsnav-[\w-]+|bench_\w+|test_\w+)$")
 SECTION = re.compile(r"^##(?:#)? (\S+(?: \S+)?)\n(.*?)(?=^## |^### |\Z)", re.MULTILINE | re.DOTALL)
 
 
@@ -69,6 +70,14 @@ class Programs:
         if not strict:
             found = found.union(*(options for k, options in self.known.items() if k.startswith(f"{name} ")))
         return found
+
+    def exists(self, word):
+        """Whether a word that is named as the programs of this tree is one of them."""
+        name = pathlib.PurePosixPath(word).name
+        if name.startswith("test_"):
+            made = re.compile(rf"gsnav_test\({name[5:]}\b")
+            return any(made.search(p.read_text(encoding="utf-8")) for p in (self.root / "tests").rglob("CMakeLists.txt"))
+        return self.options(word, strict=False) is not None or any(k.startswith(f"{name} ") for k in self.known)
 
     def all(self):
         """The options of all programs."""
@@ -138,6 +147,8 @@ def faults(command, in_block, programs, alone):
             word = re.sub(r"^(?:\./|build/\w+/|\$\w+/|\.\./)+", "", word)
             if PATH.match(word) and not (programs.root / word).is_file():
                 yield f"there is no {word}"
+            elif k == 0 and in_block and OWN.search(word) and not programs.exists(word):
+                yield f"there is no program {word}"
             elif known is None and not word.startswith("-"):
                 known = programs.options(word, words[k + 1] if k + 1 < len(words) else "", in_block)
                 program = word if known is not None else program
@@ -182,7 +193,8 @@ ls --all
 --none;
 ```
 """
-WRONG = {"    gsnav-a --tow 1\n": "gsnav-a has no option --tow", "`gsnav-a --tow`": "gsnav-a has no option --tow",
+WRONG = {"    gsnav-aa --one 1\n": "there is no program gsnav-aa", "    build/ci/tests/lod/test_no -d\n": "there is no program tests/lod/test_no",
+         "    gsnav-a --tow 1\n": "gsnav-a has no option --tow", "`gsnav-a --tow`": "gsnav-a has no option --tow",
          "`--none`": "--none: no program has this option", "    gsnav-b --four\n": "gsnav-b has no option --four",
          "```sh\nls | tools/a.py --one\n```\n": "tools/a.py has no option --one",
          "```\ngsnav-a \\\n  --tow\n```\n": "gsnav-a has no option --tow",

@@ -190,12 +190,24 @@ NO_MARKUP = re.compile(r"<(?=/?[A-Za-z])|(?<!\\)\\(?=x)|(?<=\w)@(?=\w)|(?<=[\w>]
 
 
 def plain_comments(text):
-    """Escapes in comments what Doxygen would take for HTML or a command: Simulator<B>, \\xNN."""
-    def escape(m):
-        parts = re.split(r"(`[^`]*`)", m.group())
-        return "".join(part if k % 2 else NO_MARKUP.sub(r"\\\g<0>", part) for k, part in enumerate(parts))
+    """Escapes in comments what Doxygen would take for HTML or a command: Simulator<B>, \\xNN. Code and quotations,
+    which Doxygen shows as they are, stay."""
+    out, code = [], False
+    for line in text.split("\n"):
+        code = (code or "@code" in line) and "///" in line and "@endcode" not in line
+        comment = re.search(r"///<? ?(?! {4})", line)
+        if comment and not code and "@code" not in line:
+            parts = re.split(r"(`[^`]*`|\"[^\"]*\")", line[comment.start():])
+            line = line[:comment.start()] + "".join(part if k % 2 else NO_MARKUP.sub(r"\\\g<0>", part)
+                                                    for k, part in enumerate(parts))
+        out.append(line)
+    return "\n".join(out)
 
-    return re.sub(r"///<? ?(?! {4}).*", escape, text)
+
+def shown_escapes(html):
+    """Lines for pages that show an escape of plain_comments()."""
+    return [f"{page.name}: error: it shows {m.group()}" for page in sorted(html.glob("*.html"))
+            for m in [re.search(r"\\\\(?:::|&lt;|@)", page.read_text(encoding="utf-8"))] if m]
 
 
 # Functions whose meaning the language fixes.
@@ -266,7 +278,8 @@ def bare_enumerators(text, name):
         if len(lines) < 2 or (enum.group(1) and is_private(text[:enum.start()], len(enum.group(1)))):
             continue
         for line in lines:
-            if re.match(r" *\w", line) and "///<" not in line and not re.match(r"///(?!<)", above):
+            several = re.match(r" *\w+(?: = [^,/]+)?, *\w", line)
+            if re.match(r" *\w", line) and (several or ("///<" not in line and not re.match(r"///(?!<)", above))):
                 found.append(f"{name}: error: {enum.group(2)}: no documentation of {line.strip(' ,')}")
             above = line.strip()
     return found
@@ -458,7 +471,7 @@ def make(out, doxygen):
         return 1
     drop_links_to_nothing(out / "html")
     link_drawings(out / "html")
-    wrong += wrong_pages(out / "html") + dead_links(out / "html")
+    wrong += wrong_pages(out / "html") + dead_links(out / "html") + shown_escapes(out / "html")
     if wrong:
         print("\n".join(wrong))
         return 1

@@ -203,7 +203,7 @@ class SceneReader {
   detail::GltfMaterials materials_;
   std::map<std::size_t, std::vector<std::size_t>> parts_of_;  ///< parts of each mesh in use
   std::map<std::size_t, GltfMaterial> material_of_;
-  std::size_t held_ = 0;  ///< vertices and triangles of all parts
+  std::size_t held_ = 0;  ///< number of vertices and triangles of all parts, together
 };
 
 }  // namespace

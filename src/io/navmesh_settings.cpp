@@ -35,7 +35,8 @@ constexpr const char *kVertsPerPoly = "vertsPerPoly", *kTileSize = "tileSize", *
 Result<std::int64_t> whole(const Json& value, const std::string& what, double most) {
   const double v = value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN();
   if (v >= 0 && v <= most && v == std::floor(v)) return static_cast<std::int64_t>(v);
-  return must_be(what, value, "a whole number, 0 or more");
+  const std::string rule = "a whole number from 0 to " + std::to_string(static_cast<std::int64_t>(most));
+  return must_be(what, value, rule.c_str());
 }
 
 Status read_setting(const std::string& key, const Json& value, const std::string& at,

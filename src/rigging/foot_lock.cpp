@@ -14,7 +14,7 @@ namespace gsnav {
 
 namespace {
 
-/// The smallest rotation that takes direction a to direction b.
+/// The smallest rotation that takes direction a to direction b; none if they are opposite.
 Quatd turn_between(const Vec3d& a, const Vec3d& b) noexcept {
   const Vec3d u = normalized(a), v = normalized(b), axis = cross(u, v);
   Quatd q{1 + dot(u, v), axis.x, axis.y, axis.z};

@@ -17,7 +17,7 @@ struct Counted {
   explicit Counted(int v) : value(v) { ++alive; }
   Counted(const Counted& o) : value(o.value) { ++alive; }
   Counted(Counted&& o) noexcept : value(std::exchange(o.value, -1)) { ++alive; }
-  Counted& operator=(const Counted&) = delete;
+  Counted& operator=(const Counted&) = default;
   ~Counted() { --alive; }
   int value;
   static inline int alive = 0;

@@ -89,6 +89,8 @@ class Tree(unittest.TestCase):
         missing = ["a.hpp: error: Kind: no documentation of two"]
         self.assertEqual(bare(two), missing)
         self.assertEqual(bare("enum class Kind { one,  ///< First.\n  two };\n"), missing)
+        self.assertEqual(bare("enum class Kind {\n  one, two,  ///< Both.\n  three,  ///< Third.\n};\n"),
+                         ["a.hpp: error: Kind: no documentation of one, two,  ///< Both."])
         hidden = "class A {\n public:\n  int f();\n\n private:\n  enum Kind {\n    one,\n  };\n};\n"
         self.assertEqual(bare(hidden), [])
         self.assertEqual(bare(hidden + two), missing)  # behind a class, not in it
@@ -143,6 +145,9 @@ class Tree(unittest.TestCase):
     def test_comments_of_templates_are_no_markup(self):
         said = make_site.plain_comments("/// Box<b> and `Box<b>`.\n///     Box<b> a;\nBox<b> c;  ///< Box<b>\n")
         self.assertEqual(said, "/// Box\\<b> and `Box<b>`.\n///     Box<b> a;\nBox<b> c;  ///< Box\\<b>\n")
+        shown = "/// @code\n/// auto s = Box<b>::create(2);\n/// @endcode\n/// \"<name>_end\"\n"
+        self.assertEqual(make_site.plain_comments(shown), shown)
+        self.assertEqual(make_site.plain_comments(shown + "/// Box<b>"), shown + "/// Box\\<b>")
 
     def run_doxygen(self):
         program = ("import sys, pathlib; sys.path.insert(0, sys.argv[1]); import make_site\n"

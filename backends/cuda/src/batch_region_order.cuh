@@ -240,7 +240,7 @@ __device__ inline std::uint32_t reached_pairs(std::uint32_t word, int x, int y) 
 struct TileList {
   const uint2* rows;
   std::uint32_t length, camera;
-  int x, y;  ///< The tile.
+  int x, y;  ///< First pixel of the tile.
 };
 
 /// Takes rows of one key, of which there are more than a warp holds: those of the lowest ranks from

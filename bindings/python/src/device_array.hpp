@@ -28,7 +28,7 @@ class Consumers {
 };
 
 /// Images in the memory of a GPU as a dict of DeviceArray by sensor. The arrays keep `owner` alive,
-/// and it the memory.
+/// and `owner` keeps the memory.
 nb::dict device_images(std::span<const BatchObservation> images, const Device& device,
                        const std::shared_ptr<Consumers>& consumers, nb::handle owner);
 

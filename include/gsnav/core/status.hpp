@@ -3,7 +3,7 @@
 
 #include <cstdio>
 #include <cstdlib>
-#include <new>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -105,36 +105,14 @@ template <class T>
 class [[nodiscard]] Result {
  public:
   /// Holds a value.
-  Result(T value) : has_value_(true) { ::new (static_cast<void*>(&value_)) T(std::move(value)); }
+  Result(T value) : value_(std::move(value)) {}
   /// Holds an error. `status` must not be ok.
-  Result(Status status) : status_(std::move(status)), has_value_(false) {}
+  Result(Status status) : status_(std::move(status)) {}
   /// Holds an error with a code and a message.
-  Result(Errc code, const std::string& message) : Result(Status(code, message)) {}
-  /// Copies the value or the error.
-  Result(const Result& other) requires std::is_copy_constructible_v<T> : status_(other.status_),
-                                                                         has_value_(other.has_value_) {
-    if (has_value_) ::new (static_cast<void*>(&value_)) T(other.value_);
-  }
-  /// Moves the value or the error.
-  Result(Result&& other) noexcept(std::is_nothrow_move_constructible_v<T>)
-      : status_(std::move(other.status_)), has_value_(other.has_value_) {
-    if (has_value_) ::new (static_cast<void*>(&value_)) T(std::move(other.value_));
-  }
-  /// Replaces the content by that of `other`.
-  Result& operator=(Result other) noexcept(std::is_nothrow_move_constructible_v<T>) {
-    if (has_value_) value_.~T();
-    has_value_ = false;
-    status_ = std::move(other.status_);
-    if (other.has_value_) ::new (static_cast<void*>(&value_)) T(std::move(other.value_));
-    has_value_ = other.has_value_;
-    return *this;
-  }
-  ~Result() {
-    if (has_value_) value_.~T();
-  }
+  Result(Errc code, const std::string& message) : status_(code, message) {}
 
   /// True if there is a value.
-  bool ok() const noexcept { return has_value_; }
+  bool ok() const noexcept { return value_.has_value(); }
   /// True if there is a value.
   explicit operator bool() const noexcept { return ok(); }
   /// The error, or an ok Status if there is a value.
@@ -148,18 +126,18 @@ class [[nodiscard]] Result {
   /// @throws gsnav::Error if there is none (aborts under -fno-exceptions).
   T& value() & {
     require();
-    return value_;
+    return *value_;
   }
   /// The value, read-only. Throws as above.
   const T& value() const& {
     require();
-    return value_;
+    return *value_;
   }
   /// Moves the value out. It is returned by value, so that `for (auto& x : load().value())` does not
   /// iterate over a destroyed temporary. Throws as above.
   T value() && {
     require();
-    return std::move(value_);
+    return std::move(*value_);
   }
   /// Access to a member of the value. Throws as above.
   T* operator->() { return &value(); }
@@ -174,14 +152,11 @@ class [[nodiscard]] Result {
 
  private:
   void require() const {
-    if (!has_value_) detail::fail(status_.code(), status_.message());
+    if (!ok()) detail::fail(status_.code(), status_.message());
   }
 
   Status status_;  ///< Ok if there is a value.
-  bool has_value_;
-  union {
-    T value_;  ///< Alive if has_value_.
-  };
+  std::optional<T> value_;
 };
 
 }  // namespace gsnav

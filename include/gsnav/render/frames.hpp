@@ -25,7 +25,7 @@ struct RenderStats {
                               ///< hidden
   std::uint64_t tile_intersections = 0;  ///< (tile, Gaussian) pairs, without those found hidden by a
                                          ///< mesh
-  MeshStats meshes;                      ///< counts of the meshes
+  MeshStats meshes;                      ///< triangles of the meshes
 };
 
 /// Images of a batch of C cameras of one size (H x W pixels), in host memory. Images that were not

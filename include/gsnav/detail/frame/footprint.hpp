@@ -24,7 +24,7 @@ struct PixelColumns {
 /// alpha. The edge is concave with its maximum at Y* = -k r / (a b). A strip's rightmost point is
 /// therefore at Y* clamped to the strip, and its leftmost point at -Y* clamped.
 ///
-/// @tparam Rough uses sqrt_above and reciprocal_near: faster, with an ellipse up to 3e-3 larger
+/// @tparam Rough uses sqrt_above and reciprocal_near: faster; lengths are up to 0.3 % larger
 template <class L, bool Rough = false>
 class FootprintStrips {
   using S = scalar_of<L>;

@@ -10,7 +10,7 @@
 
 namespace gsnav {
 struct LodSettings;  // detail/scene/lod_settings.hpp
-}
+}  // namespace gsnav
 
 // Functions without settings take the defaults of LodSettings.
 

@@ -12,7 +12,7 @@
 
 namespace gsnav {
 struct VisibleSettings;  // detail/scene/visible_settings.hpp
-}
+}  // namespace gsnav
 
 namespace gsnav::io {
 

@@ -36,7 +36,7 @@ class GaussianArrays {
       detail::move_to(backend, set_.gaussians.color.chunk_degrees, bytes_);
     }
   }
-  /// The same for a packed cloud.
+  /// Places a packed cloud.
   GaussianArrays(B& backend, const PackedCloud& cloud) : set_(cloud.set()) {
     if constexpr (!is_host_backend<B>) {
       const GaussianCloud floats = unpack_cloud(cloud);
@@ -44,7 +44,7 @@ class GaussianArrays {
       upload(backend, floats);
     }
   }
-  /// The same for a packed cloud.
+  /// Places a packed cloud, of whose SH only `bands` are read.
   GaussianArrays(B& backend, const PackedCloud& cloud, const SceneBands& bands)
       : set_(bands.applied_to(cloud.set())) {
     if constexpr (!is_host_backend<B>) {
