@@ -236,7 +236,8 @@ TEST_CASE("a ready NavMesh is walked on, and another one in its file is refused 
   const Outcome made = eval("--navmesh floor.navmesh");
   CAPTURE(made.text);
   CHECK(made.ok);
-  for (const auto& e : gsnav::io::load_episodes(folder / "out/episodes.json.gz")->episodes) {
+  const auto drawn = gsnav::io::load_episodes(folder / "out/episodes.json.gz").value();
+  for (const auto& e : drawn.episodes) {
     CHECK(e.start_position.x < 9);
     CHECK(e.start_position.z < 4);
   }
