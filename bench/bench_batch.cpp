@@ -4,7 +4,7 @@
 //
 //   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_batch [--size 256x256]
 //       [--compact] [--balls 8] [--rgb] [--depth] [--visible] [--visible-rows 8]
-//       [--visible-weight 0.001] [batch sizes...]
+//       [--visible-weight 0.001] [batch sizes...]        (or --device: prints the name of the GPU)
 //
 // Without the variables, the scene is the embedded flat from its four viewpoints. A batch larger than
 // the number of views repeats the views from slightly different places. Times are measured on the
@@ -12,9 +12,7 @@
 // Errors are of judged_views(), taken together; `least` is the PSNR of the worst view.
 //
 // --balls N: N meshes of 4000 triangles stand in front of the first cameras, and all cameras see them.
-// --rgb: colours alone, without depth (its error is nan) and alpha, as most renderers measure.
-// --depth: median depth alone. Errors of colours are nan.
-// --device: prints the name of the GPU and draws nothing.
+// --rgb: colours alone. --depth: median depth alone. Errors of images that are not drawn are nan.
 // --visible: each camera draws only the Gaussians that are visible from its cell (VisibleSettings::rows,
 // min_weight). The images of all views are then compared with images of the whole scene.
 #include <cuda_runtime.h>
@@ -265,27 +263,31 @@ bool chooses_images(const std::string& argument) {
   return true;
 }
 
+bool has_gpu() {
+  const bool has = CudaBackend::device_count() != 0;
+  if (!has) std::fprintf(stderr, "bench_batch: no GPU\n");
+  return has;
+}
+
 const char* drawn_images() {
-  if (!g_depth) return "RGB";
-  return g_rgb ? "RGB + alpha + median depth" : "median depth";
+  return !g_depth ? "RGB" : g_rgb ? "RGB + alpha + median depth" : "median depth";
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc == 2 && std::string(argv[1]) == "--device")
+    return has_gpu() ? std::puts(CudaBackend().device_name().c_str()) < 0 : 1;
   std::vector<std::size_t> counts;
-  bool compact = false, visible = false, name_alone = false;
+  bool compact = false, visible = false;
   VisibleSettings sets_of;
   std::size_t balls = 0;
   for (int i = 1; i < argc; ++i) {
     if (std::string(argv[i]) == "--size" && i + 1 < argc) {
       if (std::sscanf(argv[++i], "%dx%d", &g_width, &g_height) == 2 && g_width > 0 && g_height > 0)
         continue;
-    } else if (std::string(argv[i]) == "--compact") {
-      compact = true;
-      continue;
-    } else if (std::string(argv[i]) == "--visible") {
-      visible = true;
+    } else if (const std::string o = argv[i]; o == "--compact" || o == "--visible") {
+      (o == "--compact" ? compact : visible) = true;
       continue;
     } else if (std::string(argv[i]) == "--visible-rows" && i + 1 < argc) {
       sets_of.rows = std::atoi(argv[++i]);
@@ -294,9 +296,6 @@ int main(int argc, char** argv) {
       sets_of.min_weight = std::atof(argv[++i]);
       continue;
     } else if (chooses_images(argv[i])) {
-      continue;
-    } else if (std::string(argv[i]) == "--device") {
-      name_alone = true;
       continue;
     } else if (std::string(argv[i]) == "--balls" && i + 1 < argc) {
       balls = std::strtoull(argv[++i], nullptr, 10);
@@ -313,14 +312,7 @@ int main(int argc, char** argv) {
                  argv[i]);
     return 2;
   }
-  if (CudaBackend::device_count() == 0) {
-    std::fprintf(stderr, "bench_batch: no GPU\n");
-    return 1;
-  }
-  if (name_alone) {
-    std::puts(CudaBackend().device_name().c_str());
-    return 0;
-  }
+  if (!has_gpu()) return 1;
   CudaBackend cuda;
   GaussianCloud shown = gsnav_bench::workload().cloud;
   if (compact) compact_sh(shown);

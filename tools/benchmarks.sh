@@ -65,8 +65,10 @@ if [[ $gpu == 0 ]]; then
   no_gpu="--no-gpu was given"
 elif [[ ! -x $batch ]]; then
   gpu=0 no_gpu="bench_batch is not built (-DGSNAV_CUDA=ON)"
-elif ! device=$("$batch" --device 2> /dev/null); then
-  gpu=0 no_gpu="this machine has no GPU that CUDA can use"
+else
+  device=$("$batch" --device 2>&1) && status=0 || status=$?
+  ((status <= 1)) || stop "$batch does not know --device, build it again: $device"
+  ((status == 0)) || gpu=0 no_gpu="this machine has no GPU that CUDA can use"
 fi
 [[ $cpu == 1 || $gpu == 1 ]] || stop "--no-cpu leaves nothing to measure: $no_gpu"
 

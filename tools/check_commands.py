@@ -76,7 +76,8 @@ class Programs:
         name = pathlib.PurePosixPath(word).name
         if name.startswith("test_"):
             made = re.compile(rf"gsnav_test\({name[5:]}\b")
-            return any(made.search(p.read_text(encoding="utf-8")) for p in (self.root / "tests").rglob("CMakeLists.txt"))
+            files = (self.root / "tests").rglob("CMakeLists.txt")
+            return any(made.search(p.read_text(encoding="utf-8")) for p in files)
         return self.options(word, strict=False) is not None or any(k.startswith(f"{name} ") for k in self.known)
 
     def all(self):
@@ -193,7 +194,8 @@ ls --all
 --none;
 ```
 """
-WRONG = {"    gsnav-aa --one 1\n": "there is no program gsnav-aa", "    build/ci/tests/lod/test_no -d\n": "there is no program tests/lod/test_no",
+WRONG = {"    gsnav-aa --one 1\n": "there is no program gsnav-aa",
+         "    build/ci/tests/lod/test_no -d\n": "there is no program tests/lod/test_no",
          "    gsnav-a --tow 1\n": "gsnav-a has no option --tow", "`gsnav-a --tow`": "gsnav-a has no option --tow",
          "`--none`": "--none: no program has this option", "    gsnav-b --four\n": "gsnav-b has no option --four",
          "```sh\nls | tools/a.py --one\n```\n": "tools/a.py has no option --one",

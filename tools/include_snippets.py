@@ -27,8 +27,8 @@ import tempfile
 import textwrap
 
 BLOCK = re.compile(r"^<!-- snippet: (\S+)(?: (\S+))? -->\n+```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-CODE_BLOCK = re.compile(r"^(?:```|~~~) *(?:[cC]pp|[cC]\+\+|[cC]uda|[pP]ython|py)\n"
-                        r"|(?<=\n\n) {4}(?:#include |import |from [\w.]+ import |[^\n]*gsnav::\w+\()",
+CODE_BLOCK = re.compile(r"^(?:```|~~~) *(?i:cpp|c\+\+|cuda|python|py)\n"
+                        r"|(?<=\n\n) {4}(?:#include |import |from [\w.]+ import |[^\n]*gsnav::)",
                         re.MULTILINE)
 NOT_COMPILED = re.compile(r"^<!-- not compiled: \S.* -->\n+(?=```)", re.MULTILINE)
 COMMENT = re.compile(r"^<!-- snippet:", re.MULTILINE)

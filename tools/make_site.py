@@ -207,7 +207,7 @@ def plain_comments(text):
 def shown_escapes(html):
     """Lines for pages that show an escape of plain_comments()."""
     return [f"{page.name}: error: it shows {m.group()}" for page in sorted(html.glob("*.html"))
-            for m in [re.search(r"\\\\(?:::|&lt;|@)", page.read_text(encoding="utf-8"))] if m]
+            for m in [re.search(r"\\(?:::|&lt;|@)", page.read_text(encoding="utf-8"))] if m]
 
 
 # Functions whose meaning the language fixes.

@@ -29,6 +29,11 @@ chmod +x "$at/b/bench/bench_batch"
 said=$(measure 2>&1) && fail "without a GPU, --no-cpu succeeds"
 [[ $said == *"no GPU that CUDA can use"* ]] || fail "without a GPU it says: $said"
 
+# An older program: it knows no --device.
+printf '#!/usr/bin/env bash\nexit 2\n' > "$at/b/bench/bench_batch"
+said=$(measure 2>&1) && fail "with an older bench_batch, it succeeds"
+[[ $said == *"does not know --device"* ]] || fail "with an older bench_batch it says: $said"
+
 # A GPU: one row per profile and number of cameras, for three kinds of images.
 cat > "$at/b/bench/bench_batch" << 'BATCH'
 #!/usr/bin/env bash

@@ -149,6 +149,12 @@ class Tree(unittest.TestCase):
         self.assertEqual(make_site.plain_comments(shown), shown)
         self.assertEqual(make_site.plain_comments(shown + "/// Box<b>"), shown + "/// Box\\<b>")
 
+    def test_escapes_that_a_page_shows(self):
+        (self.root / "shown").mkdir()
+        for name, text in (("a", "Box\\::create"), ("b", "Box\\&lt;B&gt;"), ("c", "a\\@b"), ("d", "Box::create &lt;")):
+            (self.root / f"shown/{name}.html").write_text(f"<p>{text}</p>")
+        self.assertEqual([line[0] for line in make_site.shown_escapes(self.root / "shown")], ["a", "b", "c"])
+
     def run_doxygen(self):
         program = ("import sys, pathlib; sys.path.insert(0, sys.argv[1]); import make_site\n"
                    "root = pathlib.Path(sys.argv[2]); make_site.ROOT = root; make_site.SITE = root / 'docs/site'\n"

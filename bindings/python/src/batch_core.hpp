@@ -21,7 +21,7 @@ namespace gsnav::python {
 struct BatchCore {
   BatchSimulator sim;
   std::shared_ptr<PythonSource> source;
-  std::shared_ptr<ImagePool> pool;  ///< Memory for new images if `copy` is set; else null.
+  std::shared_ptr<ImagePool> pool;  ///< Memory for new images, or null (see image_pool).
   std::shared_ptr<PythonImageSource> images;
   std::shared_ptr<Consumers> consumers;
   bool copy = false;   ///< Images are new arrays.

@@ -141,8 +141,9 @@ void bind_scene_files(nb::module_& m) {
   Struct<V>(m, "ClampedValues", "Counts of values of a cloud that a format cannot hold.")
       .field("colours", &V::colours, "Colours of degree 0, clamped.")
       .field("scales", &V::scales, "Standard deviations, clamped.")
-      .field("bands", &V::bands, "SH coefficients of higher degrees, clamped or left out.")
-      .field("lost_bands", &V::lost_bands, "Part of `bands`: of degrees that the format does not store.")
+      .field("bands", &V::bands, "SH coefficients of degrees 1 to 3 that are stored, clamped.")
+      .field("lost_bands", &V::lost_bands,
+             "Other coefficients, not zero, of degrees that are not stored.")
       .done()
       .def("all", &V::all, "Sum of the four counts.");
   m.def(

@@ -75,7 +75,8 @@ void bind_render_settings(nb::module_& m) {
       .field("pixels", &L::pixels, "Largest error of a node, in pixels.")
       .field("grain", &L::grain,
              "Largest product of a node's error and its grain, as a multiple of `pixels`.")
-      .field("hysteresis", &L::hysteresis, "Hysteresis against flicker, in [0, 1).")
+      .field("hysteresis", &L::hysteresis,
+             "Hysteresis against flicker, in [0, 1). Simulators ignore it.")
       .field("photo", &L::photo, "Samples per pixel side of the reference image, 1 to 16.")
       .done();
   using D = DetailChoice;

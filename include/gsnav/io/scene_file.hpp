@@ -100,9 +100,9 @@ struct ClampedValues {
   std::uint64_t colours = 0;     ///< Colours of degree 0 of drawn Gaussians, clamped to the nearer end
                                  ///< of the format's range.
   std::uint64_t scales = 0;      ///< Standard deviations, clamped.
-  std::uint64_t bands = 0;       ///< SH coefficients of bands 1 to 3, clamped.
-  std::uint64_t lost_bands = 0;  ///< Part of `bands`: non-zero coefficients of bands that the format
-                                 ///< does not store.
+  std::uint64_t bands = 0;       ///< SH coefficients of bands 1 to 3 that are stored, clamped.
+  std::uint64_t lost_bands = 0;  ///< Other SH coefficients, not zero, that are lost because the
+                                 ///< format does not store their bands.
   /// Sum of the four counts.
   std::uint64_t all() const noexcept { return colours + scales + bands + lost_bands; }
 };

@@ -17,7 +17,7 @@ namespace gsnav {
 
 /// Counts of a cut. They are Gaussians of the cloud unless said otherwise.
 struct LodStats {
-  std::uint64_t shown = 0;   ///< Gaussians in chunks that may be in view.
+  std::uint64_t shown = 0;   ///< Gaussians in chunks that may be in view; by select_from, all.
   std::uint64_t merged = 0;  ///< Number of those that merged Gaussians stand for.
   std::uint64_t drawn = 0;   ///< Rows that are drawn for them, merged ones included.
   double error_px = 0;       ///< Largest LodNode::error of a node that is drawn, pixels.
@@ -107,13 +107,13 @@ class LodCut {
   /// Forgets the last choice, and with it the hysteresis.
   void reset() { refined_.clear(); }
 
-  /// Numbers of the last select().
+  /// Numbers of the last select() or select_from().
   const LodStats& stats() const noexcept { return stats_; }
-  /// The sets of the last select().
+  /// The sets of that call.
   std::span<const GaussianSet> sets() const noexcept { return sets_; }
-  /// Chunks of the cloud that the last select() chose.
+  /// Chunks of the cloud that it chose.
   const std::vector<std::uint32_t>& leaf_chunks() const noexcept { return leaf_chunks_; }
-  /// Chunks of LodTree::merged that the last select() chose.
+  /// Chunks of LodTree::merged that it chose.
   const std::vector<std::uint32_t>& merged_chunks() const noexcept { return merged_chunks_; }
 
   /// The set of a cloud, filtered for the pixels of O_photo(k): the mean of k x k samples, each blurred

@@ -19,7 +19,7 @@ struct PixelColumns {
 /// pixels that pass the pixel test in scalar_of<L>, because the ellipse is enlarged by the rounding of
 /// both computations.
 ///
-/// About the centre, the ellipse is |w|^2 = (a X)^2 + (k X + b Y)^2 = r^2. Its right edge is X(Y) = -s Y
+/// With a, b, k of SplatGeometry, the ellipse is (a X)^2 + (k X + b Y)^2 = r^2. Its right edge is -s Y
 /// + sqrt((r^2 - (beta Y)^2) / alpha^2), where alpha^2 = a^2 + k^2, s = k b / alpha^2 and beta = a b /
 /// alpha. The edge is concave with its maximum at Y* = -k r / (a b). A strip's rightmost point is
 /// therefore at Y* clamped to the strip, and its leftmost point at -Y* clamped.

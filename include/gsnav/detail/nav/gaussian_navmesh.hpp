@@ -57,10 +57,10 @@ struct GaussianNavReport {
                                 ///< floor.
   std::size_t stairs = 0;       ///< Number of stairs and ramps between storeys.
   double ceiling_share = 0.0;   ///< Fraction of the main floor with something solid above head height.
-  /// Number of solid voxels above and below the main floor, up to 1 m outside it.
+  /// Number of solid voxels above and below the main floor, and within 1 m beside it.
   std::size_t solid_above = 0, solid_below = 0;
   Aabb<double> bounds{};  ///< Box that was divided into voxels, world coordinates.
-  /// Size of the grid.
+  /// Numbers of columns and of voxels.
   std::size_t columns = 0, voxels = 0;
   /// Number of solid voxels, and how many of them were removed as floaters.
   std::size_t solid_voxels = 0, floater_voxels = 0;

@@ -141,7 +141,7 @@ class SensorRequests {
     requests_.push_back({{view.sets, &camera, view.config, images, view.meshes}, view.detail});
   }
 
-  /// `v` is the index of the view.
+  /// Adds the images of pinhole group `g` for view number `v`; `camera`: its index in cameras_.
   void add_pinhole(const Plan& plan, const SensorView& view, std::size_t v, std::size_t g,
                    SensorImages<B>& images, std::size_t camera) {
     const Plan::Group& group = plan.groups()[g];

@@ -20,7 +20,7 @@ class ActuationSpec:
 
 @dataclasses.dataclass
 class ActionSpec:
-    """An action: the name of a registered function and its size."""
+    """An action: the name of a registered function, and the actuation that it gets."""
 
     name: str
     actuation: Any = None

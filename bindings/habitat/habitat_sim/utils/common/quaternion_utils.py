@@ -27,7 +27,7 @@ def quat_to_coeffs(quat: Any) -> np.ndarray:
 
 
 def quat_to_magnum(quat: Any) -> Quaternion:
-    """The same rotation in magnum."""
+    """Converts a numpy quaternion to a magnum.Quaternion."""
     return Quaternion(Vector3(quat.x, quat.y, quat.z), quat.w)
 
 
