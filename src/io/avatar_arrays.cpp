@@ -100,7 +100,7 @@ class AvatarArrayReader {
                  ", 3] or [" + std::to_string(out.count) + ", K, 3]");
     }
     out.shs.shape = {out.count, k, 3};
-    if (Status s = find_degree("shs"); !s) return s;
+    if (Status s = find_degree("shs has"); !s) return s;
     if (k != 1 || colors == AvatarColors::coefficients) return {};
     std::vector<double>& values = out.shs.values;
     if (colors == AvatarColors::guess) {
@@ -132,16 +132,16 @@ class AvatarArrayReader {
       append(dc.values, i, 3);
       append(rest.values, i, more);
     }
-    return find_degree("_features_rest");
+    return find_degree("_features_dc and _features_rest together have");
   }
 
-  /// Finds the degree of `shs`. `name` is the array whose shape has the number of coefficients.
-  Status find_degree(const char* name) {
+  /// Finds the degree of `shs`. `arrays_have` begins the message of an error.
+  Status find_degree(const char* arrays_have) {
     const std::size_t k = out.shs.shape[1];
     int& degree = out.sh_degree;
     while (static_cast<std::size_t>(sh_coefficient_count(degree)) < k && degree < kMaxShDegree) ++degree;
     if (static_cast<std::size_t>(sh_coefficient_count(degree)) == k) return {};
-    return error(Errc::unsupported, std::string(name) + " has " + std::to_string(k) +
+    return error(Errc::unsupported, std::string(arrays_have) + " " + std::to_string(k) +
                                         " coefficients, must be 1, 4, 9 or 16");
   }
 

@@ -119,8 +119,8 @@ class CellsBuilder {
     });
   }
 
-  /// Returns false if, at all corners of the part, some kept source is at most as long as this one's
-  /// lower bound, which is its tangent plane at the middle.
+  /// Returns false if one kept source is, at every corner of the part, at most as long as this source's
+  /// lower bound, its tangent plane at the middle.
   bool may_be_least(const Candidate& c) {
     const Flat back = middle_ - sources_[c.source].last_bend(middle_);
     const double away = length(back);

@@ -281,7 +281,8 @@ TEST_CASE("avatar file: GART's parameters become the same avatar as activated on
   CHECK(folder.load(gart).value().asset.cloud.scales[0][3] ==
         doctest::Approx(2 * a.cloud.scales[0][3]).epsilon(1e-5));
   gart["_features_rest"] = {{30, 6}, std::vector<double>(180, 0.0)};
-  CHECK(contains(folder.load(gart).status().message(), "_features_rest has 3 coefficients"));
+  CHECK(contains(folder.load(gart).status().message(),
+                 "_features_dc and _features_rest together have 3 coefficients"));
   gart.erase("_opacity");
   CHECK(contains(folder.load(gart).status().message(), "_opacity"));
 }

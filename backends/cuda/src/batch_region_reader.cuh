@@ -109,7 +109,7 @@ class TileReader {
     return next_ < list_.length ? first_key_of_bin(r_, base_, list_.rows[next_].y) : kLastKey;
   }
 
-  /// Reads the list until `target_` rows are held, or no nearer than end_key_ is left.
+  /// Reads on until `target_` rows are held, the space is full, or no row before end_key_ is left.
   __device__ void read(unsigned open) {
     constexpr std::uint32_t kRead = Policy::kReadAtOnce;
     while (next_ < list_.length && held_ < target_ && held_ + 32 <= kHeld) {

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Common parts of the packages of the distribution gsnav-habitat: notice, check for others, placeholders."""
+"""Parts that the packages of the distribution gsnav-habitat share: the notice on import, the check that no other
+distribution owns their names, and placeholders for names that are not served."""
 
 import functools
 import os

@@ -108,7 +108,7 @@ def _open(gsnav: Any, name: str, beside: str | None, agent_radius: float, agent_
 
 def device(gpu_device_id: int) -> Any:
     """GSNAV_DEVICE if it is set. Else the GPU of this number if the package and the machine have it, else the
-    CPU."""
+    CPU. A CPU gets only the threads that the present thread may draw on (_turns.share)."""
     gsnav = library()
     chosen = os.environ.get("GSNAV_DEVICE")
     if chosen:

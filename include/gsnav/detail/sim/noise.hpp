@@ -61,8 +61,8 @@ void add_color_noise(const NoiseModel& model, std::uint64_t seed, std::span<floa
 
 /// Applies the noise of a structured-light depth camera (PrimeSense). It follows the simulation
 /// published with Choi, Zhou and Koltun, "Robust Reconstruction of Indoor Scenes" (CVPR 2015). Each
-/// pixel reads the depth at a position shifted by N(0, 1/4 pixel) in each direction, on a grid of every
-/// second row and column. Disparity is quantized:
+/// pixel reads the depth at a position shifted by N(0, 1/4) pixel in each direction, on a grid of every
+/// second row and column. N(0, s) is normal, with standard deviation s. Disparity is quantized:
 ///
 ///     z' = 8 * 35.130 / round(8 (35.130 / z + N(0, 1/36)))
 ///
