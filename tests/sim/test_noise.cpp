@@ -68,7 +68,7 @@ TEST_CASE("Poisson noise has the probabilities of its formula, for small and lar
     for (const double c : {0.25, 0.5, 0.75}) {
       const std::size_t n = 200000;
       std::vector<float> image(n, static_cast<float>(c));
-      // So many different bytes that v is as asked. c is one of them or none.
+      // Values of other bytes are added, so that the image has enough different bytes for this v.
       for (int k = 0; k < static_cast<int>(v) - 1; ++k) image.push_back(static_cast<float>(k) / 255.0f);
       add_color_noise(m, 11, image);
       std::vector<double> count(1024);

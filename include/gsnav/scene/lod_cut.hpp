@@ -41,7 +41,7 @@ struct SeenByCamera {
   double nearest(const ChunkBounds& reach) const noexcept { return ChunkInView(camera, reach).z_min(); }
 };
 
-/// The same for all cameras of one kind that are in a box, whatever their rotations.
+/// The same for all cameras in a box that differ in position and rotation only.
 struct SeenFromBox {
   Aabb<double> box;      ///< Positions of the cameras.
   double cosine;         ///< Cosine of the largest angle between the view axis and a ray of the image.

@@ -107,7 +107,10 @@ struct VisibleSets {
     std::size_t first = 0, last = keys.size();  // the keys before `first` are below it
     while (first < last) {
       const std::size_t middle = first + (last - first) / 2;
-      (keys[middle] < *key ? first : last) = keys[middle] < *key ? middle + 1 : middle;
+      if (keys[middle] < *key)
+        first = middle + 1;
+      else
+        last = middle;
     }
     if (first == keys.size() || keys[first] != *key) return {};
     return first;
