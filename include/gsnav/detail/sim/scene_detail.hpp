@@ -59,13 +59,15 @@ class LodCells {
       box.high[k] = box.low[k] + edge;
     }
     auto cut = make(box);
+    const std::size_t chunks = cut->leaf_chunks().size() + cut->merged_chunks().size();
     const std::scoped_lock lock(mutex_);
-    chunks_ += cut->leaf_chunks().size() + cut->merged_chunks().size();
-    if (chunks_ > kMostChunks) {
+    if (chunks_ + chunks > kMostChunks) {
       cuts_.clear();
       chunks_ = 0;
     }
-    return cuts_.emplace(key, std::move(cut)).first->second;
+    const auto at = cuts_.emplace(key, std::move(cut));
+    if (at.second) chunks_ += chunks;  // Another thread may have been faster.
+    return at.first->second;
   }
 
  private:
