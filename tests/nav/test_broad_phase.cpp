@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <set>
 
-#include "cases.hpp"
 #include "step_oracle.hpp"
+#include "support/random_cases.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

@@ -4,10 +4,10 @@
 
 #include <cmath>
 
-#include "cases.hpp"
 #include "fcl_capsules.hpp"
 #include "gsnav/detail/nav/step.hpp"
 #include "gsnav/sweep/capsule.hpp"
+#include "support/random_cases.hpp"
 
 using namespace gsnav;
 

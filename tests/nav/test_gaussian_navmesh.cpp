@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "../../bench/large_capture.hpp"
-#include "cases.hpp"
 #include "gsnav/detail/nav/gaussian_navmesh.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 #include "meshes.hpp"
+#include "support/random_cases.hpp"
 
 using namespace gsnav;
 

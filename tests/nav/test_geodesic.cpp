@@ -6,7 +6,6 @@
 #include <limits>
 #include <thread>
 
-#include "cases.hpp"
 #include "detour.hpp"
 #include "geodesic_oracle.hpp"
 #include "gsnav/detail/nav/geodesic_field.hpp"
@@ -15,6 +14,7 @@
 #include "metric_check.hpp"
 #include "navmesh_impl.hpp"
 #include "support/data.hpp"
+#include "support/random_cases.hpp"
 
 using namespace gsnav;
 using gsnav_test::cases;

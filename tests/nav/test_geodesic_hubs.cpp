@@ -4,11 +4,11 @@
 #include <cmath>
 #include <limits>
 
-#include "cases.hpp"
 #include "gsnav/detail/nav/geodesic_field.hpp"
 #include "meshes.hpp"
 #include "navmesh_impl.hpp"
 #include "support/data.hpp"
+#include "support/random_cases.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

@@ -17,7 +17,7 @@
 
 #include "../../src/nav/landmarks.hpp"
 #include "gsnav/core/rng.hpp"
-#include "nav/cases.hpp"
+#include "support/random_cases.hpp"
 
 using namespace gsnav;
 using detail::GeodesicSearch;

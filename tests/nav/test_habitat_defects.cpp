@@ -8,10 +8,10 @@
 #include <limits>
 #include <thread>
 
-#include "cases.hpp"
 #include "detour.hpp"
 #include "gsnav/nav/navmesh.hpp"
 #include "meshes.hpp"
+#include "support/random_cases.hpp"
 
 using namespace gsnav;
 using gsnav_test::cases;

@@ -4,12 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <vector>
 
-#include "cases.hpp"
 #include "gsnav/detail/nav/local_planner.hpp"
 #include "half_planes.hpp"
 #include "step_scene.hpp"
+#include "support/random_cases.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -17,8 +18,6 @@ using detail::Ground;
 using detail::HalfPlane;
 
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 /// The same by trying every point where an optimum can lie.
 double nearest_by_trying(const std::vector<HalfPlane>& planes, const Ground& wanted, double limit) {
@@ -66,10 +65,10 @@ TEST_CASE("half planes: the nearest point, against all that can be it") {
   for (int i = 0; i < cases(100000); ++i) {
     std::vector<HalfPlane> planes;
     for (std::uint64_t k = rng.below(7); k > 0; --k) {
-      const double a = rng.uniform(0, 2 * kPi);
+      const double a = rng.uniform(0, 2 * std::numbers::pi);
       planes.push_back({{std::cos(a), std::sin(a)}, rng.uniform(-1, 0.6), false});
     }
-    const double a = rng.uniform(0, 2 * kPi), r = rng.uniform(0, 1.5);
+    const double a = rng.uniform(0, 2 * std::numbers::pi), r = rng.uniform(0, 1.5);
     const Ground wanted{r * std::cos(a), r * std::sin(a)};
     const auto v = detail::nearest_in(planes, wanted, 1.0);
     const double best = nearest_by_trying(planes, wanted, 1.0);
@@ -106,12 +105,12 @@ TEST_CASE(
     std::vector<Body> around;
     const double seconds = 0.1;
     for (std::uint32_t a = 0; a <= static_cast<std::uint32_t>(i % 5); ++a) {
-      const Vec3d to = flat(rng.uniform(0.6, 6), rng.uniform(0, 2 * kPi));
-      const Vec3d v = flat(rng.uniform(0, 1.5), rng.uniform(0, 2 * kPi));
+      const Vec3d to = flat(rng.uniform(0.6, 6), rng.uniform(0, 2 * std::numbers::pi));
+      const Vec3d v = flat(rng.uniform(0, 1.5), rng.uniform(0, 2 * std::numbers::pi));
       list.push_back(walker(agent.position + to, v, seconds, 0.3, a));
       around.push_back({to, v, 0.3 + agent.radius + o.margin});
     }
-    const Vec3d preferred = flat(rng.uniform(0, 1.5), rng.uniform(0, 2 * kPi));
+    const Vec3d preferred = flat(rng.uniform(0, 1.5), rng.uniform(0, 2 * std::numbers::pi));
     const CapsuleSet set = CapsuleSet::create(list, 7.0, 7.0 + seconds).value();
     const PlannedVelocity plan = plan_velocity(mesh, agent, preferred, set, o);
     const auto least = [&](const Body& b, const Vec3d& v) {  // distance to a body within the horizon
@@ -158,8 +157,9 @@ TEST_CASE("local planner: nobody is touched within the tick whom standing still 
     const AgentState agent{p.position, 0.15, 1.5, p.poly};
     std::vector<DynamicCapsule> list;
     for (std::uint32_t a = 0; a < 4; ++a) {
-      const Vec3d at = p.position + flat(rng.uniform(0.45, 1.2), rng.uniform(0, 2 * kPi));
-      list.push_back(walker(at, flat(rng.uniform(0, 2), rng.uniform(0, 2 * kPi)), seconds, 0.2, a));
+      const Vec3d at = p.position + flat(rng.uniform(0.45, 1.2), rng.uniform(0, 2 * std::numbers::pi));
+      list.push_back(
+          walker(at, flat(rng.uniform(0, 2), rng.uniform(0, 2 * std::numbers::pi)), seconds, 0.2, a));
     }
     const CapsuleSet set = CapsuleSet::create(list, 0, seconds).value();
     if (clearance(agent, set, 0).distance < 0.01) continue;
@@ -168,7 +168,8 @@ TEST_CASE("local planner: nobody is touched within the tick whom standing still 
       const StepResult r = step(mesh, who, v * seconds, set);
       return r.blocked_by == BlockedBy::capsule || r.pushed_into;
     };
-    const PlannedVelocity plan = plan_velocity(mesh, agent, flat(1.0, rng.uniform(0, 2 * kPi)), set);
+    const PlannedVelocity plan =
+        plan_velocity(mesh, agent, flat(1.0, rng.uniform(0, 2 * std::numbers::pi)), set);
     if (!touches(agent, plan.velocity)) continue;
     ++touched;
     // With a little more room than the planner keeps.
@@ -189,7 +190,7 @@ TEST_CASE("local planner: walls are not met within their horizon") {
   const LocalPlannerOptions o;
   for (int i = 0; i < cases(20000); ++i) {
     const NavPoint p = mesh.random_point(rng, 0);
-    const Vec3d preferred = flat(1.0, rng.uniform(0, 2 * kPi));
+    const Vec3d preferred = flat(1.0, rng.uniform(0, 2 * std::numbers::pi));
     const PlannedVelocity plan = plan_velocity(mesh, {p.position, 0.1, 1.5, p.poly}, preferred, {}, o);
     REQUIRE(plan.safe);
     REQUIRE_FALSE(mesh.walk(p, plan.velocity * (o.wall_horizon * 0.999), false).hit_wall);

@@ -8,7 +8,6 @@
 #include <initializer_list>
 #include <new>
 
-#include "cases.hpp"
 #include "gsnav/detail/nav/navmesh_file.hpp"
 #include "height_mending.hpp"
 #include "io/allocations.hpp"
@@ -16,6 +15,7 @@
 #include "navmesh_impl.hpp"
 #include "support/data.hpp"
 #include "support/files.hpp"
+#include "support/random_cases.hpp"
 
 using namespace gsnav;
 using gsnav_test::cases;

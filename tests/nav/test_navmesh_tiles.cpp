@@ -8,7 +8,6 @@
 #include <map>
 #include <string>
 
-#include "cases.hpp"
 #include "geodesic_oracle.hpp"
 #include "gsnav/detail/nav/gaussian_navmesh.hpp"
 #include "gsnav/detail/nav/geodesic_field.hpp"
@@ -18,6 +17,7 @@
 #include "navmesh_impl.hpp"
 #include "support/data.hpp"
 #include "support/files.hpp"
+#include "support/random_cases.hpp"
 #include "walk_check.hpp"
 
 using namespace gsnav;

@@ -7,11 +7,11 @@
 #include <limits>
 #include <vector>
 
-#include "cases.hpp"
 #include "gsnav/detail/nav/step_batch.hpp"
 #include "ops/backends.hpp"
 #include "step_oracle.hpp"
 #include "step_scene.hpp"
+#include "support/random_cases.hpp"
 #if defined(GSNAV_HAS_CUDA)
 #include "gsnav/backends/cuda.hpp"
 #include "ops/no_gpu.hpp"

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <limits>
 
-#include "cases.hpp"
 #include "gsnav/detail/core/small_vector.hpp"
 #include "io/allocations.hpp"
 #include "step_oracle.hpp"
+#include "support/random_cases.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <limits>
 
-#include "cases.hpp"
 #include "meshes.hpp"
 #include "step_oracle.hpp"
+#include "support/random_cases.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <limits>
 
-#include "cases.hpp"
 #include "deepening.hpp"
 #include "step_oracle.hpp"
+#include "support/random_cases.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

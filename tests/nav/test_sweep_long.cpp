@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <limits>
 
-#include "cases.hpp"
 #include "deepening.hpp"
 #include "gsnav/sweep/capsule.hpp"
+#include "support/random_cases.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

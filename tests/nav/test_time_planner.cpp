@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "cases.hpp"
 #include "gsnav/detail/nav/time_planner.hpp"
 #include "step_oracle.hpp"
+#include "support/random_cases.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;

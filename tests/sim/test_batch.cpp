@@ -10,9 +10,9 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/sim/basic_batch.hpp"
-#include "nav/cases.hpp"
 #include "same_bits.hpp"
 #include "sim_scene.hpp"
+#include "support/random_cases.hpp"
 #include "support/sanitized.hpp"
 #include "wandering.hpp"
 

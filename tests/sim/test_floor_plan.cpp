@@ -11,8 +11,8 @@
 #include "gsnav/demo.hpp"
 #include "gsnav/detail/core/pool_backend.hpp"
 #include "gsnav/nav.hpp"
-#include "nav/cases.hpp"
 #include "sim/plan_floor.hpp"
+#include "support/random_cases.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
