@@ -54,6 +54,10 @@ echo "Configuring the preset $preset in $build"
 cmake -S "$root" --preset "$preset" "${options[@]}"
 echo "Building, $jobs at a time"
 cmake --build "$build" -j "$jobs"
+# Tests write many small files. In memory, no test waits for the disk.
+if [[ -z ${TMPDIR:-} && -w /dev/shm && $(df --output=avail -k /dev/shm | tail -n 1) -gt 2000000 ]]; then
+  export TMPDIR=/dev/shm
+fi
 echo "Testing"
 cd "$root"
 exec ctest --preset "$preset" -j "$jobs" --no-label-summary "$@"

@@ -37,7 +37,11 @@ class TempFolder {
 
 // File contents are std::string here: easy to write down, cut and compare.
 
+/// Replaces a file. A new one is made, because ext4 writes one that is cut and filled anew to the disk
+/// at once.
 inline void write_file(const std::filesystem::path& path, const std::string& content) {
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(path, ignored)) std::filesystem::remove(path, ignored);
   std::ofstream(path, std::ios::binary) << content;
 }
 
