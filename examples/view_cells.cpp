@@ -15,9 +15,9 @@ int main(int argc, char** argv) try {
   auto flat = gsnav::default_simulator_scene(0, 1, 0.2).value();
   gsnav::SceneAsset& asset = flat.assets[0];
   const std::size_t rows = asset.cloud->size();
-  // Once for each scene: look around from places all over the floor, and keep for each cell of 1 m which
-  // Gaussians are seen from there. For files, gsnav-navmesh --visible-sets does it.
-  gsnav::VisibleSettings settings{.cell = 1.0, .margin = 0.5};
+  // Once for each scene: look around from places all over the floor, and keep for each cell of 1.5 m
+  // which Gaussians are seen from there. For files, gsnav-navmesh --visible-sets does it.
+  gsnav::VisibleSettings settings{.cell = 1.5, .margin = 0.5};
   const double heights[] = {1.5};  // of the cameras, metres
   auto places = gsnav::navmesh_viewpoints(*flat.navmesh, heights, settings.spacing()).value();
   auto cells = std::make_shared<const gsnav::VisibleSets>(
