@@ -10,7 +10,7 @@ if(NOT "${_answer--libs}" STREQUAL "" OR NOT "${_answer--modversion}" STREQUAL "
 endif()
 separate_arguments(_cflags UNIX_COMMAND "${_answer--cflags}")
 file(MAKE_DIRECTORY "${WORK}")
-execute_process(COMMAND "${CXX}" -std=c++20 -O1 ${_cflags} "${MAIN}" -o "${WORK}/consumer"
+execute_process(COMMAND "${CXX}" -std=c++20 ${_cflags} "${MAIN}" -o "${WORK}/consumer"
                 COMMAND_ERROR_IS_FATAL ANY)
 execute_process(COMMAND "${WORK}/consumer" COMMAND_ERROR_IS_FATAL ANY)
 
