@@ -17,28 +17,28 @@ namespace fs = std::filesystem;
 using detail::invalid_file;
 
 /// Version of the result of build_visible_sets: increase it with every change.
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kVisibleVersion = 2;
 
 /// Start of the file. Keys, ends and bits follow.
-struct Header {
+struct VisibleHeader {
   detail::CacheFront front;
   double cell, focal, near_plane, near_sigma, min_weight;
   std::uint64_t viewpoints, cells, chunks;  ///< chunks: those of the cloud.
   std::uint64_t words;                      ///< Number of words of all cells.
   std::uint64_t checksum;                   ///< Checksum of the numbers above and of the arrays.
 };
-static_assert(sizeof(Header) == 112);
+static_assert(sizeof(VisibleHeader) == 112);
 
 /// Hash of the cloud without its colours, and of the version.
 Hasher hash_of(const GaussianCloud& cloud) {
   Hasher h;
-  h.value(kVersion);
+  h.value(kVisibleVersion);
   hash_shapes(h, cloud);
   return h;
 }
 
 detail::CacheFront front_of(const GaussianCloud& cloud) {
-  return {"GSNAVVIS", kVersion, sizeof(Header), hash_of(cloud)};
+  return {"GSNAVVIS", kVisibleVersion, sizeof(VisibleHeader), hash_of(cloud)};
 }
 
 std::uint64_t checksum(const VisibleSets& v) {
@@ -109,7 +109,7 @@ Status check(const fs::path& path, const VisibleSets& v, std::size_t cloud_rows)
 
 Status save_visible_sets(const fs::path& path, const VisibleSets& sets, const GaussianCloud& cloud) {
   return detail::guarded(path.string(), [&]() -> Status {
-    Header header{};
+    VisibleHeader header{};
     header.front = front_of(cloud);
     header.cell = sets.cell;
     header.focal = sets.focal;
@@ -133,7 +133,7 @@ Status save_visible_sets(const fs::path& path, const VisibleSets& sets, const Ga
 Result<VisibleSets> load_visible_sets(const fs::path& path, const GaussianCloud& cloud) {
   return detail::guarded(path.string(), [&]() -> Result<VisibleSets> {
     detail::RandomFile file;
-    Header header{};
+    VisibleHeader header{};
     if (Status s = open_cache(path, front_of(cloud), "file of visible sets", file, header); !s) return s;
     // Allocate no more than the size of the file.
     VisibleSets v;

@@ -12,14 +12,14 @@ constexpr double kLevel = 0.984807753012208;  // Cosine of 10 degrees.
 constexpr double kLeastArea = 1e-6;           // m². Smaller areas are rounding errors.
 constexpr double kLeastGap = 1e-6;            // Metres. Rounding error of a mean height.
 
-struct Piece {
+struct LevelPiece {
   double height = 0, area = 0;
 };
 
 }  // namespace
 
 std::vector<NavLevel> find_levels(const NavMesh& mesh, const LevelOptions& options) {
-  std::vector<Piece> pieces;
+  std::vector<LevelPiece> pieces;
   for (const std::array<Vec3d, 3>& t : mesh.triangles()) {
     const Vec3d n = cross(t[1] - t[0], t[2] - t[0]);
     const double twice = norm(n);
@@ -28,7 +28,7 @@ std::vector<NavLevel> find_levels(const NavMesh& mesh, const LevelOptions& optio
     }
   }
   std::sort(pieces.begin(), pieces.end(),
-            [](const Piece& a, const Piece& b) { return a.height < b.height; });
+            [](const LevelPiece& a, const LevelPiece& b) { return a.height < b.height; });
   std::vector<NavLevel> levels;
   for (;;) {
     // Window of twice `band` with the largest area.
@@ -46,7 +46,7 @@ std::vector<NavLevel> find_levels(const NavMesh& mesh, const LevelOptions& optio
     }
     if (!(best.area >= max(options.min_area, kLeastArea))) break;
     levels.push_back(best);
-    std::erase_if(pieces, [&](const Piece& p) {
+    std::erase_if(pieces, [&](const LevelPiece& p) {
       const double off = std::abs(p.height - best.height);
       return off < max(options.min_gap, kLeastGap) || off <= options.band;
     });

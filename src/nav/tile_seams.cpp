@@ -11,7 +11,7 @@
 namespace gsnav::detail {
 namespace {
 
-constexpr double kSame = 1e-3;  // Metres. Vertices of two tiles that are closer coincide.
+constexpr double kSamePlace = 1e-3;  // Metres. Vertices of two tiles that are closer coincide.
 
 using Triangle = PolyMesh::Corners;
 using Points = std::vector<std::uint32_t>;  // Indices into the mesh's points.
@@ -26,7 +26,7 @@ class Line {
   double length() const noexcept { return length_; }
   double along(const Vec3d& p) const noexcept { return (p.x - a_.x) * dx_ + (p.z - a_.z) * dz_; }
   bool has(const Vec3d& p) const noexcept {
-    return std::abs((p.x - a_.x) * dz_ - (p.z - a_.z) * dx_) <= kSame;
+    return std::abs((p.x - a_.x) * dz_ - (p.z - a_.z) * dx_) <= kSamePlace;
   }
 
  private:
@@ -66,7 +66,7 @@ class Seams {
         const PolyId q = m_.neighbours[poly.first + k];
         if (q == kNoPoly || q < p || tile_of_[q] == tile_of_[p]) continue;
         const Line line(m_.corner(poly, k), m_.corner(poly, k + 1));
-        if (line.length() > kSame) f(p, q, line);
+        if (line.length() > kSamePlace) f(p, q, line);
       }
     }
   }
@@ -131,7 +131,7 @@ class Seams {
   /// is none.
   const Vec3d* nearest(const Vec3d& v, const Points& list) const noexcept {
     const Vec3d* best = nullptr;
-    double least = kSame;
+    double least = kSamePlace;
     for (const std::uint32_t point : list) {
       const Vec3d& u = m_.points[point];
       const double apart = std::hypot(u.x - v.x, u.z - v.z);
@@ -149,7 +149,7 @@ class Seams {
       for (const std::uint32_t point : t) {
         const Vec3d& v = m_.points[point];
         const double at = line.along(v);
-        if (!line.has(v) || at < -kSame || at > line.length() + kSame) continue;
+        if (!line.has(v) || at < -kSamePlace || at > line.length() + kSamePlace) continue;
         const auto same = [&](std::uint32_t other) { return m_.points[other] == v; };
         if (std::none_of(out.begin(), out.end(), same)) out.push_back(point);
       }
@@ -175,7 +175,7 @@ class Seams {
         const std::uint32_t a = t[e], b = t[(e + 1) % 3];
         if (!line.has(m_.points[a]) || !line.has(m_.points[b])) continue;
         const double s = line.along(m_.points[a]), u = line.along(m_.points[b]);
-        if (!(min(s, u) + kSame < at && at < max(s, u) - kSame)) continue;
+        if (!(min(s, u) + kSamePlace < at && at < max(s, u) - kSamePlace)) continue;
         const Triangle first{a, v, t[(e + 2) % 3]}, rest{v, b, t[(e + 2) % 3]};
         t = first;
         extra_[id].push_back(rest);

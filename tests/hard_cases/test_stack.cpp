@@ -31,9 +31,9 @@ GaussianCloud layers(const std::vector<double>& opacities, std::uint64_t seed = 
 }
 
 /// The blend at the axis in long double from the stored opacities, nearest first.
-struct Blend {
+struct StackBlend {
   Real red = 0, transmittance = 1, depth = 0;
-  Blend(const GaussianCloud& cloud, double max_alpha, double transmittance_min, bool exclusive) {
+  StackBlend(const GaussianCloud& cloud, double max_alpha, double transmittance_min, bool exclusive) {
     for (std::size_t i = cloud.size(); i-- > 0;) {
       const Real alpha = std::min<Real>(cloud.opacities[i], static_cast<Real>(max_alpha));
       if (alpha * 255 < 1) continue;
@@ -92,7 +92,7 @@ TEST_CASE("N42_saturation_stop") {
       RenderConfig config = all_outputs();
       config.quality.max_alpha = row.max_alpha;
       config.compat = compat;
-      const Blend truth(cloud, row.max_alpha, 1e-4, compat != Compat::none);
+      const StackBlend truth(cloud, row.max_alpha, 1e-4, compat != Compat::none);
       if (compat == Compat::none) {
         REQUIRE(truth.transmittance < 1e-4L);
       } else {
@@ -119,7 +119,7 @@ TEST_CASE("normalize_closed: a closed pixel is divided by its alpha, an open one
   for (const Row& row :
        {Row{{0.6, 0.6, 0.6, 0.9}, true}, Row{{0.95, 0.9}, true}, Row{{0.6, 0.7}, false}}) {
     const GaussianCloud cloud = layers(row.opacities, 421);
-    const Blend truth(cloud, 0.99, 0.1, false);
+    const StackBlend truth(cloud, 0.99, 0.1, false);
     REQUIRE((truth.transmittance < 0.1L) == row.closes);
     const Real scale = row.closes ? 1 / (1 - truth.transmittance) : 1;
     const Real through = row.closes ? 0 : truth.transmittance;
@@ -139,7 +139,7 @@ TEST_CASE("normalize_closed: a closed pixel is divided by its alpha, an open one
     // The rules of other renderers have no such step.
     config.compat = Compat::inria;
     config.background = {};
-    const Blend theirs(cloud, 0.99, 0.1, true);
+    const StackBlend theirs(cloud, 0.99, 0.1, true);
     on_axis(cloud, config, [&](double alpha, double red, const auto&) {
       CHECK(std::abs(alpha - static_cast<double>(1 - theirs.transmittance)) < 1e-6);
       CHECK(std::abs(red - static_cast<double>(theirs.red)) < 1e-6);
@@ -201,7 +201,7 @@ TEST_CASE("N43_faint_fog") {
   // From 0.00393 on they count, and add up.
   for (const double faint : {0.00393, 0.004, 0.01}) {
     const GaussianCloud cloud = layers(std::vector<double>(500, faint), 43);
-    const Blend truth(cloud, 0.99, 1e-4, false);
+    const StackBlend truth(cloud, 0.99, 1e-4, false);
     on_axis(cloud, all_outputs(), [&](double alpha, double red, const auto&) {
       check(alpha, 1 - truth.transmittance);
       check(red, truth.red);
@@ -219,7 +219,7 @@ TEST_CASE("N44_deep_stack") {
     CAPTURE(stop);
     RenderConfig config = all_outputs();
     config.quality.transmittance_min = stop;
-    const Blend truth(cloud, 0.99, stop, false);
+    const StackBlend truth(cloud, 0.99, stop, false);
     double worst = 0, worst_depth = 0;
     render_everywhere({&cloud}, axis_camera(kSize, 64), config, [&](const auto& f, const auto&) {
       const double alpha = static_cast<double>(f.alpha[kMiddle]),

@@ -19,21 +19,21 @@ const std::string kOne =
     R"({"id":0,"img_name":"a","width":1280,"height":960,"position":[1,2,3],
         "rotation":[[0,0,1],[-1,0,0],[0,-1,0]],"fx":800,"fy":700})";
 
-Result<std::vector<Camera>> parse(const std::string& text, int width = 0, int height = 0) {
+Result<std::vector<Camera>> parse_cameras(const std::string& text, int width = 0, int height = 0) {
   TempFolder folder("cameras");
   write_file(folder / "cameras.json", text);
   return io::load_cameras(folder / "cameras.json", width, height);
 }
 
 void check_fails(const std::string& from, const std::string& to, const std::string& part) {
-  check_refused(parse("[" + kOne + "," + replaced(kOne, from, to) + "]"), Errc::invalid_file,
+  check_refused(parse_cameras("[" + kOne + "," + replaced(kOne, from, to) + "]"), Errc::invalid_file,
                 "cameras.json: camera 1", part);
 }
 
 }  // namespace
 
 TEST_CASE("cameras: pose and intrinsics") {
-  const Camera c = parse("[" + kOne + "]").value()[0];
+  const Camera c = parse_cameras("[" + kOne + "]").value()[0];
   CHECK(c.width == 1280);
   CHECK(c.height == 960);
   CHECK(c.fx == 800);
@@ -46,11 +46,11 @@ TEST_CASE("cameras: pose and intrinsics") {
   CHECK(std::fabs(p.x - 0.5) < 1e-12);
   CHECK(std::fabs(p.y - 0.25) < 1e-12);
   CHECK(std::fabs(p.z - 5) < 1e-12);
-  CHECK(parse("[]").value().empty());
+  CHECK(parse_cameras("[]").value().empty());
 }
 
 TEST_CASE("cameras: another size keeps the horizontal field of view") {
-  const Camera c = parse("[" + kOne + "]", 320, 320).value()[0];
+  const Camera c = parse_cameras("[" + kOne + "]", 320, 320).value()[0];
   CHECK(c.width == 320);
   CHECK(c.height == 320);
   CHECK(c.fx == 200);
@@ -58,7 +58,7 @@ TEST_CASE("cameras: another size keeps the horizontal field of view") {
   CHECK(c.cx == 160);
   CHECK(c.cy == 160);
   for (const auto& [w, h] : {std::pair{320, 0}, {0, 240}, {-1, -1}, {70000, 10}}) {
-    CHECK(parse("[" + kOne + "]", w, h).code() == Errc::invalid_argument);
+    CHECK(parse_cameras("[" + kOne + "]", w, h).code() == Errc::invalid_argument);
   }
 }
 
@@ -81,7 +81,7 @@ TEST_CASE("cameras: errors name the camera and the field") {
   check_fails("\"rotation\"", "\"rot\"", "'rotation' is missing");
   for (const char* text : {"", "{", "{}", "7", "[7]", "[[]]", "[null]"}) {
     CAPTURE(text);
-    CHECK(parse(text).code() == Errc::invalid_file);
+    CHECK(parse_cameras(text).code() == Errc::invalid_file);
   }
   CHECK(io::load_cameras("/none/cameras.json").code() == Errc::file_not_found);
 }

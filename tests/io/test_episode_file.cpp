@@ -35,7 +35,7 @@ const std::string kOne =
     R"("goals":[{"position":[4,2.5,-1],"radius":0.36}],"info":{"geodesic_distance":3.75,"difficulty":"easy"},)"
     R"("shortest_paths":null,"start_room":null})";
 
-Result<io::EpisodeFile> parse(const std::string& text) {
+Result<io::EpisodeFile> parse_episodes(const std::string& text) {
   TempFolder folder("episodes");
   write_file(folder / "val.json", text);
   return io::load_episodes(folder / "val.json");
@@ -56,7 +56,7 @@ void check_first(const PointNavEpisode& e, double radius) {
 }  // namespace
 
 TEST_CASE("episodes of Habitat-Lab are read, their quaternions turned round") {
-  const auto file = parse("{\"episodes\":[" + kOne + "]}").value();
+  const auto file = parse_episodes("{\"episodes\":[" + kOne + "]}").value();
   REQUIRE(file.episodes.size() == 1);
   check_first(file.episodes[0], 0.36);
   CHECK(file.episodes[0].scene_id == "hm3d/flat.basis.glb");
@@ -129,7 +129,7 @@ TEST_CASE("keys that change nothing are reported once") {
   std::string more = kOne;
   more.replace(more.find("\"start_room\""), 12, "\"weather\":\"rain\",\"start_room\"");
   const std::string two = "[" + more + "," + more + "]";
-  const auto file = parse("{\"episodes\":" + two + "}").value();
+  const auto file = parse_episodes("{\"episodes\":" + two + "}").value();
   REQUIRE(file.warnings.size() == 1);
   CHECK(contains(file.warnings[0], "weather"));
 }
@@ -139,7 +139,7 @@ TEST_CASE("bad episodes are named with file, episode and key") {
     std::string bad = kOne;
     REQUIRE(contains(bad, from));
     bad.replace(bad.find(from), from.size(), to);
-    const auto result = parse("{\"episodes\":[" + kOne + "," + bad + "]}");
+    const auto result = parse_episodes("{\"episodes\":[" + kOne + "," + bad + "]}");
     CAPTURE(result.message());
     CHECK(result.code() == Errc::invalid_file);
     CHECK(contains(result.message(), "val.json: episodes[1]"));
@@ -153,10 +153,10 @@ TEST_CASE("bad episodes are named with file, episode and key") {
   check_fails("\"radius\":0.36", "\"radius\":\"big\"", "radius");
   check_fails("3.75", "\"far\"", "geodesic_distance");
   check_fails("\"7\"", "[7]", "episode_id");
-  CHECK(contains(parse("{}").message(), "'episodes' is missing"));
-  CHECK(contains(parse("[]").message(), "must be an object"));
-  CHECK(contains(parse("{\"episodes\":7}").message(), "must be an array"));
-  CHECK(contains(parse("{\"episodes\":[").message(), "not valid JSON"));
+  CHECK(contains(parse_episodes("{}").message(), "'episodes' is missing"));
+  CHECK(contains(parse_episodes("[]").message(), "must be an object"));
+  CHECK(contains(parse_episodes("{\"episodes\":7}").message(), "must be an array"));
+  CHECK(contains(parse_episodes("{\"episodes\":[").message(), "not valid JSON"));
   CHECK(io::load_episodes("nowhere.json").code() == Errc::file_not_found);
   CHECK(io::save_episodes("no/such/folder/x.json", {}).code() == Errc::file_not_found);
 }

@@ -39,10 +39,10 @@ Result<io::LoadedMotion> load_clip(const std::string& text, const io::BvhOptions
 }
 
 using Real = long double;
-using Matrix = std::array<std::array<Real, 4>, 4>;
+using Matrix4 = std::array<std::array<Real, 4>, 4>;
 
-Matrix times(const Matrix& a, const Matrix& b) {
-  Matrix c{};
+Matrix4 times(const Matrix4& a, const Matrix4& b) {
+  Matrix4 c{};
   for (std::size_t i = 0; i < 4; ++i) {
     for (std::size_t j = 0; j < 4; ++j) {
       for (std::size_t k = 0; k < 4; ++k) c[i][j] += a[i][k] * b[k][j];
@@ -51,12 +51,12 @@ Matrix times(const Matrix& a, const Matrix& b) {
   return c;
 }
 
-Matrix moved(Real x, Real y, Real z) {
+Matrix4 moved(Real x, Real y, Real z) {
   return {{{1, 0, 0, x}, {0, 1, 0, y}, {0, 0, 1, z}, {0, 0, 0, 1}}};
 }
 
 /// Rotation about 'X', 'Y' or 'Z', by the textbook.
-Matrix turned(char axis, Real degrees) {
+Matrix4 turned(char axis, Real degrees) {
   const Real a = degrees * std::acos(Real{-1}) / 180, c = std::cos(a), s = std::sin(a);
   if (axis == 'X') return {{{1, 0, 0, 0}, {0, c, -s, 0}, {0, s, c, 0}, {0, 0, 0, 1}}};
   if (axis == 'Y') return {{{c, 0, s, 0}, {0, 1, 0, 0}, {-s, 0, c, 0}, {0, 0, 0, 1}}};
@@ -75,16 +75,16 @@ TEST_CASE("bvh: kinematics against matrices in long double") {
                          {1, 2, 3, -10, -200, 30, -40, 150, -60, 70}};
   for (std::size_t t = 0; t < 2; ++t) {
     // The first frame's place is nearer to zero than to the OFFSET, so places are added to it.
-    const Matrix hips =
+    const Matrix4 hips =
         times(times(times(moved(1 + f[t][0], 2 + f[t][2], 3 + f[t][1]), turned('Y', f[t][3])),
                     turned('X', f[t][4])),
               turned('Z', f[t][5]));
-    const Matrix arm =
+    const Matrix4 arm =
         times(times(times(times(hips, moved(0, 5, 0)), turned('Z', f[t][6])), turned('X', f[t][7])),
               turned('Y', f[t][8]));
-    const Matrix hand = times(times(arm, moved(-4, 0, 0.5L)), turned('Y', f[t][9]));
+    const Matrix4 hand = times(times(arm, moved(-4, 0, 0.5L)), turned('Y', f[t][9]));
     const auto globals = pose_at(m, 0.05 * static_cast<double>(t));
-    const Matrix* truth[3] = {&hips, &arm, &hand};
+    const Matrix4* truth[3] = {&hips, &arm, &hand};
     for (std::size_t j = 0; j < 3; ++j) {
       for (std::size_t i = 0; i < 3; ++i) {
         const int row = static_cast<int>(i);

@@ -12,7 +12,7 @@ using namespace gsnav_test;
 
 namespace {
 
-PlyFile small_ply(int rest = 0) {
+PlyFile ply_with_rest(int rest = 0) {
   PlyFile file;
   file.properties = inria_properties(rest);
   file.rows = random_rows(5, rest, 11);
@@ -27,7 +27,7 @@ void check_ply_fails(const std::string& text, Errc code, const std::string& part
 
 TEST_CASE("ply: cut off anywhere") {
   for (const char* format : {"binary_little_endian", "binary_big_endian"}) {
-    PlyFile file = small_ply(9);
+    PlyFile file = ply_with_rest(9);
     file.format = format;
     const std::string text = file.text();
     const std::size_t header = file.header().size(), stride = (text.size() - header) / 5;
@@ -42,7 +42,7 @@ TEST_CASE("ply: cut off anywhere") {
 }
 
 TEST_CASE("ply: ascii cut off, words that are no numbers") {
-  PlyFile file = small_ply();
+  PlyFile file = ply_with_rest();
   file.format = "ascii";
   const std::string text = file.text();
   const std::size_t third = text.find('\n', text.find('\n', file.header().size()) + 1) + 1;
@@ -54,7 +54,7 @@ TEST_CASE("ply: ascii cut off, words that are no numbers") {
 TEST_CASE("ply: a count in the header is not trusted with memory") {
   for (const char* format : {"binary_little_endian", "ascii"}) {
     for (const char* count : {"1000000000", "18446744073709551615", "9223372036854775807", "6"}) {
-      PlyFile file = small_ply(45);
+      PlyFile file = ply_with_rest(45);
       file.format = format;
       file.count = count;
       const std::string text = file.text();
@@ -63,7 +63,7 @@ TEST_CASE("ply: a count in the header is not trusted with memory") {
       CHECK(largest_allocation() < 300000);
     }
   }
-  PlyFile lists = small_ply();
+  PlyFile lists = ply_with_rest();
   lists.before_header = "element face 18446744073709551615\nproperty list uint int a\n";
   lists.before_rows = std::string("\xff\xff\xff\xff", 4);
   reset_largest_allocation();
@@ -73,7 +73,7 @@ TEST_CASE("ply: a count in the header is not trusted with memory") {
 }
 
 TEST_CASE("ply: a list of negative length") {
-  PlyFile file = small_ply();
+  PlyFile file = ply_with_rest();
   file.before_header = "element face 1\nproperty list char uchar a\n";
   file.before_rows = "\xff";
   check_ply_fails(file.text(), Errc::invalid_file, "'face' promises 1 rows, 0 are there");
@@ -82,7 +82,7 @@ TEST_CASE("ply: a list of negative length") {
 TEST_CASE("ply: each property that must be there is named") {
   for (const char* name : {"x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1",
                            "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"}) {
-    PlyFile file = small_ply();
+    PlyFile file = ply_with_rest();
     std::erase_if(file.properties, [&](const auto& p) { return p.first == name; });
     check_ply_fails(file.text(), Errc::invalid_file, std::string("no property '") + name + "'");
   }
@@ -90,16 +90,16 @@ TEST_CASE("ply: each property that must be there is named") {
 
 TEST_CASE("ply: numbers of f_rest that fit no degree") {
   for (const int rest : {1, 3, 8, 10, 15, 44, 46, 48, 71, 73, 105}) {
-    PlyFile file = small_ply(rest);
+    PlyFile file = ply_with_rest(rest);
     check_ply_fails(file.text(), Errc::invalid_file, std::to_string(rest) + " properties f_rest_*");
   }
-  PlyFile gap = small_ply(9);
+  PlyFile gap = ply_with_rest(9);
   for (auto& [name, type] : gap.properties) name = name == "f_rest_4" ? "f_rest_9" : name;
   check_ply_fails(gap.text(), Errc::invalid_file, "f_rest_4");
 }
 
 TEST_CASE("ply: headers that make no sense") {
-  PlyFile file = small_ply();
+  PlyFile file = ply_with_rest();
   const std::string text = file.text();
   const auto with = [&](const std::string& from, const std::string& to) {
     std::string out = text;

@@ -31,7 +31,7 @@ std::vector<PlyRow> moderate_rows(std::size_t n, int rest, unsigned seed) {
   return rows;
 }
 
-constexpr int kRest[] = {0, 9, 24, 45};
+constexpr int kRestOfDegree[] = {0, 9, 24, 45};
 
 }  // namespace
 
@@ -59,7 +59,7 @@ TEST_CASE("save_spz: every field within half a step") {
   TempFolder folder("save_spz");
   for (int degree = 0; degree <= 3; ++degree) {
     CAPTURE(degree);
-    const int rest = kRest[degree];
+    const int rest = kRestOfDegree[degree];
     const std::vector<PlyRow> rows = moderate_rows(200, rest, 52);
     GaussianCloud cloud = cloud_of(rows, rest);
     cloud.filter = degree == 1 ? Filter::mip : Filter::classic;
@@ -127,7 +127,7 @@ TEST_CASE("save_compressed_ply: every field within half a step of its chunk") {
   TempFolder folder("save_compressed_ply");
   for (int degree = 0; degree <= 3; ++degree) {
     CAPTURE(degree);
-    const int rest = kRest[degree];
+    const int rest = kRestOfDegree[degree];
     std::vector<PlyRow> rows = moderate_rows(600, rest, 55);
     for (PlyRow& row : rows) row["f_dc_0"] *= 3;  // ranges of colour reach beyond [0, 1]
     GaussianCloud cloud = cloud_of(rows, rest);
