@@ -5,6 +5,7 @@
 // retargeted to their skeletons. Link gsnav::rigging.
 
 #include "gsnav/avatar.hpp"
+#include "gsnav/detail/rigging/body_levels.hpp"
 #include "gsnav/detail/rigging/capsule_fit.hpp"
 #include "gsnav/detail/rigging/capsule_volume.hpp"
 #include "gsnav/detail/rigging/clip_walk.hpp"

@@ -57,6 +57,10 @@ bool AvatarActor::active(double t) const noexcept {
   return blending(t) ? within(blend_begin()) && within(0.0) : within(t);
 }
 
+Result<AvatarActor> AvatarActor::with_body(std::shared_ptr<const AvatarAsset> body) const {
+  return create(std::move(body), motion_, trajectory_, options_);
+}
+
 Result<AvatarActor> AvatarActor::looped(double period, double blend) const {
   ActorOptions options = options_;
   options.loop_period = period;
@@ -69,10 +73,11 @@ Similarity AvatarActor::placement(double t) const {
   return placement(t, pose);
 }
 
-void AvatarActor::joint_globals(double t, std::vector<Affine3<double>>& out) const {
-  LocalPose pose;
-  placement(t, pose);
+Similarity AvatarActor::joint_globals(double t, std::vector<Affine3<double>>& out) const {
+  thread_local LocalPose pose;
+  const Similarity world = placement(t, pose);
   forward_kinematics(asset_->skeleton, pose, out);
+  return world;
 }
 
 void AvatarActor::joint_matrices(double t, std::vector<Affine3<double>>& out) const {

@@ -116,6 +116,20 @@ Status AvatarAsset::validate() const {
       return bad("capsule " + std::to_string(c) + " names no joint or is not finite");
     }
   }
+  for (std::size_t l = 0; l < levels.size(); ++l) {
+    const AvatarLevel& level = levels[l];
+    const std::string at = "levels[" + std::to_string(l) + "]";
+    if (level.body == nullptr || level.body->skeleton.size() != joints || !level.body->levels.empty()) {
+      return bad(at + ".body is null, has levels, or has another skeleton");
+    }
+    if (level.body->skinning != skinning) return bad(at + ".body has another kind of skinning");
+    if (!(level.error >= (l == 0 ? 0 : levels[l - 1].error)) || !is_finite(level.error) ||
+        !(level.grain >= 0) || !is_finite(level.grain)) {
+      return bad(at + ": its error is less than that of the level before, or it is not finite");
+    }
+    if (Status s = level.body->validate(); !s) return bad(at + ".body: " + s.message());
+  }
+  if (levels.size() > kMostLevels) return bad("more than " + std::to_string(kMostLevels) + " levels");
   if (!idle.rotations.empty() &&
       (idle.rotations.size() != joints || idle.translations.size() != joints)) {
     return bad("idle has another number of joints than the skeleton");

@@ -8,8 +8,18 @@
 
 namespace gsnav {
 
-BodyBounds::BodyBounds(const AvatarAsset& asset) : reach_(asset.skeleton.size(), -1.0) {
+BodyBounds::BodyBounds(const AvatarAsset& asset, bool with_levels)
+    : reach_(asset.skeleton.size(), -1.0) {
   const auto inverse = asset.skeleton.bind_inverses();
+  add(asset, inverse);
+  if (with_levels) {
+    for (const AvatarLevel& level : asset.levels) add(*level.body, inverse);
+  }
+  if (asset.skinning == Skinning::linear_stretched)
+    scale_ *= static_cast<float>(kGreatestStretch * (1 + 1e-5));
+}
+
+void BodyBounds::add(const AvatarAsset& asset, const std::vector<Affine3<double>>& inverse) {
   const std::size_t row = static_cast<std::size_t>(asset.influences);
   for (std::size_t i = 0; i < asset.size(); ++i) {
     const Vec3d p = asset.cloud.mean(i);
@@ -25,8 +35,6 @@ BodyBounds::BodyBounds(const AvatarAsset& asset) : reach_(asset.skeleton.size(),
     for (const auto& s : asset.cloud.scales) scale_ = max(scale_, s[i]);
     opacity_ = max(opacity_, asset.cloud.opacities[i]);
   }
-  if (asset.skinning == Skinning::linear_stretched)
-    scale_ *= static_cast<float>(kGreatestStretch * (1 + 1e-5));
 }
 
 ChunkBounds BodyBounds::at(const std::vector<Affine3<double>>& joints) const noexcept {

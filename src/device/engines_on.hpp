@@ -25,6 +25,7 @@ class RendererOn final : public RendererEngine {
              const RenderOptions& options)
       : backend_(std::move(backend)),
         scene_(*backend_, std::move(scene), options.detail),
+        skinning_(*backend_),
         images_(*backend_),
         light_(scene_.meshes().light) {
     set_config(options.render);
@@ -37,7 +38,8 @@ class RendererOn final : public RendererEngine {
     if (Status s = BasicRenderer<float, B>::size_frames(cameras, config_.outputs, out); !s) return s;
     scene_.make_slots(1);
     if (Status s = scene_.prepare(0, time, cameras, config_); !s) return s;
-    if (Status s = scene_.pose_prepared(0); !s) return s;
+    scene_.pose_prepared(0, skinning_);
+    if (Status s = skinning_.run(); !s) return s;
     requests_.clear();
     for (std::size_t c = 0; c < cameras.size(); ++c) {
       requests_.push_back({{scene_.sets(0),
@@ -45,7 +47,8 @@ class RendererOn final : public RendererEngine {
                             &config_,
                             BasicRenderer<float, B>::images_of(out, c),
                             {scene_.meshes().instances, light_}},
-                           scene_.detail()});
+                           scene_.detail(),
+                           scene_.bodies(0)});
     }
     if (Status s = images_.render(requests_, ImageMemory::host); !s) return s;
     std::copy(images_.stats().begin(), images_.stats().end(), out.stats.begin());
@@ -55,6 +58,7 @@ class RendererOn final : public RendererEngine {
  private:
   std::unique_ptr<B> backend_;
   SceneOnBackend<B> scene_;
+  SkinningBatch<B> skinning_;
   ImageRenderer<B> images_;
   MeshLight light_;
   RenderConfig config_;

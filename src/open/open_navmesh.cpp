@@ -2,14 +2,19 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <map>
+#include <memory>
 #include <utility>
+#include <vector>
 
 #include "gsnav/core/lower_case.hpp"
+#include "gsnav/detail/core/pool_backend.hpp"
 #include "gsnav/detail/demo/people.hpp"
 #include "gsnav/detail/io/visible_file.hpp"
 #include "gsnav/detail/nav/gaussian_navmesh.hpp"
 #include "gsnav/detail/nav/navmesh_file.hpp"
 #include "gsnav/detail/nav/viewpoints.hpp"
+#include "gsnav/detail/rigging/body_levels.hpp"
 #include "gsnav/detail/scene/visible_settings.hpp"
 #include "gsnav/device/renderer.hpp"
 #include "gsnav/scene/prepare.hpp"
@@ -90,6 +95,41 @@ Result<NavMesh> build(OpeningScene& s, const NavMeshChoice& choice, double radiu
   return std::move(built->mesh);
 }
 
+/// Builds levels of detail of the people's bodies that have none, if levels were asked for. Bodies with
+/// stretched skinning stay without.
+Status add_body_levels(OpeningScene& s) {
+  if (s.options.levels == SceneLevels::none) return {};
+  struct Body {
+    std::shared_ptr<const AvatarAsset> asset;
+    Status status;
+  };
+  std::map<std::shared_ptr<const AvatarAsset>, std::size_t> places;
+  std::vector<Body> bodies;
+  for (const AvatarActor& a : s.scene.avatars) {
+    const auto& asset = a.asset();
+    if (!asset->levels.empty() || asset->skinning == Skinning::linear_stretched) continue;
+    if (places.emplace(asset, bodies.size()).second) bodies.push_back({asset, {}});
+  }
+  PoolBackend().parallel_for(bodies.size(), [&](std::size_t i) {
+    auto levels = body_levels(*bodies[i].asset);
+    bodies[i].status = levels.status();
+    if (!levels) return;
+    auto with_levels = std::make_shared<AvatarAsset>(*bodies[i].asset);
+    with_levels->levels = std::move(*levels);
+    bodies[i].asset = std::move(with_levels);
+  });
+  for (AvatarActor& a : s.scene.avatars) {
+    const auto at = places.find(a.asset());
+    if (at == places.end()) continue;
+    const Body& body = bodies[at->second];
+    if (!body.status) return body.status;
+    auto actor = a.with_body(body.asset);
+    if (!actor) return actor.status();
+    a = std::move(*actor);
+  }
+  return {};
+}
+
 /// Adds the people that were asked for, or else those that belong to the scene.
 Status add_people(OpeningScene& s, const std::optional<NavMeshChoice>& choice) {
   const OpenOptions& o = s.options;
@@ -99,7 +139,7 @@ Status add_people(OpeningScene& s, const std::optional<NavMeshChoice>& choice) {
     auto actors = io::load_scene_actors(s.source.avatars);
     if (!actors) return actors.status();
     s.scene.avatars = std::move(*actors);
-    return {};
+    return add_body_levels(s);
   }
   if (s.scene.navmesh == nullptr) {
     return {Errc::invalid_argument, "OpenOptions.people = " + std::to_string(o.people) +
@@ -114,7 +154,7 @@ Status add_people(OpeningScene& s, const std::optional<NavMeshChoice>& choice) {
   auto people = walking_people(wide ? *wide : *s.scene.navmesh, o.people, o.seed, o.density);
   if (!people) return people.status();
   s.scene.avatars = std::move(*people);
-  return {};
+  return add_body_levels(s);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include "flat_world.hpp"
 #include "gsnav/detail/demo/humanoid.hpp"
+#include "gsnav/detail/rigging/body_levels.hpp"
 #include "gsnav/detail/sim/scene_on_backend.hpp"
 
 namespace gsnav_test {
@@ -29,6 +30,14 @@ inline gsnav::SimulatorScene peopled_scene(int gaussians = 3000) {
   s.avatars.push_back(make_walker(body, {{3.4, 0, 3.7}, {5.4, 0, 3.0}}).value());
   s.avatars.push_back(make_walker(body, {{5.3, 0, 1.6}, {3.6, 0, 2.9}, {4.6, 0, 4.0}}).value());
   return s;
+}
+
+/// Builds levels of detail of the people, who share one body.
+inline void give_body_levels(gsnav::SimulatorScene& s) {
+  using namespace gsnav;
+  auto body = std::make_shared<AvatarAsset>(*s.avatars[0].asset());
+  body->levels = body_levels(*body).value();
+  for (AvatarActor& a : s.avatars) a = a.with_body(body).value();
 }
 
 inline gsnav::PointNavEpisode to_kitchen() {

@@ -158,7 +158,10 @@ TEST_CASE("cuda: levels of detail, and what is seen from where") {
   SUBCASE("levels of detail") { levels = true; }
   SUBCASE("visible sets") { visible = true; }
   SUBCASE("both") { levels = visible = true; }
-  if (levels) config.lod = LodChoice{};
+  if (levels) {
+    config.lod = LodChoice{};
+    give_body_levels(detailed);
+  }
   const auto there = [](std::size_t environment, std::size_t count) -> Result<BatchEpisode> {
     BatchEpisode e = wandering(environment, count).value();
     e.scene = 0;

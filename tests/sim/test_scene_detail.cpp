@@ -99,11 +99,11 @@ TEST_CASE("a simulator with levels of detail sees what the cut of its cell draws
 TEST_CASE(
     "levels of detail: a batch has the bits of single simulators, and a state those it was saved with") {
   constexpr std::size_t kEnvironments = 3;
-  SimulatorScene empty = detailed_scene();
+  SimulatorScene peopled = detailed_scene(), empty = peopled;
+  give_body_levels(peopled);
   empty.avatars.clear();
   const std::vector<std::shared_ptr<const SimulatorScene>> scenes{
-      std::make_shared<const SimulatorScene>(detailed_scene()),
-      std::make_shared<const SimulatorScene>(empty)};
+      std::make_shared<const SimulatorScene>(peopled), std::make_shared<const SimulatorScene>(empty)};
   BatchConfig config;
   config.sensors = rgbd_sensors(16, 24);
   config.sensors.push_back(config.sensors[0]);

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "batch_state.cuh"
+#include "gsnav/detail/core/host_threads.hpp"
 
 // Host side of a batch.
 
@@ -121,7 +122,7 @@ std::size_t CudaBatchRenderer::State::list_camera_sets(std::span<const GaussianS
     std::size_t place = 0;
     const auto see = [&](std::uint32_t s) {
       const auto bits = cameras[c].seen.empty() ? sets[s].selection.seen : cameras[c].seen[place++];
-      camera_sets.push_back({s, c, rank, bits});
+      camera_sets.push_back({s, c, rank, bits, 0});
       rank += static_cast<std::uint32_t>(sets[s].gaussians.size());
       ++set_begins[s + 1];
       origins += origin_count(sets[s].gaussians);
@@ -170,14 +171,19 @@ void CudaBatchRenderer::State::fill_instances(std::span<const GaussianSet> sets,
   auto* const first = at.on_host<std::uint32_t>(at.first);
   auto* const list = at.on_host<std::uint32_t>(at.list);
   auto* const offsets = at.on_host<Vec3d>(at.offsets);
-  std::size_t origin = 0;
+  std::size_t origins = 0;
   std::fill(first, first + cameras.size() + 1, 0u);
   for (std::size_t i = 0; i < camera_sets.size(); ++i) {
+    list[i] = cursors[camera_sets[i].set]++;
+    ++first[camera_sets[i].camera + 1];
+    camera_sets[i].first_origin = origins;
+    origins += origin_count(sets[camera_sets[i].set].gaussians);
+  }
+  const auto write = [&](std::size_t i) {
     const GaussianSet& set = sets[camera_sets[i].set];
     const Camera& camera = cameras[camera_sets[i].camera].camera;
-    const std::uint32_t index = cursors[camera_sets[i].set]++;
-    list[i] = index;
-    ++first[camera_sets[i].camera + 1];
+    const std::uint32_t index = list[i];
+    std::size_t origin = camera_sets[i].first_origin;
     BatchInstance instance{};
     instance.camera = camera_sets[i].camera;
     ViewedSet<float>& to = instance.args;
@@ -185,10 +191,14 @@ void CudaBatchRenderer::State::fill_instances(std::span<const GaussianSet> sets,
     to.selection.seen = camera_sets[i].bits;
     to.first_rank = camera_sets[i].first_rank;
     to.offsets = {at.on_device<Vec3d>(at.offsets) + origin, origin_count(set.gaussians)};
-    const std::size_t first_origin = origin;
     for (std::size_t o = 0; o < to.offsets.size; ++o) offsets[origin++] = origin_offset(to, o);
     std::memcpy(instances + index, &instance, sizeof instance);
-    if (plain_rules) plain[index] = plain_camera(instance, offsets[first_origin]);
+    if (plain_rules) plain[index] = plain_camera(instance, offsets[camera_sets[i].first_origin]);
+  };
+  if (camera_sets.size() < cuda::policy::Batch::kThreadedInstances) {
+    for (std::size_t i = 0; i < camera_sets.size(); ++i) write(i);
+  } else {
+    for_each_in(backend.host_threads(), camera_sets.size(), write);
   }
   for (std::size_t c = 0; c < cameras.size(); ++c) first[c + 1] += first[c];
 }

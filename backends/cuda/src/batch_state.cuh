@@ -324,6 +324,7 @@ struct CudaBatchRenderer::State {
   struct CameraSet {
     std::uint32_t set, camera, first_rank;
     View<const std::uint32_t> bits;  ///< Selection::seen.
+    std::size_t first_origin;        ///< Index of its first origin among those of all.
   };
   std::vector<CameraSet> camera_sets;  ///< Ordered by camera.
   std::vector<std::uint32_t> set_begins, cursors;

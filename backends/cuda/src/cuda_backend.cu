@@ -6,6 +6,7 @@
 
 #include "gsnav/backends/cuda/device.cuh"
 #include "gsnav/backends/cuda/pinned.hpp"
+#include "gsnav/detail/core/host_threads.hpp"
 #include "pinned_ring.cuh"
 
 namespace gsnav {
@@ -60,6 +61,7 @@ CudaBackend::CudaBackend(int device, CUstream_st* stream) : stream_(stream), dev
   std::uint64_t keep = ~std::uint64_t{0};
   need(cudaMemPoolSetAttribute(pool, cudaMemPoolAttrReleaseThreshold, &keep), "cudaMemPoolSetAttribute");
   uploads_ = std::make_unique<cuda::PinnedRing>();
+  host_threads_ = std::make_unique<ThreadPool>(threads_of_machine());
 }
 
 CudaBackend::~CudaBackend() {

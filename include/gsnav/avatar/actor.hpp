@@ -52,6 +52,8 @@ class AvatarActor {
 
   /// Whether the actor is in the scene at time t (seconds on the scene's clock, as everywhere below).
   bool active(double t) const noexcept;
+  /// The same actor with another body, such as one with levels of detail. Errors: those of create.
+  Result<AvatarActor> with_body(std::shared_ptr<const AvatarAsset> body) const;
   /// The same actor with another `loop_period` and `loop_blend` (seconds, ActorOptions). Errors: those
   /// of create.
   Result<AvatarActor> looped(double period, double blend) const;
@@ -59,8 +61,8 @@ class AvatarActor {
   /// Transform from the avatar's root frame (Y up, facing -Z, feet on y = 0) to the world.
   Similarity placement(double t) const;
 
-  /// Fills `out` with the transforms from joints to the root frame, [J], metres.
-  void joint_globals(double t, std::vector<Affine3<double>>& out) const;
+  /// Fills `out` with the transforms from joints to the root frame, [J], metres. Returns placement(t).
+  Similarity joint_globals(double t, std::vector<Affine3<double>>& out) const;
 
   /// Fills `out` with the skinning matrices, [J]: joint to root frame times inverse bind.
   void joint_matrices(double t, std::vector<Affine3<double>>& out) const;

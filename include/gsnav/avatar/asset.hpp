@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,15 @@ enum class Skinning : std::uint8_t {
   dual_quaternion,   ///< Dual quaternion blending: twisted limbs keep their width.
 };
 
+struct AvatarAsset;
+
+/// A body with fewer Gaussians, for cameras that see it small (body_levels).
+struct AvatarLevel {
+  std::shared_ptr<const AvatarAsset> body;  ///< Gaussians and weights over the same skeleton.
+  float error = 0;  ///< Distance of its Gaussians from those that they stand for, metres (LodNode).
+  float grain = 0;  ///< Size of the Gaussians of the whole body, metres (LodNode).
+};
+
 /// A body: Gaussians, skeleton, weights and capsules, shared by all actors that look alike. Immutable
 /// once built.
 struct AvatarAsset {
@@ -46,6 +56,11 @@ struct AvatarAsset {
   std::vector<float> weight_gradients;
   std::vector<ProxyCapsule> capsules;  ///< The body's shape for navigation.
   LocalPose idle;                      ///< Pose of an actor without a motion. Empty: the rest pose.
+  std::vector<AvatarLevel> levels;  ///< Levels of detail, each with fewer Gaussians than the last one.
+                                    ///< Empty: cameras always see all Gaussians.
+
+  /// Largest number of levels.
+  static constexpr std::size_t kMostLevels = 16;
 
   /// Number of Gaussians.
   std::size_t size() const noexcept { return cloud.size(); }

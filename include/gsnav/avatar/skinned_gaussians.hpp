@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -27,7 +28,11 @@ template <Backend B>
 class AvatarArrays {
  public:
   /// Uploads the asset's arrays where the backend has a memory of its own.
-  AvatarArrays(B& backend, std::shared_ptr<const AvatarAsset> asset) : asset_(std::move(asset)) {
+  /// @param with_levels whether its levels of detail are wanted too.
+  AvatarArrays(B& backend, std::shared_ptr<const AvatarAsset> asset, bool with_levels = false)
+      : asset_(std::move(asset)) {
+    for (std::size_t l = 0; with_levels && l < asset_->levels.size(); ++l)
+      levels_.push_back(std::make_shared<const AvatarArrays>(backend, asset_->levels[l].body));
     set_ = asset_->cloud.set();
     GaussianRows& v = set_.gaussians;
     args_.influences = asset_->influences;
@@ -54,6 +59,8 @@ class AvatarArrays {
 
   /// The asset.
   const std::shared_ptr<const AvatarAsset>& asset() const noexcept { return asset_; }
+  /// Arrays of its levels of detail, from the finest one. Empty if they are not wanted.
+  const std::vector<std::shared_ptr<const AvatarArrays>>& levels() const noexcept { return levels_; }
   /// The canonical Gaussians. Valid while this object lives.
   const GaussianSet& set() const& noexcept { return set_; }
   /// Deleted: the reference would point into a temporary.
@@ -67,6 +74,7 @@ class AvatarArrays {
   std::shared_ptr<const AvatarAsset> asset_;
   GaussianSet set_;
   SkinningArgs<float> args_;
+  std::vector<std::shared_ptr<const AvatarArrays>> levels_;
   std::vector<Buffer<std::uint16_t, B>> shorts_;
   std::vector<Buffer<float, B>> floats_;
 };
@@ -89,31 +97,19 @@ class SkinnedGaussians {
   /// Allocates the buffers for an asset whose arrays are shared with other actors.
   SkinnedGaussians(B& backend, std::shared_ptr<const AvatarArrays<B>> arrays)
       : backend_(&backend),
-        arrays_(std::move(arrays)),
-        bounds_(*asset()),
-        args_(arrays_->skinning()),
-        set_(arrays_->set()),
+        bounds_(*arrays->asset(), !arrays->levels().empty()),
         joints_(backend),
-        dual_joints_(backend) {
-    ShapeRows& v = set_.gaussians.shape;
-    ColorRows& color = set_.gaussians.color;
-    for (std::size_t k = 0; k < 3; ++k) v.means.set(k, args_.means_out[k] = output(v.size));
-    for (std::size_t k = 0; k < 4; ++k) {
-      v.quats.set(k, args_.quats_out[k] = output(v.size));
-      if (color.degree >= 1) color.rotations.set(k, args_.rotations_out[k] = output(v.size));
-    }
-    if (this->asset()->skinning == Skinning::linear_stretched) {
-      for (std::size_t k = 0; k < 9; ++k) v.axes.set(k, args_.axes_out[k] = output(v.size));
-    }
+        dual_joints_(backend),
+        levels_(1 + arrays->levels().size()) {
+    levels_[0].emplace(backend, std::move(arrays));
   }
 
   /// Poses the Gaussians for time t (seconds on the scene's clock). If the actor is not in the scene
   /// then, the set is empty. The Gaussians are complete after `backend.synchronize()`, which rendering
   /// calls. Error: invalid_argument for an actor of another asset.
   Status pose(const AvatarActor& actor, double t) {
-    if (Status s = place(actor, t); !s || !visible_) return s;
-    actor.joint_matrices(t, matrices_);
-    return skin();
+    if (Status s = prepare_levels(actor, t, [](const auto&, const auto&) { return 1u; }); !s) return s;
+    return skin_prepared();
   }
 
   /// Poses the Gaussians for rendering with `config` from these cameras. If none of them can see the
@@ -128,83 +124,132 @@ class SkinnedGaussians {
   /// prepare different objects at once.
   Status prepare(const AvatarActor& actor, double t, std::span<const Camera> cameras,
                  const RenderConfig& config) {
-    if (Status s = place(actor, t); !s || !visible_) return s;
-    actor.joint_globals(t, matrices_);
-    const ChunkBounds bounds = bounds_.at(matrices_);
-    visible_ = false;
-    for (const Camera& c : cameras) {
-      visible_ =
-          visible_ ||
-          may_be_visible(make_projection_camera<double>(c, set_, projection_rules(config)), bounds);
-    }
-    if (visible_) actor.to_joint_matrices(matrices_);
-    return {};
+    return prepare_levels(actor, t, [&](const GaussianSet& set, const ChunkBounds& bounds) {
+      std::uint32_t seen = 0;
+      for (const Camera& c : cameras) seen = seen != 0 || is_seen(c, config, set, bounds) ? 1 : 0;
+      return seen;
+    });
   }
   /// Second step of `pose`: skins the Gaussians, unless no camera sees them.
-  Status skin_prepared() { return visible_ ? skin() : Status(); }
+  Status skin_prepared() { return wanted_ != 0 ? skin() : Status(); }
 
   /// The posed Gaussians, placed in the world. Empty before the first `pose`. Valid until the next one
   /// and while this object lives.
-  GaussianSet set() const& noexcept {
-    GaussianSet s = set_;
-    if (!visible_) s.gaussians = {};
-    return s;
-  }
+  GaussianSet set() const& noexcept { return set_of(0); }
   /// Deleted: the set would point into a temporary.
   GaussianSet set() const&& = delete;
 
   /// The asset.
-  const std::shared_ptr<const AvatarAsset>& asset() const noexcept { return arrays_->asset(); }
+  const std::shared_ptr<const AvatarAsset>& asset() const noexcept {
+    return levels_[0]->arrays->asset();
+  }
+
+  /// Whether a camera that renders with `config` may see Gaussians of a set within `bounds`.
+  static bool is_seen(const Camera& camera, const RenderConfig& config, const GaussianSet& set,
+                      const ChunkBounds& bounds) {
+    return may_be_visible(make_projection_camera<double>(camera, set, projection_rules(config)), bounds);
+  }
 
  private:
   template <Backend>
   friend class SkinnedCrowd;
 
-  /// Sets the placement, and whether the actor is in the scene at time t.
-  Status place(const AvatarActor& actor, double t) {
+  /// The whole body, or a level of detail, and the arrays of its posed Gaussians.
+  struct Level {
+    Level(B& backend, std::shared_ptr<const AvatarArrays<B>> its)
+        : arrays(std::move(its)), args(arrays->skinning()), set(arrays->set()) {
+      const auto output = [&](std::size_t n) {
+        floats.emplace_back(backend).resize_discard(n);
+        return View<float>{floats.back().data(), n};
+      };
+      ShapeRows& v = set.gaussians.shape;
+      ColorRows& color = set.gaussians.color;
+      for (std::size_t k = 0; k < 3; ++k) v.means.set(k, args.means_out[k] = output(v.size));
+      for (std::size_t k = 0; k < 4; ++k) {
+        v.quats.set(k, args.quats_out[k] = output(v.size));
+        if (color.degree >= 1) color.rotations.set(k, args.rotations_out[k] = output(v.size));
+      }
+      if (arrays->asset()->skinning == Skinning::linear_stretched) {
+        for (std::size_t k = 0; k < 9; ++k) v.axes.set(k, args.axes_out[k] = output(v.size));
+      }
+    }
+    std::shared_ptr<const AvatarArrays<B>> arrays;
+    SkinningArgs<float> args;
+    GaussianSet set;
+    std::vector<Buffer<float, B>> floats;  // A Buffer's memory does not move when the vector grows.
+  };
+
+  /// The Gaussians of a level, placed in the world. Empty if that level was not posed.
+  GaussianSet set_of(std::size_t level) const noexcept {
+    const bool posed = (wanted_ >> level & 1) != 0 && levels_[level];
+    GaussianSet s = posed ? levels_[level]->set : levels_[0]->set;
+    s.world_from_asset = world_;
+    if (!posed) s.gaussians = {};
+    return s;
+  }
+  /// Forward kinematics, on the host. wanted(set, bounds) returns a bit for each level that is to be
+  /// skinned, that of the whole body first.
+  template <class Wanted>
+  Status prepare_levels(const AvatarActor& actor, double t, const Wanted& wanted) {
+    if (Status s = present(actor, t); !s || wanted_ == 0) return s;
+    world_ = actor.joint_globals(t, matrices_);
+    bounds_now_ = bounds_.at(matrices_);
+    wanted_ = wanted(set_of(0), bounds_now_);
+    if (wanted_ != 0) actor.to_joint_matrices(matrices_);
+    return {};
+  }
+  /// Calls f with the arguments of each level that is to be skinned. Allocates its arrays first.
+  template <class F>
+  void for_each_wanted(const F& f) {
+    for (std::size_t l = 0; l < levels_.size(); ++l) {
+      if ((wanted_ >> l & 1) == 0) continue;
+      if (!levels_[l]) levels_[l].emplace(*backend_, levels_[0]->arrays->levels()[l - 1]);
+      f(levels_[l]->args);
+    }
+  }
+
+  /// Sets whether the actor is in the scene at time t. Only the whole body is wanted then.
+  Status present(const AvatarActor& actor, double t) {
     if (actor.asset() != asset()) {
       return {Errc::invalid_argument,
               "SkinnedGaussians: the actor has another asset than was given at creation"};
     }
-    visible_ = actor.active(t);
-    if (visible_) set_.world_from_asset = actor.placement(t);
+    wanted_ = actor.active(t) ? 1 : 0;
     return {};
   }
   Status skin() {
+    SkinningArgs<float>& args = levels_[0]->args;
     if (asset()->skinning == Skinning::dual_quaternion) {
       set_dual_joints(matrices_);
-      return skin_gaussians<float>(*backend_, args_);
+      return skin_gaussians<float>(*backend_, args);
     }
     host_joints_.clear();
     for (const auto& m : matrices_) host_joints_.push_back(affine_cast<float>(m));
     joints_.upload(host_joints_.data(), host_joints_.size());
-    args_.joints = std::as_const(joints_).view();
-    return skin_gaussians<float>(*backend_, args_);
+    args.joints = std::as_const(joints_).view();
+    return skin_gaussians<float>(*backend_, args);
   }
   /// Uploads the joint matrices as dual quaternions.
   void set_dual_joints(const std::vector<Affine3<double>>& matrices) {
     host_duals_.clear();
     for (const auto& m : matrices) host_duals_.push_back(dual_quat_cast<float>(dual_quat(m)));
     dual_joints_.upload(host_duals_.data(), host_duals_.size());
-    args_.dual_joints = std::as_const(dual_joints_).view();
-  }
-  View<float> output(std::size_t n) {
-    floats_.emplace_back(*backend_).resize_discard(n);
-    return {floats_.back().data(), n};
+    for (auto& level : levels_) {
+      if (level) level->args.dual_joints = std::as_const(dual_joints_).view();
+    }
   }
 
   B* backend_;
-  std::shared_ptr<const AvatarArrays<B>> arrays_;
   BodyBounds bounds_;
-  SkinningArgs<float> args_;
-  GaussianSet set_;
+  Similarity world_;        // Placement of the actor.
+  ChunkBounds bounds_now_;  // In the present pose.
   Buffer<Affine3<float>, B> joints_;
-  Buffer<DualQuat<float>, B> dual_joints_;  // whichever of these two the asset's skinning reads
-  std::vector<Buffer<float, B>> floats_;    // a Buffer's memory does not move when the vector grows
+  Buffer<DualQuat<float>, B> dual_joints_;    // whichever of these two the asset's skinning reads
+  std::vector<std::optional<Level>> levels_;  // The whole body, then the levels that were needed so far.
   std::vector<Affine3<double>> matrices_;
   std::vector<Affine3<float>> host_joints_;
   std::vector<DualQuat<float>> host_duals_;
-  bool visible_ = false;
+  std::uint32_t wanted_ = 0;  // Bits of the levels that are posed. 0: the actor is not seen.
 };
 
 }  // namespace gsnav

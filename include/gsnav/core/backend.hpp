@@ -54,6 +54,8 @@ struct NoopFunctor {
 /// - `static constexpr bool bins_in_lanes`: true if binning reads BinArgs::spans. Projection then fills
 ///   that array.
 /// - `batch_renderer`: a type that draws many cameras in one call (detail/sim/frame_batch.hpp).
+/// - `host_threads() -> ThreadPool&`: threads for the host's part of the work, such as stepping the
+///   worlds of a batch (detail/core/host_threads.hpp). Backends that use host memory need none.
 /// - `static allocate_host(bytes) -> void*` and `deallocate_host(p)`: host memory for copies that do not
 ///   wait (detail/core/host_array.hpp). `allocate_host` returns nullptr if there is none.
 template <class B>

@@ -32,6 +32,27 @@ inline RenderConfig lod_config(RenderConfig config) noexcept {
   return config;
 }
 
+/// `set` filtered for the pixels of O_photo(k): the mean of k x k samples, each blurred by the set's own
+/// filter. Opacities compensate for the part of a pixel's blur that a sample does not have.
+inline GaussianSet filtered_for_photo(GaussianSet set, const LodChoice& choice) noexcept {
+  const double k2 = static_cast<double>(choice.photo) * choice.photo;
+  const double sample = static_cast<double>(set.eps2d) / k2;
+  // k points spaced evenly over a pixel have the variance (1 - 1 / k^2) / 12.
+  set.eps2d = static_cast<float>(sample + (1 - 1 / k2) / 12);
+  set.base_eps2d = set.filter == Filter::mip ? 0.0f : static_cast<float>(sample);
+  set.filter = Filter::mip;
+  return set;
+}
+
+/// Error of merged Gaussians as a multiple of the largest that is allowed.
+/// @param error,grain values of LodNode, metres.
+/// @param scale size of a metre at their nearest depth, in units of choice.pixels.
+inline double relative_lod_error(float error, float grain, double scale,
+                                 const LodChoice& choice) noexcept {
+  const double grains = static_cast<double>(grain) * scale * choice.pixels / choice.grain;
+  return static_cast<double>(error) * scale * max(grains, 1.0);
+}
+
 namespace detail {
 
 /// Tells whether a camera may see a node, and the nearest depth of the node. Depths are in asset units.
@@ -116,19 +137,10 @@ class LodCut {
   /// Chunks of LodTree::merged that it chose.
   const std::vector<std::uint32_t>& merged_chunks() const noexcept { return merged_chunks_; }
 
-  /// The set of a cloud, filtered for the pixels of O_photo(k): the mean of k x k samples, each blurred
-  /// by the cloud's own filter. Opacities compensate for the part of a pixel's blur that a sample does
-  /// not have.
+  /// The set of a cloud, filtered_for_photo().
   static GaussianSet photo_set(const GaussianCloud& cloud, const LodChoice& choice,
                                const Similarity& world_from_asset = {}) {
-    GaussianSet s = cloud.set(world_from_asset);
-    const double k2 = static_cast<double>(choice.photo) * choice.photo;
-    const double sample = static_cast<double>(cloud.eps2d) / k2;
-    // k points spaced evenly over a pixel have the variance (1 - 1 / k^2) / 12.
-    s.eps2d = static_cast<float>(sample + (1 - 1 / k2) / 12);
-    s.base_eps2d = cloud.filter == Filter::mip ? 0.0f : static_cast<float>(sample);
-    s.filter = Filter::mip;
-    return s;
+    return filtered_for_photo(cloud.set(world_from_asset), choice);
   }
   /// Deleted: the set would point into a temporary cloud.
   static GaussianSet photo_set(const GaussianCloud&& cloud, const LodChoice& choice,
@@ -188,8 +200,7 @@ class LodCut {
   /// at the node's nearest depth, in units of choice.pixels.
   bool refine(std::size_t node, double scale, const LodChoice& choice) {
     const LodNode& n = tree_->nodes[node];
-    const double grain = static_cast<double>(n.grain) * scale * choice.pixels / choice.grain;
-    const double error = static_cast<double>(n.error) * scale * max(grain, 1.0);
+    const double error = relative_lod_error(n.error, n.grain, scale, choice);
     if (refined_.empty()) return error > 1;
     const bool finer = error > (refined_[node] != 0 ? 1 - choice.hysteresis : 1 + choice.hysteresis);
     refined_[node] = finer ? 1 : 0;

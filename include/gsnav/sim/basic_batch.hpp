@@ -8,12 +8,11 @@
 #include <memory>
 #include <span>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include "gsnav/detail/core/guarded.hpp"
-#include "gsnav/detail/core/thread_pool.hpp"
+#include "gsnav/detail/core/host_threads.hpp"
 #include "gsnav/detail/sim/batch_scenes.hpp"
 #include "gsnav/detail/sim/batch_world.hpp"
 #include "gsnav/detail/sim/scene_library.hpp"
@@ -178,10 +177,8 @@ class BasicBatchSimulator {
     }
     final_images_ = images_;
     buffers_.memory = final_buffers_.memory = config_.images;
-    if constexpr (!is_host_backend<B>) {
-      pool_ = std::make_unique<ThreadPool>(
-          std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
-    }
+    if constexpr (!is_host_backend<B> && !HasHostThreads<B>)
+      pool_ = std::make_unique<ThreadPool>(threads_of_machine());
   }
 
   static Status moved_away() {
@@ -198,14 +195,10 @@ class BasicBatchSimulator {
 
   auto parallel() noexcept {
     return [this](std::size_t n, const auto& f) {
-      if constexpr (is_host_backend<B>) {
-        backend_->parallel_for(n, f);
+      if constexpr (is_host_backend<B> || HasHostThreads<B>) {
+        for_each_on_host(*backend_, n, f);
       } else {
-        // Worlds always step on the host.
-        const std::size_t piece = n / kPieces + 1;
-        pool_->run(static_cast<std::uint32_t>((n + piece - 1) / piece), [&f, n, piece](std::uint32_t p) {
-          for (std::size_t i = p * piece; i < std::min(n, (p + 1) * piece); ++i) f(i);
-        });
+        for_each_in(*pool_, n, f);
       }
     };
   }
@@ -308,8 +301,6 @@ class BasicBatchSimulator {
                         [&](std::span<const SensorView> views) { return rig_.render(views, images); });
   }
 
-  static constexpr std::size_t kPieces = 64;
-
   B* backend_;
   BatchWorld worlds_;
   BatchConfig config_;
@@ -320,7 +311,7 @@ class BasicBatchSimulator {
   bool drawn_ = false;                // True if buffers_ holds an image of every environment as of the
                                       // last call.
   SensorImages<B> buffers_, final_buffers_;
-  std::unique_ptr<ThreadPool> pool_;  // Steps the worlds if the backend does not compute on the host.
+  std::unique_ptr<ThreadPool> pool_;  // Steps the worlds if the backend has no threads on the host.
   std::vector<BatchObservation> images_, final_images_;
   std::vector<SceneView> views_;
 };

@@ -96,9 +96,9 @@ class BasicSimulator {
     if (Status s = scene_.pose(0, world_.time()); !s) return s;
     const AgentPose& agent = world_.agent();
     const SensorView view{
-        agent.position, agent.rotation(), agent.pitch, noise_seed(config_.seed, world_.state()),
-        scene_.sets(0), &config_.render,  0,           scene_.meshes(),
-        scene_.detail()};
+        agent.position,  agent.rotation(), agent.pitch, noise_seed(config_.seed, world_.state()),
+        scene_.sets(0),  &config_.render,  0,           scene_.meshes(),
+        scene_.detail(), scene_.bodies(0)};
     rig_.resize(buffers_, 1);
     if (Status s = rig_.render(std::span(&view, 1), buffers_); !s) return s;
     for (std::size_t i = 0; i < images_.size(); ++i) images_[i].data = buffers_.image(rig_.plan(), i, 0);
@@ -155,7 +155,8 @@ class BasicSimulator {
     RenderConfig config = config_.render;
     config.outputs = outputs;
     ++spectator_count_;
-    const ImageRequest request{{scene_.sets(0), &camera, &config, {}, scene_.meshes()}, scene_.detail()};
+    const ImageRequest request{
+        {scene_.sets(0), &camera, &config, {}, scene_.meshes()}, scene_.detail(), scene_.bodies(0)};
     if (Status s = rig_.renderer().render(request, spectator_); !s) return s;
     return &spectator_;
   }
@@ -168,9 +169,16 @@ class BasicSimulator {
     if (Status s = alive(); !s) return s;
     const WorldState& s = world_.state();
     if (!s.running) return {Errc::invalid_argument, "goal_images before reset: no episode is running"};
-    const SensorView view{s.goal.position, goal_rotation(s.episode), 0.0, noise_seed(config_.seed, s),
-                          scene_.assets(), &config_.render,          0,   scene_.meshes(),
-                          scene_.detail()};
+    const SensorView view{s.goal.position,
+                          goal_rotation(s.episode),
+                          0.0,
+                          noise_seed(config_.seed, s),
+                          scene_.assets(),
+                          &config_.render,
+                          0,
+                          scene_.meshes(),
+                          scene_.detail(),
+                          {}};
     rig_.resize(goal_buffers_, 1);
     if (Status e = rig_.render(std::span(&view, 1), goal_buffers_); !e) return e;
     goal_images_ = images_;

@@ -35,6 +35,7 @@ constexpr Exp2 device_exp2(Exp2 asked) noexcept {
 }  // namespace cuda
 
 class CudaBatchRenderer;
+class ThreadPool;
 
 /// Memory space of one GPU.
 struct CudaSpace {};
@@ -98,6 +99,8 @@ class CudaBackend {
   /// Makes all later work on the consumer's stream wait for the work submitted here so far. The host
   /// does not wait. Use it to hand over images without a copy.
   void hand_over_to(CUstream_st* consumer);
+  /// Threads for the host's part of the work, one per core. They start with the first job.
+  ThreadPool& host_threads() noexcept { return *host_threads_; }
   /// Name of the GPU.
   std::string device_name() const;
 
@@ -171,6 +174,7 @@ class CudaBackend {
   const char* failed_ = "";
   Block scratch_[kScratchSlots];
   std::unique_ptr<cuda::PinnedRing> uploads_;
+  std::unique_ptr<ThreadPool> host_threads_;
   CUevent_st* handed_over_ = nullptr;
 };
 

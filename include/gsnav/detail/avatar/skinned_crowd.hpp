@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -10,6 +11,46 @@
 #include "gsnav/avatar/skinned_gaussians.hpp"
 
 namespace gsnav {
+
+/// Actors of any number of crowds that are skinned together: their joint matrices are uploaded in one
+/// copy, and a GPU skins all of them in one launch.
+template <Backend B>
+class SkinningBatch {
+ public:
+  /// Keeps a pointer to `backend`.
+  explicit SkinningBatch(B& backend) : backend_(&backend), joints_(backend) {}
+
+  /// Adds the joints of an actor. The jobs that are added afterwards read them.
+  void add_joints(const std::vector<Affine3<double>>& matrices) {
+    first_ = host_joints_.size();
+    for (const auto& m : matrices) host_joints_.push_back(affine_cast<float>(m));
+  }
+  /// Adds Gaussians that follow the joints added last. `args` may leave out `joints`.
+  void add(const SkinningArgs<float>& args) {
+    jobs_.push_back(args);
+    firsts_.push_back(first_);
+    jobs_.back().joints = {nullptr, host_joints_.size() - first_};
+  }
+  /// Skins the jobs that were added since the last call.
+  /// @return invalid_argument naming the array, and the index of the job.
+  Status run() {
+    joints_.upload(host_joints_.data(), host_joints_.size());
+    for (std::size_t i = 0; i < jobs_.size(); ++i) jobs_[i].joints.data = joints_.data() + firsts_[i];
+    const Status s = skin_all<float, B, float>(*backend_, jobs_);
+    host_joints_.clear();
+    jobs_.clear();
+    firsts_.clear();
+    return s;
+  }
+
+ private:
+  B* backend_;
+  Buffer<Affine3<float>, B> joints_;
+  std::vector<Affine3<float>> host_joints_;
+  std::vector<SkinningArgs<float>> jobs_;
+  std::vector<std::size_t> firsts_;  // Index of the first joint of each job.
+  std::size_t first_ = 0;
+};
 
 /// The Gaussians of many actors on one backend, skinned together. Their joint matrices are uploaded in
 /// one copy, and a GPU skins all actors in one launch. Actors of one asset share its canonical arrays.
@@ -23,7 +64,7 @@ template <Backend B>
 class SkinnedCrowd {
  public:
   /// Keeps a pointer to `backend`.
-  explicit SkinnedCrowd(B& backend) : backend_(&backend), joints_(backend) {}
+  explicit SkinnedCrowd(B& backend) : backend_(&backend), batch_(backend) {}
 
   /// Adds a place for an actor of this asset and returns the place's index.
   std::size_t add(const std::shared_ptr<const AvatarAsset>& asset) {
@@ -59,33 +100,49 @@ class SkinnedCrowd {
   /// different crowds at once. Errors: as above.
   Status prepare(std::span<const AvatarActor> actors, double t, std::span<const Camera> cameras,
                  const RenderConfig& config) {
+    return prepare(actors, t, [&](std::size_t, const GaussianSet& set, const ChunkBounds& bounds) {
+      std::uint32_t seen = 0;
+      for (const Camera& c : cameras)
+        seen = seen != 0 || SkinnedGaussians<B>::is_seen(c, config, set, bounds) ? 1 : 0;
+      return seen;
+    });
+  }
+  /// The same for chosen levels of detail. wanted(place, set, bounds) returns a bit for each level that
+  /// is to be skinned, that of the whole body first. `set` has the body's placement. `bounds` contain
+  /// the body in its present pose.
+  template <class Wanted>
+  Status prepare(std::span<const AvatarActor> actors, double t, const Wanted& wanted) {
     if (Status s = check(actors.size()); !s) return s;
-    for (std::size_t i = 0; i < actors.size(); ++i) {
-      if (Status s = at_place(i, actors_[i].prepare(actors[i], t, cameras, config)); !s) return s;
-    }
-    return {};
+    return prepare_levels(
+        actors.size(), [&](std::size_t i) -> const AvatarActor& { return actors[i]; }, t, wanted);
   }
   /// Second step of `pose`: skins all actors that some camera sees.
   Status skin_prepared() {
-    host_joints_.clear();
+    add_prepared(batch_);
+    return batch_.run();
+  }
+  /// The same as part of a batch, whose run() then skins them.
+  void add_prepared(SkinningBatch<B>& batch) {
     for (SkinnedGaussians<B>& a : actors_) {
-      if (!a.visible_) continue;
+      if (a.wanted_ == 0) continue;
+      a.for_each_wanted([](const auto&) {});  // allocates
       if (a.asset()->skinning == Skinning::dual_quaternion) a.set_dual_joints(a.matrices_);
-      for (const auto& m : a.matrices_) host_joints_.push_back(affine_cast<float>(m));
+      batch.add_joints(a.matrices_);
+      a.for_each_wanted([&](const SkinningArgs<float>& args) { batch.add(args); });
     }
-    joints_.upload(host_joints_.data(), host_joints_.size());
-    jobs_.clear();
-    std::size_t first = 0;
-    for (SkinnedGaussians<B>& a : actors_) {
-      if (!a.visible_) continue;
-      const std::size_t joints = a.asset()->skeleton.size();
-      a.args_.joints = {joints_.data() + first, joints};
-      first += joints;
-      jobs_.push_back(a.args_);
-    }
-    return skin_all<float, B, float>(*backend_, jobs_);
   }
 
+  /// The posed Gaussians of a level of detail of a place, or of the whole body (0). Empty if that level
+  /// was not posed.
+  GaussianSet set(std::size_t place, std::size_t level) const& noexcept {
+    return actors_[place].set_of(level);
+  }
+  /// Deleted for temporaries, because the set refers to the crowd's buffers.
+  GaussianSet set(std::size_t place, std::size_t level) const&& = delete;
+  /// A box that contains the Gaussians of a place in its present pose.
+  const ChunkBounds& bounds(std::size_t place) const noexcept { return actors_[place].bounds_now_; }
+  /// Whether some level of a place is posed.
+  bool is_posed(std::size_t place) const noexcept { return actors_[place].wanted_ != 0; }
   /// Number of places.
   std::size_t size() const noexcept { return actors_.size(); }
   /// The posed Gaussians of a place. Valid until the next pose().
@@ -98,12 +155,23 @@ class SkinnedCrowd {
   Status pose(std::size_t count, const ActorAt& actor_at, double t) {
     if (Status s = check(count); !s) return s;
     for (std::size_t i = 0; i < count; ++i) {
-      if (Status s = at_place(i, actors_[i].place(actor_at(i), t)); !s) return s;
+      if (Status s = at_place(i, actors_[i].present(actor_at(i), t)); !s) return s;
     }
-    for (std::size_t i = 0; i < count; ++i) {
-      if (actors_[i].visible_) actor_at(i).joint_matrices(t, actors_[i].matrices_);
-    }
+    const auto all = [](std::size_t, const auto&, const auto&) { return ~std::uint32_t{0}; };
+    if (Status s = prepare_levels(count, actor_at, t, all); !s) return s;
     return skin_prepared();
+  }
+  template <class ActorAt, class Wanted>
+  Status prepare_levels(std::size_t count, const ActorAt& actor_at, double t, const Wanted& wanted) {
+    for (std::size_t i = 0; i < count; ++i) {
+      SkinnedGaussians<B>& a = actors_[i];
+      const std::uint32_t levels = (std::uint32_t{1} << a.levels_.size()) - 1;
+      const Status s = a.prepare_levels(actor_at(i), t, [&](const auto& set, const auto& bounds) {
+        return wanted(i, set, bounds) & levels;
+      });
+      if (!s) return at_place(i, s);
+    }
+    return {};
   }
   Status check(std::size_t actors) const {
     if (actors == actors_.size()) return {};
@@ -118,9 +186,7 @@ class SkinnedCrowd {
   B* backend_;
   std::vector<std::shared_ptr<const AvatarArrays<B>>> assets_;
   std::vector<SkinnedGaussians<B>> actors_;
-  Buffer<Affine3<float>, B> joints_;
-  std::vector<Affine3<float>> host_joints_;
-  std::vector<SkinningArgs<float>> jobs_;
+  SkinningBatch<B> batch_;
 };
 
 }  // namespace gsnav

@@ -54,7 +54,7 @@ struct OpenOptions {
   double unseen_color = 0;
   bool keep_zero_bands = false;            ///< Keep all SH bands of the file, also those of zeros.
   SceneLevels levels = SceneLevels::none;  ///< Levels of detail. Built ones are stored next to the
-                                           ///< scene's file.
+                                           ///< scene's file. People get levels too.
   /// Paths of triangle meshes to draw among the Gaussians, in the frame of the scene's file: .gltf and
   /// .glb with colours and textures, .obj and .ply grey.
   std::vector<std::string> meshes{};

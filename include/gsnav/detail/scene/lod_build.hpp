@@ -10,7 +10,6 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/detail/math/svd.hpp"
 #include "gsnav/detail/scene/lod_greedy.hpp"
 #include "gsnav/detail/scene/lod_merge.hpp"
 #include "gsnav/detail/scene/lod_settings.hpp"
@@ -171,27 +170,7 @@ class LodBuilder {
       m.origin_ids[row] = like.cloud->origin_ids[like.row];
       origin = m.origins[m.origin_ids[row]];
     }
-    for (int k = 0; k < 3; ++k) {
-      m.means[static_cast<std::size_t>(k)][row] = static_cast<float>(g.mean[k] - origin[k]);
-    }
-    const Svd3<double> axes = svd(g.covariance.matrix());
-    double opacity = g.mass / std::max(lod_area(g.covariance), 1e-30), grow = 1;
-    if (opacity > 1) {  // No Gaussian takes more than all light, so its area grows instead.
-      grow = std::sqrt(opacity);
-      opacity = 1;
-    }
-    for (std::size_t k = 0; k < 3; ++k) {
-      m.scales[k][row] = static_cast<float>(grow * std::sqrt(std::max(axes.values[k], 0.0)));
-    }
-    const Mat3d r{{{axes.left[0].x, axes.left[1].x, axes.left[2].x},
-                   {axes.left[0].y, axes.left[1].y, axes.left[2].y},
-                   {axes.left[0].z, axes.left[1].z, axes.left[2].z}}};
-    const Quatd q = quat_from_matrix(r);
-    m.quats[0][row] = static_cast<float>(q.w);
-    m.quats[1][row] = static_cast<float>(q.x);
-    m.quats[2][row] = static_cast<float>(q.y);
-    m.quats[3][row] = static_cast<float>(q.z);
-    m.opacities[row] = static_cast<float>(opacity);
+    set_lod_gaussian(m, row, g, origin);
     spreads_[row] = static_cast<float>(g.spread);
   }
   /// Makes a transparent row at the position of row `like`.

@@ -8,6 +8,7 @@
 #include <queue>
 #include <vector>
 
+#include "gsnav/detail/math/svd.hpp"
 #include "gsnav/detail/scene/lod_merge.hpp"
 #include "gsnav/math/quat.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
@@ -34,6 +35,33 @@ inline LodGaussian lod_gaussian(const GaussianCloud& cloud, std::size_t i, doubl
     g.color[k] = 0.5 + kC0 * static_cast<double>(cloud.sh0[3 * i + static_cast<std::size_t>(k)]);
   }
   return g;
+}
+
+/// Writes the shape and opacity of row i of a cloud. The mean is relative to `origin`. No Gaussian takes
+/// more than all light, so its area grows instead.
+inline void set_lod_gaussian(GaussianCloud& cloud, std::size_t i, const LodGaussian& g,
+                             const Vec3d& origin) noexcept {
+  for (int k = 0; k < 3; ++k) {
+    cloud.means[static_cast<std::size_t>(k)][i] = static_cast<float>(g.mean[k] - origin[k]);
+  }
+  const Svd3<double> axes = svd(g.covariance.matrix());
+  double opacity = g.mass / std::max(lod_area(g.covariance), 1e-30), grow = 1;
+  if (opacity > 1) {
+    grow = std::sqrt(opacity);
+    opacity = 1;
+  }
+  for (std::size_t k = 0; k < 3; ++k) {
+    cloud.scales[k][i] = static_cast<float>(grow * std::sqrt(std::max(axes.values[k], 0.0)));
+  }
+  const Mat3d r{{{axes.left[0].x, axes.left[1].x, axes.left[2].x},
+                 {axes.left[0].y, axes.left[1].y, axes.left[2].y},
+                 {axes.left[0].z, axes.left[1].z, axes.left[2].z}}};
+  const Quatd q = quat_from_matrix(r);
+  cloud.quats[0][i] = static_cast<float>(q.w);
+  cloud.quats[1][i] = static_cast<float>(q.x);
+  cloud.quats[2][i] = static_cast<float>(q.y);
+  cloud.quats[3][i] = static_cast<float>(q.z);
+  cloud.opacities[i] = static_cast<float>(opacity);
 }
 
 /// Sums over Gaussians of their mass and of mass times log(area).

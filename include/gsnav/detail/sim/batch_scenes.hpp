@@ -42,7 +42,8 @@ class BatchScenes {
         detail_(detail),
         pose_slots_(pose_slots),
         scenes_(count),
-        configs_(count) {}
+        configs_(count),
+        skinning_(backend) {}
 
   /// Frees the scenes s with in_use[s] == 0.
   void keep(std::span<const std::uint8_t> in_use) {
@@ -108,8 +109,8 @@ class BatchScenes {
     return {};
   }
 
-  /// Poses the avatars of posed_ and lists its views in ready_. Joints are computed on all threads,
-  /// Gaussians are skinned by the backend.
+  /// Poses the avatars of posed_ and lists its views in ready_. Joints are computed on all threads.
+  /// Gaussians of all avatars are skinned by the backend together.
   template <class Run>
   Status pose(const SensorPlan& plan, const Run& run) {
     for (const Posed& p : posed_) scenes_[p.views[0].scene]->make_slots(p.slot + 1);
@@ -119,24 +120,28 @@ class BatchScenes {
         for (const SceneView& v : p.views)
           plan.append_cameras(v.view.base, v.view.rotation, v.view.pitch, p.cameras);
         const std::size_t scene = p.views[0].scene;
-        return scenes_[scene]->prepare(p.slot, p.views[0].time, p.cameras, configs_[scene]);
+        return scenes_[scene]->prepare(p.slot, p.views[0].time, p.cameras, configs_[scene],
+                                       plan.any(SensorPlan::kSemantic));
       });
     });
-    ready_.clear();
     for (const Posed& p : posed_) {
       if (!p.status) return p.status;
+    }
+    ready_.clear();
+    for (const Posed& p : posed_) {
       const std::size_t number = p.views[0].scene;
       SceneOnBackend<B>& scene = *scenes_[number];
-      if (Status s = scene.pose_prepared(p.slot); !s) return s;
+      scene.pose_prepared(p.slot, skinning_);
       for (const SceneView& v : p.views) {
         SensorView& view = ready_.emplace_back(v.view);
         view.sets = scene.sets(p.slot);
         view.config = &configs_[number];
         view.meshes = scene.meshes();
         view.detail = scene.detail();
+        view.bodies = scene.bodies(p.slot);
       }
     }
-    return {};
+    return skinning_.run();
   }
 
   B* backend_;
@@ -147,6 +152,7 @@ class BatchScenes {
   std::vector<std::unique_ptr<SceneOnBackend<B>>> scenes_;  // Null for scenes that no view has needed.
   std::vector<RenderConfig> configs_;                       // One per scene.
   std::size_t left_poses_ = 0;                              // Poses of scenes that were freed.
+  SkinningBatch<B> skinning_;
   std::vector<Posed> posed_;
   std::vector<std::size_t> used_;  // Number of slots used per scene.
   std::vector<SensorView> ready_;

@@ -194,13 +194,17 @@ class FrameBatch {
     const auto same = [](const GaussianSet& a, const GaussianSet& b) {
       return std::memcmp(&a, &b, sizeof a) == 0;
     };
-    auto [at, end] = places_.equal_range(set.gaussians.shape.means.data[0]);
+    // Sets of one cloud differ in their chunks, so that few sets have equal hashes.
+    const std::hash<const void*> of;
+    const std::size_t hash =
+        31 * of(set.gaussians.shape.means.data[0]) + of(set.selection.drawn_chunks.data);
+    auto [at, end] = places_.equal_range(hash);
     for (; at != end; ++at) {
       if (same(sets_[at->second], set)) return at->second;
     }
     const auto place = static_cast<std::uint32_t>(sets_.size());
     sets_.push_back(set);
-    places_.emplace(set.gaussians.shape.means.data[0], place);
+    places_.emplace(hash, place);
     return place;
   }
 
@@ -233,7 +237,7 @@ class FrameBatch {
   Buffer<float, B> scratch_;
   // Data of the current group:
   std::vector<GaussianSet> sets_;
-  std::unordered_multimap<const float*, std::uint32_t> places_;  // index in sets_ by address of means
+  std::unordered_multimap<std::size_t, std::uint32_t> places_;  // index in sets_ by hash of addresses
   std::vector<std::uint32_t> lists_;
   std::vector<View<const std::uint32_t>> seen_;  // visible rows of each entry of lists_
   std::vector<std::size_t> ends_;

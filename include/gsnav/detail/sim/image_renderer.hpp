@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "gsnav/detail/core/host_threads.hpp"
 #include "gsnav/detail/sim/frame_batch.hpp"
 #include "gsnav/detail/sim/scene_detail.hpp"
 #include "gsnav/scene/basic_renderer.hpp"
@@ -12,20 +13,12 @@
 
 namespace gsnav {
 
-/// Calls f(i) for i in [0, n): in parallel on a host backend, else on the calling thread.
-template <Backend B, class F>
-void for_each_on_host(B& backend, std::size_t n, const F& f) {
-  if constexpr (is_host_backend<B>) {
-    backend.parallel_for(n, f);
-  } else {
-    for (std::size_t i = 0; i < n; ++i) f(i);
-  }
-}
-
 /// One image to render: camera, sets, meshes, rules and output.
 struct ImageRequest : FrameJob<float> {
-  const SceneDetail* detail = nullptr;  ///< Levels of detail and visible sets of the assets, which are
-                                        ///< the first of `sets`. Null: draw everything.
+  const SceneDetail* detail = nullptr;   ///< Levels of detail and visible sets of the assets, which are
+                                         ///< the first of `sets`. Null: draw everything.
+  std::span<const BodyDetail> bodies{};  ///< Levels of detail of the avatars, which are the last of
+                                         ///< `sets`.
 };
 
 /// Renders independent images. It selects the visible part of the assets for each, renders what the
@@ -92,7 +85,7 @@ class ImageRenderer {
     while (cuts_.size() < detailed_.size()) cuts_.emplace_back();
     for_each_on_host(*backend_, detailed_.size(), [this](std::size_t i) {
       ImageRequest& r = *detailed_[i];
-      r.sets = cuts_[i].select(*r.detail, r.sets, *r.camera);
+      r.sets = cuts_[i].select(*r.detail, r.sets, *r.camera, r.bodies);
       r.config = &cuts_[i].rules(*r.config);
     });
     chosen_.place(std::span(cuts_).first(detailed_.size()));

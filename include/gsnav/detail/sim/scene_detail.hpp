@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -14,6 +15,7 @@
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
+#include "gsnav/detail/sim/body_detail.hpp"
 #include "gsnav/scene/lod_cut.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 
@@ -103,9 +105,11 @@ struct SceneDetail {
 class DetailSets {
  public:
   /// Selects the sets for a camera. The result is valid until the next call.
-  /// @param sets Sets of the scene: assets first, then avatars, which are not changed.
+  /// @param sets Sets of the scene: assets first, then avatars.
+  /// @param bodies Levels of detail of the avatars. Empty, or without an asset: the avatar's set is not
+  /// changed.
   std::span<const GaussianSet> select(const SceneDetail& detail, std::span<const GaussianSet> sets,
-                                      const Camera& camera) {
+                                      const Camera& camera, std::span<const BodyDetail> bodies = {}) {
     cuts_.assign(detail.assets.size(), nullptr);
     sets_.clear();
     to_place_.clear();
@@ -129,12 +133,18 @@ class DetailSets {
                                         asset.world_from_asset, seen, cell));
       for (const GaussianSet& set : cut.sets()) {
         sets_.push_back(set);
-        if (asset.cloud_there.size() != 0) move(asset, sets_.back(), cell);
+        if (asset.cloud_there.size() != 0) move(asset, a, sets_.back(), cell);
       }
     }
     const auto others =
         sets.subspan(detail.assets.size() < sets.size() ? detail.assets.size() : sets.size());
-    sets_.insert(sets_.end(), others.begin(), others.end());
+    for (std::size_t i = 0; i < others.size(); ++i) {
+      const BodyDetail* const body = i < bodies.size() ? &bodies[i] : nullptr;
+      sets_.push_back(body == nullptr || body->asset == nullptr
+                          ? others[i]
+                          : body->sets[level_of_body(*body->asset, body->sets[0], body->bounds, camera,
+                                                     detail.choice)]);
+    }
     return sets_;
   }
 
@@ -157,18 +167,20 @@ class DetailSets {
     return sum;
   }
 
-  /// Calls f with each chunk list of the last select() that a backend with its own memory needs. f
-  /// returns the address of a copy there.
+  /// Calls f with each chunk list of the last select() that a backend with its own memory needs, and
+  /// with the cut that holds the list. f returns the address of a copy there.
   template <class F>
   void place_chunks(const F& f) {
-    for (const auto& [set, list] : to_place_) sets_[set].selection.drawn_chunks.data = f(list);
+    for (const auto& [set, asset, list] : to_place_)
+      sets_[set].selection.drawn_chunks.data = f(cuts_[asset], list);
   }
 
  private:
   /// Changes the last set from host arrays to the backend's arrays.
-  void move(const SceneDetail::Asset& asset, GaussianSet& set, std::optional<std::size_t> cell) {
+  void move(const SceneDetail::Asset& asset, std::size_t index, GaussianSet& set,
+            std::optional<std::size_t> cell) {
     const View<const std::uint32_t> drawn = set.selection.drawn_chunks;
-    to_place_.push_back({sets_.size() - 1, drawn});
+    to_place_.push_back({sets_.size() - 1, index, drawn});
     const bool is_cloud = set.gaussians.shape.means.data[0] == asset.cloud->means[0].data();
     set.gaussians = is_cloud ? asset.cloud_there : asset.merged_there;
     set.selection = {{nullptr, drawn.size}, {}};
@@ -178,7 +190,7 @@ class DetailSets {
   std::vector<std::shared_ptr<const LodCut>> cuts_;  // Per asset.
   std::vector<GaussianSet> sets_;
   struct ToPlace {
-    std::size_t set;  // Index in sets_.
+    std::size_t set, asset;  // Indices in sets_ and cuts_.
     View<const std::uint32_t> chunks;
   };
   std::vector<ToPlace> to_place_;
@@ -190,41 +202,55 @@ class DetailSets {
   RenderConfig rules_;
 };
 
-/// Makes chosen chunk lists readable for the backend. If it has its own memory, all lists are uploaded
-/// in one copy.
+/// Makes chosen chunk lists readable for the backend. If it has its own memory, each list is uploaded
+/// when it is first needed, together with the other new lists of that call.
 template <Backend B>
 class ChosenChunks {
  public:
-  explicit ChosenChunks(B& backend) : there_(backend) {}
+  explicit ChosenChunks(B& backend) : backend_(&backend), there_(backend) {}
 
   /// Uploads the lists of these cuts. Their sets can be drawn until the next call. Cameras that share a
   /// cut share its lists.
   void place(std::span<DetailSets> cuts) {
     if constexpr (!is_host_backend<B>) {
-      all_.clear();
-      begins_.clear();
-      const auto begin_of = [this](View<const std::uint32_t> list) {
-        const auto [at, is_new] = begins_.emplace(list.data, all_.size());
-        if (is_new) all_.insert(all_.end(), list.data, list.data + list.size);
-        return at->second;
-      };
-      for (DetailSets& cut : cuts) {
-        cut.place_chunks([&](View<const std::uint32_t> list) {
-          begin_of(list);
-          return static_cast<const std::uint32_t*>(nullptr);
-        });
+      if (!list_new(cuts) || used_ + new_.size() > there_.size()) {
+        // Forget all lists, so that memory is bounded, and list those of this call.
+        kept_.clear();
+        used_ = 0;
+        list_new(cuts);
+        there_.resize_discard(std::max(2 * there_.size(), 2 * new_.size()));
       }
-      there_.resize_discard(all_.size());
-      there_.upload(all_.data(), all_.size());
+      backend_->copy(there_.data() + used_, new_.data(), new_.size() * sizeof(std::uint32_t),
+                     CopyKind::host_to_device);
+      used_ += new_.size();
       for (DetailSets& cut : cuts) {
-        cut.place_chunks([&](View<const std::uint32_t> list) { return there_.data() + begin_of(list); });
+        cut.place_chunks([&](const auto&, View<const std::uint32_t> list) {
+          return std::as_const(there_).data() + kept_.at(list.data).first;
+        });
       }
     }
   }
 
  private:
-  std::vector<std::uint32_t> all_;
-  std::unordered_map<const std::uint32_t*, std::size_t> begins_;  // Places of the lists in all_.
+  /// Puts the lists that are not on the backend yet into new_. Returns false if more would be kept than
+  /// LodCells keeps.
+  bool list_new(std::span<DetailSets> cuts) {
+    new_.clear();
+    for (DetailSets& cut : cuts) {
+      cut.place_chunks([&](const std::shared_ptr<const LodCut>& held, View<const std::uint32_t> list) {
+        const auto [at, is_new] = kept_.try_emplace(list.data, used_ + new_.size(), held);
+        if (is_new) new_.insert(new_.end(), list.data, list.data + list.size);
+        return static_cast<const std::uint32_t*>(nullptr);
+      });
+    }
+    return used_ + new_.size() <= LodCells::kMostChunks;
+  }
+
+  B* backend_;
+  /// By address: place in there_, and the cut, without which another list could have the address.
+  std::unordered_map<const std::uint32_t*, std::pair<std::size_t, std::shared_ptr<const LodCut>>> kept_;
+  std::vector<std::uint32_t> new_;
+  std::size_t used_ = 0;  ///< Numbers in there_ that belong to lists.
   Buffer<std::uint32_t, B> there_;
 };
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "gsnav/avatar/actor.hpp"
 #include "gsnav/detail/avatar/skinned_crowd.hpp"
 #include "gsnav/detail/scene/placed_meshes.hpp"
+#include "gsnav/detail/sim/body_detail.hpp"
 #include "gsnav/detail/sim/scene_detail.hpp"
 #include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/sim/scene.hpp"
@@ -29,6 +31,7 @@ class SceneOnBackend {
                  const DetailChoice& choice = {})
       : backend_(&backend), scene_(std::move(scene)) {
     if (choice.lod) detail_.choice = *choice.lod;
+    if (!scene_->assets.empty()) lod_ = choice.lod;
     for (const SceneAsset& a : scene_->assets) {
       arrays_.push_back(arrays_of(a, choice.lod ? nullptr : a.bands.get()));
       sets_.push_back(arrays_.back().set(a.world_from_asset));
@@ -52,8 +55,9 @@ class SceneOnBackend {
     for (const AvatarActor& actor : scene_->avatars) {
       std::shared_ptr<const AvatarArrays<B>> body;
       for (const auto& known : bodies_) body = known->asset() == actor.asset() ? known : body;
-      bodies_.push_back(
-          body != nullptr ? body : std::make_shared<const AvatarArrays<B>>(backend, actor.asset()));
+      bodies_.push_back(body != nullptr ? body
+                                        : std::make_shared<const AvatarArrays<B>>(backend, actor.asset(),
+                                                                                  lod_.has_value()));
     }
   }
 
@@ -66,6 +70,9 @@ class SceneOnBackend {
     if (!scene_->assets.empty()) config.sort_order = scene_->assets.front().sort_order();
     return config;
   }
+  /// Levels of detail of the avatars of a slot, if levels were asked for. Valid until the slot is posed
+  /// again.
+  std::span<const BodyDetail> bodies(std::size_t slot) const noexcept { return slots_[slot]->bodies; }
   /// Sets of the assets, without avatars.
   std::span<const GaussianSet> assets() const noexcept { return sets_; }
   /// Meshes of the scene. The id of an instance is the index of its SceneMesh.
@@ -81,23 +88,45 @@ class SceneOnBackend {
   Status pose(std::size_t slot, double t) {
     Slot& s = at(slot);
     if (s.whole && s.time == t) return {};
-    return posed(s, t, true, [&] { return s.people.pose(scene_->avatars, t); });
+    s.whole = false;
+    if (Status e = s.people.pose(scene_->avatars, t); !e) return e;
+    list_sets(s);
+    list_bodies(s);
+    pose_count_ += s.people.size();
+    s.time = t;
+    s.whole = true;
+    return {};
   }
   /// Poses slot `slot` for certain cameras, in two steps: prepare(), then pose_prepared(). Avatars that
   /// no camera can see cost little. prepare() runs on the host only; several threads may call it for
   /// different slots after make_slots().
+  /// @param whole_bodies whether whole bodies are drawn besides their levels of detail.
   /// @return an error of skinning.
-  Status prepare(std::size_t slot, double t, std::span<const Camera> cameras,
-                 const RenderConfig& config) {
+  Status prepare(std::size_t slot, double t, std::span<const Camera> cameras, const RenderConfig& config,
+                 bool whole_bodies = false) {
     Slot& s = *slots_[slot];
     s.whole = false;
     s.time = t;
-    return s.people.prepare(scene_->avatars, t, cameras, config);
+    const auto wanted = [&](std::size_t i, const GaussianSet& body, const ChunkBounds& bounds) {
+      const AvatarAsset& asset = *scene_->avatars[i].asset();
+      std::uint32_t levels = 0;
+      for (const Camera& c : cameras) {
+        if (!SkinnedGaussians<B>::is_seen(c, config, body, bounds)) continue;
+        levels |= whole_bodies || !lod_ ? 1 : 0;
+        if (lod_) levels |= std::uint32_t{1} << level_of_body(asset, body, bounds, c, *lod_);
+      }
+      return levels;
+    };
+    if (Status e = s.people.prepare(scene_->avatars, t, wanted); !e) return e;
+    list_sets(s);
+    return {};
   }
-  /// Second step of prepare(): skins the Gaussians.
-  Status pose_prepared(std::size_t slot) {
+  /// Second step of prepare(): skins the Gaussians, as part of a batch that the caller runs.
+  void pose_prepared(std::size_t slot, SkinningBatch<B>& batch) {
     Slot& s = *slots_[slot];
-    return posed(s, s.time, false, [&] { return s.people.skin_prepared(); });
+    s.people.add_prepared(batch);
+    list_bodies(s);
+    pose_count_ += s.people.size();
   }
   /// Creates slots 0 to count - 1.
   void make_slots(std::size_t count) {
@@ -111,6 +140,7 @@ class SceneOnBackend {
     explicit Slot(B& backend) : people(backend) {}
     SkinnedCrowd<B> people;
     std::vector<GaussianSet> sets;
+    std::vector<BodyDetail> bodies;
     double time = 0.0;
     bool whole = false;  // True if posed for any camera.
   };
@@ -145,20 +175,28 @@ class SceneOnBackend {
     }
   }
 
-  template <class PosePeople>
-  Status posed(Slot& s, double t, bool whole, const PosePeople& pose_people) {
-    s.whole = false;
-    if (Status e = pose_people(); !e) return e;
-    pose_count_ += s.people.size();
+  void list_bodies(Slot& s) const {
+    if (!lod_) return;
+    s.bodies.resize(s.people.size());
+    for (std::size_t i = 0; i < s.bodies.size(); ++i) {
+      const AvatarAsset& asset = *scene_->avatars[i].asset();
+      BodyDetail& b = s.bodies[i];
+      b.asset = s.people.is_posed(i) && !asset.levels.empty() ? &asset : nullptr;
+      if (b.asset == nullptr) continue;
+      b.bounds = s.people.bounds(i);
+      b.sets.clear();
+      for (std::size_t l = 0; l <= asset.levels.size(); ++l)
+        b.sets.push_back(filtered_for_photo(s.people.set(i, l), *lod_));
+    }
+  }
+  void list_sets(Slot& s) const {
     s.sets = sets_;
     for (std::size_t i = 0; i < s.people.size(); ++i) s.sets.push_back(s.people.set(i));
-    s.time = t;
-    s.whole = whole;
-    return {};
   }
 
   B* backend_;
   std::shared_ptr<const SimulatorScene> scene_;
+  std::optional<LodChoice> lod_;
   std::vector<GaussianArrays<B>> arrays_;
   std::vector<GaussianSet> sets_;          // Assets.
   std::vector<GaussianArrays<B>> merged_;  // Merged Gaussians of the trees, if the backend has its own

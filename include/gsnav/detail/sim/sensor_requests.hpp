@@ -30,6 +30,7 @@ struct SensorView {
   const SceneDetail* detail = nullptr;   ///< Levels of detail and visible sets of the assets, which are
                                         ///< the first of `sets`. Null: draw everything. Semantic sensors
                                         ///< always draw everything.
+  std::span<const BodyDetail> bodies{};  ///< Levels of detail of the avatars.
 
   /// Number of sets and meshes that a semantic sensor distinguishes.
   std::size_t things() const noexcept {
@@ -138,7 +139,8 @@ class SensorRequests {
     images.rgb = at[static_cast<std::size_t>(SensorKind::rgb)];
     images.median_depth = at[Plan::kDepth];
     images.alpha = at[static_cast<std::size_t>(SensorKind::alpha)];
-    requests_.push_back({{view.sets, &camera, view.config, images, view.meshes}, view.detail});
+    requests_.push_back(
+        {{view.sets, &camera, view.config, images, view.meshes}, view.detail, view.bodies});
   }
 
   /// Adds the images of pinhole group `g` for view number `v`; `camera`: its index in cameras_.
@@ -184,7 +186,9 @@ class SensorRequests {
       FrameImages<float> out;
       out.rgb = s.images.emplace_back(SemanticPasses<B>::kChannels * plan.size(s.buffer)).data();
       requests_.push_back(
-          {{s.sets.back(), &camera, &share_configs_[v], out, {s.meshes.back(), view.meshes.light}}, {}});
+          {{s.sets.back(), &camera, &share_configs_[v], out, {s.meshes.back(), view.meshes.light}},
+           {},
+           {}});
       ++render_count_;
     }
     shares_.push_back(std::move(s));

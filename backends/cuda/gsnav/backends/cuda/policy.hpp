@@ -20,6 +20,8 @@ struct Batch {
   static constexpr std::uint64_t kFewTiles = 512, kFewTilesEach = 16, kManyGaussians = 2'500'000;
   /// Above this number of tiles per multiprocessor, most lists are short.
   static constexpr std::uint64_t kShortListTiles = 16;
+  /// With at least this number of pairs of camera and set, they are prepared on the host's threads.
+  static constexpr std::size_t kThreadedInstances = 128;
   /// Number of calls that may be in progress before one is waited for.
   static constexpr int kInFlight = 3;
 };
