@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/detail/sim/batch_world.hpp"
 
+#include <algorithm>
 #include <functional>
 #include <utility>
 
@@ -138,7 +139,8 @@ Status BatchWorld::reset(const ParallelFor& run, std::span<const std::uint8_t> m
 
 Status BatchWorld::make_bodies(const ParallelFor& run, std::span<const std::size_t> which) {
   static const CapsuleSet nobody;
-  bodies_.trim(most_bodies_);
+  removed_.clear();
+  bodies_.trim(most_bodies_, removed_);
   missing_.clear();
   for (const std::size_t i : which) {
     Environment& e = environments_[i];
@@ -157,7 +159,9 @@ Status BatchWorld::make_bodies(const ParallelFor& run, std::span<const std::size
     }
   }
   made_.assign(missing_.size(), {});
-  run(missing_.size(), [&](std::size_t m) {
+  run(std::max(missing_.size(), removed_.size()), [&](std::size_t m) {
+    if (m < removed_.size()) removed_[m] = {};
+    if (m >= missing_.size()) return;
     const BodyCache::Key& key = missing_[m].key;
     made_[m] = detail::guarded([&] {
       std::vector<DynamicCapsule> capsules;

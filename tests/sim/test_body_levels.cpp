@@ -103,7 +103,8 @@ TEST_CASE("body levels: a small body is drawn with few Gaussians, nearer to the 
         for (const int size : {64, 128}) {
           const Camera camera = Camera::look_at(at + side * away + Vec3d{0, 1.4, 0}, at + Vec3d{0, 1, 0},
                                                 {0, 1, 0}, size, size, 90);
-          const std::size_t level = level_of_body(*body, whole, crowd.bounds(0), camera, choice);
+          const std::size_t level =
+              level_of_body(*body, whole.world_from_asset, crowd.bounds(0), camera, choice);
           const GaussianSet drawn = filtered_for_photo(crowd.set(0, level), choice);
           const auto truth = eval::oracle_photo(backend, std::span(&whole, 1), camera, 4).value();
           const auto direct = renderer.render(whole, camera).value();

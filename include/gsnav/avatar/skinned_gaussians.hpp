@@ -157,26 +157,31 @@ class SkinnedGaussians {
   /// The whole body, or a level of detail, and the arrays of its posed Gaussians.
   struct Level {
     Level(B& backend, std::shared_ptr<const AvatarArrays<B>> its)
-        : arrays(std::move(its)), args(arrays->skinning()), set(arrays->set()) {
-      const auto output = [&](std::size_t n) {
-        floats.emplace_back(backend).resize_discard(n);
-        return View<float>{floats.back().data(), n};
-      };
+        : arrays(std::move(its)), args(arrays->skinning()), set(arrays->set()), floats(backend) {
       ShapeRows& v = set.gaussians.shape;
       ColorRows& color = set.gaussians.color;
-      for (std::size_t k = 0; k < 3; ++k) v.means.set(k, args.means_out[k] = output(v.size));
+      const bool turns = color.degree >= 1,
+                 stretches = arrays->asset()->skinning == Skinning::linear_stretched;
+      // One block, because a batch has thousands of these. Each array begins at a multiple of 256 bytes.
+      const std::size_t stride = (v.size + 63) / 64 * 64;
+      floats.resize_exactly(stride * (7 + (turns ? 4 : 0) + (stretches ? 9 : 0)));
+      float* next = floats.data();
+      const auto output = [&] {
+        const View<float> array{next, v.size};
+        next += v.size == 0 ? 0 : stride;
+        return array;
+      };
+      for (std::size_t k = 0; k < 3; ++k) v.means.set(k, args.means_out[k] = output());
       for (std::size_t k = 0; k < 4; ++k) {
-        v.quats.set(k, args.quats_out[k] = output(v.size));
-        if (color.degree >= 1) color.rotations.set(k, args.rotations_out[k] = output(v.size));
+        v.quats.set(k, args.quats_out[k] = output());
+        if (turns) color.rotations.set(k, args.rotations_out[k] = output());
       }
-      if (arrays->asset()->skinning == Skinning::linear_stretched) {
-        for (std::size_t k = 0; k < 9; ++k) v.axes.set(k, args.axes_out[k] = output(v.size));
-      }
+      for (std::size_t k = 0; stretches && k < 9; ++k) v.axes.set(k, args.axes_out[k] = output());
     }
     std::shared_ptr<const AvatarArrays<B>> arrays;
     SkinningArgs<float> args;
     GaussianSet set;
-    std::vector<Buffer<float, B>> floats;  // A Buffer's memory does not move when the vector grows.
+    Buffer<float, B> floats;  // Its memory does not move when the level does.
   };
 
   /// The Gaussians of a level, placed in the world. Empty if that level was not posed.

@@ -139,6 +139,7 @@ class BasicBatchSimulator {
     places.get = [scene_of](std::size_t i) -> Result<BatchScene> {
       auto scene = scene_of(i);
       if (!scene) return scene.status();
+      if ((*scene)->avatars.empty()) return BatchScene{(*scene)->navmesh, {}, {}};
       return BatchScene{
           (*scene)->navmesh,
           [held = *scene](double t0, double t1, auto& out) { append_bodies(*held, t0, t1, out); },

@@ -142,7 +142,11 @@ class SkinnedCrowd {
   /// A box that contains the Gaussians of a place in its present pose.
   const ChunkBounds& bounds(std::size_t place) const noexcept { return actors_[place].bounds_now_; }
   /// Whether some level of a place is posed.
-  bool is_posed(std::size_t place) const noexcept { return actors_[place].wanted_ != 0; }
+  bool is_seen(std::size_t place) const noexcept { return actors_[place].wanted_ != 0; }
+  /// Whether a level of a place, or the whole body (0), is posed.
+  bool is_posed(std::size_t place, std::size_t level) const noexcept {
+    return (actors_[place].wanted_ >> level & 1) != 0;
+  }
   /// Number of places.
   std::size_t size() const noexcept { return actors_.size(); }
   /// The posed Gaussians of a place. Valid until the next pose().

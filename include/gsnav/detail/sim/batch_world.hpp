@@ -166,6 +166,7 @@ class BatchWorld {
   };
   std::vector<Missing> missing_;
   std::vector<Status> made_;
+  std::vector<CapsuleSet> removed_;
   std::vector<std::size_t> stepping_, resetting_, finished_;
   std::vector<BatchEpisode> episodes_;
   std::vector<EpisodeMetrics> final_metrics_;

@@ -6,6 +6,7 @@
 #include <list>
 #include <unordered_map>
 #include <utility>
+#include <vector>
 
 #include "gsnav/detail/nav/obstacles.hpp"
 
@@ -51,9 +52,15 @@ class BodyCache {
     order_.erase(at->second.place);
     entries_.erase(at);
   }
-  /// Removes the least recently used entries until at most `most` remain.
-  void trim(std::size_t most) {
-    while (entries_.size() > most) erase(Key(order_.front()));
+  /// Removes the least recently used entries until at most `most` remain, and appends their bodies to
+  /// `removed`, so that the caller can free them on several threads.
+  void trim(std::size_t most, std::vector<CapsuleSet>& removed) {
+    while (entries_.size() > most) {
+      const auto at = entries_.find(order_.front());
+      removed.push_back(std::move(at->second.bodies));
+      order_.pop_front();
+      entries_.erase(at);
+    }
   }
   /// Number of entries.
   std::size_t size() const noexcept { return entries_.size(); }

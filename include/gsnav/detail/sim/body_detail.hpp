@@ -14,18 +14,23 @@ namespace gsnav {
 struct BodyDetail {
   const AvatarAsset* asset = nullptr;  ///< Null: no camera sees the body, or it has no levels.
   ChunkBounds bounds{};                ///< A box that contains it, in its frame.
-  std::vector<GaussianSet> sets;       ///< By level, that of the whole body first, as the photo's pixels
-                                       ///< see them. Empty where a level was not posed.
+  Similarity world_from_body{};        ///< Its placement.
+  std::vector<GaussianSet> sets;       ///< The posed levels, filtered for the photo's pixels.
+  std::vector<std::size_t> levels;     ///< The level of each of `sets`; 0 is the whole body.
+
+  /// The set that a camera draws. Empty if the camera does not see the body.
+  GaussianSet set_for(const Camera& camera, const LodChoice& choice) const;
 };
 
 /// The level of a body that a camera draws: the coarsest whose error LodChoice allows, by the rule for
 /// nodes of a tree. 0 is the whole body.
-/// @param body a set with the body's placement and filter.
 /// @param bounds a box that contains the body, in its frame.
-inline std::size_t level_of_body(const AvatarAsset& asset, const GaussianSet& body,
+inline std::size_t level_of_body(const AvatarAsset& asset, const Similarity& world_from_body,
                                  const ChunkBounds& bounds, const Camera& camera,
                                  const LodChoice& choice) {
-  const auto p = make_projection_camera<double>(camera, body);
+  GaussianSet placed{};
+  placed.world_from_asset = world_from_body;
+  const auto p = make_projection_camera<double>(camera, placed);
   const double nearest = detail::SeenByCamera{p}.nearest(bounds);
   const double scale = max(p.fx, p.fy) / choice.pixels / nearest;
   std::size_t level = asset.levels.size();
@@ -34,6 +39,16 @@ inline std::size_t level_of_body(const AvatarAsset& asset, const GaussianSet& bo
     --level;
   }
   return level;
+}
+
+inline GaussianSet BodyDetail::set_for(const Camera& camera, const LodChoice& choice) const {
+  const std::size_t wanted = level_of_body(*asset, world_from_body, bounds, camera, choice);
+  for (std::size_t i = 0; i < sets.size(); ++i) {
+    if (levels[i] == wanted) return sets[i];
+  }
+  GaussianSet nothing = sets[0];
+  nothing.gaussians = {};
+  return nothing;
 }
 
 }  // namespace gsnav

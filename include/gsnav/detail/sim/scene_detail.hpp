@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <shared_mutex>
 #include <span>
 #include <tuple>
 #include <unordered_map>
@@ -52,7 +53,7 @@ class LodCells {
         camera.cx,    camera.cy,   camera.width, camera.height, camera.near_plane, choice.pixels,
         choice.grain, choice.photo};
     {
-      const std::scoped_lock lock(mutex_);
+      const std::shared_lock lock(mutex_);
       if (const auto found = cuts_.find(key); found != cuts_.end()) return found->second;
     }
     Aabb<double> box;
@@ -75,7 +76,7 @@ class LodCells {
  private:
   using Key = std::tuple<std::size_t, const LodTree*, VisibleSets::Key, std::optional<std::size_t>,
                          double, double, double, double, int, int, double, double, double, int>;
-  std::mutex mutex_;
+  std::shared_mutex mutex_;
   std::map<Key, std::shared_ptr<const LodCut>> cuts_;
   std::size_t chunks_ = 0;  // In all cuts.
 };
@@ -140,10 +141,8 @@ class DetailSets {
         sets.subspan(detail.assets.size() < sets.size() ? detail.assets.size() : sets.size());
     for (std::size_t i = 0; i < others.size(); ++i) {
       const BodyDetail* const body = i < bodies.size() ? &bodies[i] : nullptr;
-      sets_.push_back(body == nullptr || body->asset == nullptr
-                          ? others[i]
-                          : body->sets[level_of_body(*body->asset, body->sets[0], body->bounds, camera,
-                                                     detail.choice)]);
+      sets_.push_back(body == nullptr || body->asset == nullptr ? others[i]
+                                                                : body->set_for(camera, detail.choice));
     }
     return sets_;
   }

@@ -113,7 +113,8 @@ class SceneOnBackend {
       for (const Camera& c : cameras) {
         if (!SkinnedGaussians<B>::is_seen(c, config, body, bounds)) continue;
         levels |= whole_bodies || !lod_ ? 1 : 0;
-        if (lod_) levels |= std::uint32_t{1} << level_of_body(asset, body, bounds, c, *lod_);
+        if (lod_)
+          levels |= std::uint32_t{1} << level_of_body(asset, body.world_from_asset, bounds, c, *lod_);
       }
       return levels;
     };
@@ -181,12 +182,17 @@ class SceneOnBackend {
     for (std::size_t i = 0; i < s.bodies.size(); ++i) {
       const AvatarAsset& asset = *scene_->avatars[i].asset();
       BodyDetail& b = s.bodies[i];
-      b.asset = s.people.is_posed(i) && !asset.levels.empty() ? &asset : nullptr;
+      b.asset = s.people.is_seen(i) && !asset.levels.empty() ? &asset : nullptr;
       if (b.asset == nullptr) continue;
       b.bounds = s.people.bounds(i);
       b.sets.clear();
-      for (std::size_t l = 0; l <= asset.levels.size(); ++l)
+      b.levels.clear();
+      for (std::size_t l = 0; l <= asset.levels.size(); ++l) {
+        if (!s.people.is_posed(i, l)) continue;
         b.sets.push_back(filtered_for_photo(s.people.set(i, l), *lod_));
+        b.levels.push_back(l);
+        b.world_from_body = b.sets.back().world_from_asset;
+      }
     }
   }
   void list_sets(Slot& s) const {
