@@ -73,6 +73,13 @@ Similarity AvatarActor::placement(double t) const {
   return placement(t, pose);
 }
 
+std::optional<AvatarActor::PlacedBall> AvatarActor::joint_ball(double t) const {
+  const auto ball = motion_->joint_ball();
+  t = clock(t);
+  if (!ball || blending(t)) return {};
+  return PlacedBall{*ball, base_at(trajectory_->at(t - options_.time_begin))};
+}
+
 Similarity AvatarActor::joint_globals(double t, std::vector<Affine3<double>>& out) const {
   thread_local LocalPose pose;
   const Similarity world = placement(t, pose);
@@ -184,8 +191,12 @@ Similarity AvatarActor::placement_at(double t, LocalPose& pose, const std::vecto
     motion_->pose(input, pose);
   }
   // Put the path of a clip into the placement, so that joint matrices stay small numbers.
-  const Similarity base{axis_angle(Vec3d{0, 1, 0}, at.yaw), at.position, scale};
+  const Similarity base = base_at(at);
   return {base.rotation, base * pose.root, base.scale};
+}
+
+Similarity AvatarActor::base_at(const TrajectorySample& at) const {
+  return {axis_angle(Vec3d{0, 1, 0}, at.yaw), at.position, options_.scale};
 }
 
 }  // namespace gsnav

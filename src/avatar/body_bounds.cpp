@@ -50,6 +50,21 @@ ChunkBounds BodyBounds::at(const std::vector<Affine3<double>>& joints) const noe
     }
     first = false;
   }
+  return grown(out);
+}
+
+ChunkBounds BodyBounds::around(const Vec3d& center, double radius) const noexcept {
+  double reach = 0;
+  for (const double r : reach_) reach = max(reach, r);
+  const Vec3d half = Vec3d{1, 1, 1} * (radius + reach * (1 + 1e-5) + 1e-5);
+  ChunkBounds out;
+  out.low = center - half;
+  out.high = center + half;
+  return grown(out);
+}
+
+/// Widens a box for dual quaternions, and sets the largest scale and opacity.
+ChunkBounds BodyBounds::grown(ChunkBounds out) const noexcept {
   // Let d_k be the distance between the positions that joint k and the first joint give a Gaussian. The
   // blend q = sum w_k q_k moves it away from the first one's by sum w_k d_k q_k conj(q) / |q|^2, which
   // is at most sum w_k |d_k| / |q|. |q| is at least the first weight, because no q_k points away from

@@ -12,6 +12,9 @@ namespace gsnav {
 namespace {
 
 constexpr double kTau = 6.283185307179586;
+// How far the pelvis moves in a walk, metres: to each side, and up and down.
+constexpr double kSway = 0.018, kBob = 0.020;
+constexpr double kStand = 0.012;  // keeps knees from locking, metres
 
 Quatd about_x(double degrees) noexcept { return axis_angle(Vec3d{1, 0, 0}, degrees * kTau / 360); }
 Quatd about_y(double degrees) noexcept { return axis_angle(Vec3d{0, 1, 0}, degrees * kTau / 360); }
@@ -193,18 +196,30 @@ void WalkMotion::prepare() {
     (stretch > 0.998 ? low : high) = drop;
   }
   pelvis_drop_ = high;
+
+  // Rotations keep the length of bones. Only the pelvis is translated: to the side, up and down, and by
+  // the drop (body()).
+  const double moved = norm(Vec3d{kSway, kBob + max(kStand, pelvis_drop_), 0});
+  joint_ball_ = {rest(kPelvis), 0.0};
+  std::vector<double> away;  // of each joint from the centre, at most
+  for (std::size_t j = 0; j < parents_.size(); ++j) {
+    const std::int32_t p = parents_[j];
+    const double bone = p < 0 ? norm(rest_.translations[j] - joint_ball_.center)
+                              : away[static_cast<std::size_t>(p)] + norm(rest_.translations[j]);
+    away.push_back(bone + (j == at(kPelvis) ? moved : 0.0));
+    joint_ball_.radius = max(joint_ball_.radius, away.back() + 1e-6);
+  }
 }
 
 WalkMotion::Body WalkMotion::body(double phase, double walking, double drop) const {
   Body b;
   const double mid = 0.5 * options_.duty;  // phase at which the right leg is upright
-  const double stand = 0.012;              // keeps knees from locking
   b.roll = 3.0 * walking * std::cos(kTau * (phase - mid));
   b.rotation =
       about_y(6.0 * walking * std::cos(kTau * phase)) * about_z(b.roll) * about_x(-2.0 * walking);
-  const double bob = 0.020 * walking * std::cos(2 * kTau * (phase - mid + 0.03));
-  b.pelvis = rest(kPelvis) + Vec3d{0.018 * walking * std::cos(kTau * (phase - mid)),
-                                   bob - stand - walking * (drop - stand), 0};
+  const double bob = kBob * walking * std::cos(2 * kTau * (phase - mid + 0.03));
+  b.pelvis = rest(kPelvis) + Vec3d{kSway * walking * std::cos(kTau * (phase - mid)),
+                                   bob - kStand - walking * (drop - kStand), 0};
   return b;
 }
 

@@ -3,7 +3,12 @@
 #include <doctest/doctest.h>
 
 #include <cstring>
+#include <span>
+#include <vector>
 
+#include "gsnav/avatar/skinned_gaussians.hpp"
+#include "gsnav/backends/serial.hpp"
+#include "gsnav/core/rng.hpp"
 #include "gsnav/detail/demo/people.hpp"
 #include "sim_scene.hpp"
 
@@ -59,6 +64,58 @@ std::vector<AvatarActor> actors() {
 }
 
 }  // namespace
+
+TEST_CASE("a ball of joints contains all of them, and its placement is that of the pose") {
+  int known = 0;
+  double used = 0;
+  for (const AvatarActor& actor : actors()) {
+    for (int i = 0; i < 400; ++i) {
+      const double t = 0.061 * i;
+      const auto ball = actor.joint_ball(t);
+      if (!ball) continue;
+      ++known;
+      std::vector<Affine3<double>> globals;
+      const Similarity world = actor.joint_globals(t, globals);
+      REQUIRE(world.translation == ball->placement.translation);
+      REQUIRE(world.scale == ball->placement.scale);
+      const Vec3d p{0.3, -0.2, 0.7};
+      REQUIRE(norm(world * p - ball->placement * p) < 1e-12);
+      for (const Affine3<double>& g : globals) {
+        const double away = norm(g.translation - ball->joints.center);
+        REQUIRE(away <= ball->joints.radius);
+        used = max(used, away / ball->joints.radius);
+      }
+    }
+  }
+  CHECK(known == 800);  // of the walkers
+  CHECK(used > 0.4);
+}
+
+TEST_CASE("a body that is skipped by its ball is not seen by its pose") {
+  const AvatarActor actor = peopled_scene(2000).avatars[0];
+  SerialBackend backend;
+  SkinnedGaussians<SerialBackend> skin(backend, actor.asset());
+  const BodyBounds bounds(*actor.asset());
+  Rng rng(4);
+  int seen = 0, outside = 0;
+  for (int i = 0; i < 600; ++i) {
+    const double t = rng.uniform(0, 30);
+    const Vec3d at = actor.placement(t).translation;
+    const Vec3d eye = at + Vec3d{rng.uniform(-4, 4), rng.uniform(0.2, 2), rng.uniform(-4, 4)};
+    const Vec3d to = at + Vec3d{rng.uniform(-4, 4), rng.uniform(0, 2), rng.uniform(-4, 4)};
+    const Camera camera = Camera::look_at(eye, to, {0, 1, 0}, 40, 30, 80);
+    REQUIRE(skin.prepare(actor, t, std::span(&camera, 1), {}).ok());
+    std::vector<Affine3<double>> globals;
+    GaussianSet set{};
+    set.world_from_asset = actor.joint_globals(t, globals);
+    set.eps2d = actor.asset()->cloud.eps2d;
+    const bool truth = SkinnedGaussians<SerialBackend>::is_seen(camera, {}, set, bounds.at(globals));
+    REQUIRE((skin.set().gaussians.size() != 0) == truth);
+    (truth ? seen : outside) += 1;
+  }
+  CHECK(seen > 100);
+  CHECK(outside > 100);
+}
 
 TEST_CASE("capsules are those of the whole pose, bit for bit") {
   for (const AvatarActor& actor : actors()) {

@@ -26,8 +26,8 @@ using cuda::BatchSet;
 bool is_of_few(std::uint64_t cameras, std::uint64_t tiles, std::uint64_t gaussians, bool cuts,
                int multiprocessors) {
   using Policy = cuda::policy::Batch;
-  const bool doubled = gaussians >= Policy::kManyGaussians * cameras ||
-                       (cuts && tiles <= Policy::kSmallImageTiles);
+  const bool doubled =
+      gaussians >= Policy::kManyGaussians * cameras || (cuts && tiles <= Policy::kSmallImageTiles);
   const std::uint64_t each = (doubled ? 2 : 1) * Policy::kFewTilesEach;
   return tiles <= Policy::kFewTiles &&
          cameras * tiles <= each * static_cast<std::uint64_t>(multiprocessors);
@@ -231,9 +231,8 @@ bool CudaBatchRenderer::State::plan_tiles(std::span<const GaussianSet> sets,
                                           std::uint64_t gaussians) {
   const int width = cameras[0].camera.width, height = cameras[0].camera.height;
   args.grid = TileGrid::of(width, height, cuda::policy::Batch::kTile);
-  const bool cuts = std::any_of(sets.begin(), sets.end(), [](const GaussianSet& s) {
-    return !s.selection.drawn_chunks.empty();
-  });
+  const bool cuts = std::any_of(sets.begin(), sets.end(),
+                                [](const GaussianSet& s) { return !s.selection.drawn_chunks.empty(); });
   const bool few = is_of_few(args.cameras, args.grid.count(), gaussians, cuts, multiprocessors);
   if (few) args.grid = TileGrid::of(width, height, cuda::policy::Batch::kSmallTile);
   args.tiles = static_cast<std::uint32_t>(

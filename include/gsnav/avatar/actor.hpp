@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "gsnav/avatar/asset.hpp"
@@ -61,6 +62,14 @@ class AvatarActor {
   /// Transform from the avatar's root frame (Y up, facing -Z, feet on y = 0) to the world.
   Similarity placement(double t) const;
 
+  /// A ball that contains all joints at time t, and placement(t), without posing the body.
+  struct PlacedBall {
+    JointBall joints;      ///< In the root frame.
+    Similarity placement;  ///< Transform from the root frame to the world.
+  };
+  /// Empty if the motion knows no ball, or during the blend of a looping clock.
+  std::optional<PlacedBall> joint_ball(double t) const;
+
   /// Fills `out` with the transforms from joints to the root frame, [J], metres. Returns placement(t).
   Similarity joint_globals(double t, std::vector<Affine3<double>>& out) const;
 
@@ -96,6 +105,7 @@ class AvatarActor {
   Similarity placement(double t, LocalPose& pose, const std::vector<char>* needed = nullptr) const;
 
   Similarity placement_at(double t, LocalPose& pose, const std::vector<char>* needed) const;
+  Similarity base_at(const TrajectorySample& at) const;
 
   /// Calls f(index, capsule in the world) for each proxy capsule at time t.
   template <class F>

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -26,6 +27,12 @@ struct MotionInput {
   double turning = 0.0;  ///< Weight of turning on the spot, in [0, 1].
 };
 
+/// A ball around joints.
+struct JointBall {
+  Vec3d center{};       ///< Metres, in the avatar's root frame.
+  double radius = 0.0;  ///< Metres.
+};
+
 /// Gives the local transforms of all joints over time. Implementations are immutable, so that many
 /// actors on many threads may share one.
 class MotionSource {
@@ -37,6 +44,9 @@ class MotionSource {
   /// ancestors of a needed joint must be needed too.
   virtual void pose_of(const MotionInput& input, [[maybe_unused]] const std::vector<char>& needed,
                        LocalPose& out) const;
+  /// A ball that contains the positions of all joints in every pose, if one is known. LocalPose::root is
+  /// zero in all poses then. It tells without a pose that a camera does not see the avatar.
+  virtual std::optional<JointBall> joint_ball() const { return {}; }
   /// Number of joints of each pose.
   virtual std::size_t joint_count() const noexcept = 0;
   /// Checks the motion. Errors: invalid_argument naming the field.

@@ -197,6 +197,11 @@ class SkinnedGaussians {
   template <class Wanted>
   Status prepare_levels(const AvatarActor& actor, double t, const Wanted& wanted) {
     if (Status s = present(actor, t); !s || wanted_ == 0) return s;
+    if (const auto rough = actor.joint_ball(t)) {
+      world_ = rough->placement;
+      wanted_ = wanted(set_of(0), bounds_.around(rough->joints.center, rough->joints.radius));
+      if (wanted_ == 0) return {};
+    }
     world_ = actor.joint_globals(t, matrices_);
     bounds_now_ = bounds_.at(matrices_);
     wanted_ = wanted(set_of(0), bounds_now_);

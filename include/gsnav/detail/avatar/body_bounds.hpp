@@ -20,8 +20,11 @@ class BodyBounds {
 
   /// The box for a pose. `joints` [J]: joint to root frame, metres.
   ChunkBounds at(const std::vector<Affine3<double>>& joints) const noexcept;
+  /// A box for all poses whose joints are in a ball (root frame, metres).
+  ChunkBounds around(const Vec3d& center, double radius) const noexcept;
 
  private:
+  ChunkBounds grown(ChunkBounds box) const noexcept;
   void add(const AvatarAsset& asset, const std::vector<Affine3<double>>& bind_inverses);
 
   std::vector<double> reach_;  // [J] metres; negative: the joint moves nothing

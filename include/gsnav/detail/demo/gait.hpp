@@ -37,6 +37,7 @@ class WalkMotion final : public MotionSource {
   static Result<WalkMotion> create(const Skeleton& skeleton, const GaitOptions& options = {});
 
   std::size_t joint_count() const noexcept override { return parents_.size(); }
+  std::optional<JointBall> joint_ball() const override { return joint_ball_; }
   /// Metres from one footfall to the next of the same foot.
   double stride() const noexcept { return stride_; }
   /// The options.
@@ -110,6 +111,7 @@ class WalkMotion final : public MotionSource {
   std::vector<Rest> rest_globals_;
   std::vector<double> curl_;
   double hang_[2] = {};
+  JointBall joint_ball_;
   Vec3d heel_[2], ball_[2];
   double stride_ = 1.3, pelvis_drop_ = 0.0;
 };
