@@ -169,7 +169,7 @@ class Workers:
         self._actors, self._local = [], None
 
     def _remote(self, pieces: list[Any], make_policy: Any, keep: Any) -> Iterator[list[Rollout]]:
-        ray, policy = self._ray, self._ray.put(make_policy)
+        ray, gone, policy = self._ray, self._ray.exceptions, self._ray.put(make_policy)
         todo, deaths = list(range(len(pieces))), collections.Counter[int]()  # `todo` is a heap.
         done, idle = dict[int, list[Rollout]](), list[Any]()
         working = {actor.ready.remote(): (actor, -1) for actor in self._actors}
@@ -182,8 +182,8 @@ class Workers:
             actor, index = working.pop(future)
             try:
                 result = ray.get(future)
-            except ray.exceptions.RayActorError as e:
-                self.deaths += 1
+            except (gone.RayActorError, gone.ObjectLostError, gone.OutOfMemoryError, gone.NodeDiedError) as e:
+                self.deaths += 1  # A result may be lost with a node although its actor has ended the piece.
                 deaths[index] += 1
                 if deaths[index] >= DEATHS * (1 if index >= 0 else len(self._actors)):
                     raise BackendFailure(f"gsnav.ray: actors died again and again: {e}") from e

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
 import os
+import time
 
 import numpy as np
 import pytest
@@ -8,12 +9,13 @@ import pytest
 import gsnav
 import gsnav.ray
 
-CONFIG = gsnav.SimulatorConfig(sensors=gsnav.rgbd_sensors(8, 12), task=gsnav.TaskConfig(max_steps=15))
+CONFIG = gsnav.SimulatorConfig(sensors=gsnav.rgbd_sensors(16, 24), task=gsnav.TaskConfig(max_steps=15))
 
 
-def policy_maker():
+def policy_maker(slow=1000):
     """Maker of a policy whose actions depend on images and on random numbers of the episode.
 
+    It is slow in episodes from the index `slow` on.
     It is a local function, so that Ray sends it by value: actors cannot import the tests.
     """
 
@@ -22,7 +24,8 @@ def policy_maker():
         before = [-1] * envs.num_envs
 
         def policy(observations, playing):
-            assert observations["rgb"].shape == (envs.num_envs, 8, 12, 3) and playing.shape == (envs.num_envs,)
+            assert observations["rgb"].shape == (envs.num_envs, 16, 24, 3) and playing.shape == (envs.num_envs,)
+            time.sleep(0.05 * (max(playing) >= slow))
             actions = []
             for e, index in enumerate(playing):
                 steps[e] = steps[e] + 1 if index == before[e] else 0
@@ -92,18 +95,19 @@ def test_a_cluster_of_two_nodes_one_killed(episodes, alone, tmp_path):
     ray = pytest.importorskip("ray")
     from ray.cluster_utils import Cluster
 
-    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 3})
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
     try:
-        node = cluster.add_node(num_cpus=1, resources={"second": 1})
+        node = cluster.add_node(num_cpus=2)
         ray.init(address=cluster.address, log_to_driver=False, logging_level="ERROR")
-        workers = gsnav.ray.Workers(actors=2, environments=3, config=CONFIG,
-                                    options={"scheduling_strategy": "SPREAD"})
+        workers = gsnav.ray.Workers(actors=3, environments=3, config=CONFIG)
+        ray.get([actor.ready.remote() for actor in workers._actors])
         played = []
-        for rollout in workers.rollouts(episodes, policy_maker(), piece=4, keep=["depth"]):
+        for rollout in workers.rollouts(episodes, policy_maker(slow=8), piece=8, keep=["rgb", "depth"]):
             if not played:
+                # The other two actors end their pieces. One of them is on the node, and its result is lost.
                 where = [a.__ray_call__.remote(lambda _: ray.get_runtime_context().get_node_id())
                          for a in workers._actors]
-                assert len(set(ray.get(where))) == 2
+                assert sorted(ray.get(where)).count(node.node_id) == 2
                 cluster.remove_node(node, allow_graceful=False)
             if len(played) == 13:
                 ray.kill(workers._actors[0])
@@ -112,6 +116,7 @@ def test_a_cluster_of_two_nodes_one_killed(episodes, alone, tmp_path):
         assert "".join(r.line() + "\n" for r in played).encode() == alone[0].split(b"\n", 1)[1]
         assert all(np.array_equal(a.observations["depth"], b.observations["depth"]) for a, b in zip(played, alone[1]))
         workers.close()
+        cluster.add_node(num_cpus=2)
         for actors in (1, 3):
             workers = gsnav.ray.Workers(actors=actors, environments=3, config=CONFIG)
             workers.evaluate(episodes, policy_maker(), tmp_path / f"{actors}.jsonl", piece=4)
