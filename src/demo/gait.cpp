@@ -68,7 +68,9 @@ Result<WalkMotion> WalkMotion::create(const Skeleton& skeleton, const GaitOption
     const std::string& n = skeleton.names[j];
     const bool finger = n.find("index") != n.npos || n.find("middle") != n.npos ||
                         n.find("ring") != n.npos || n.find("pinky") != n.npos;
-    m.curl_.push_back(!finger ? 0.0 : (n.compare(0, 4, "left") == 0 ? 16.0 : -16.0));
+    const double curl = !finger ? 0.0 : (n.compare(0, 4, "left") == 0 ? 16.0 : -16.0);
+    m.curls_.push_back(finger ? 1 : 0);
+    m.curl_.push_back(about_z(curl));
   }
   m.prepare();
   return m;
@@ -106,9 +108,11 @@ void WalkMotion::pose(const Steps& steps, double walking, double time, const std
                       LocalPose& out) const {
   const double cycles = steps.cycles;
   const double phase = cycles - std::floor(cycles);
-  thread_local std::vector<Quatd> turn;  // rotation of each joint from the bind pose, in the root frame
+  // Rotation of each joint from the bind pose, and from joint to root frame.
+  thread_local std::vector<Quatd> turn, global;
   thread_local std::vector<char> set;
   turn.resize(parents_.size());
+  global.resize(parents_.size());
   set.assign(parents_.size(), 0);
   const Body b = body(phase, walking, pelvis_drop_);
   out.translations = rest_.translations;
@@ -144,21 +148,22 @@ void WalkMotion::pose(const Steps& steps, double walking, double time, const std
 
     const double swing = 2.0 - s * options_.arm_swing * walking * c + 0.5 * breath * (1 - walking);
     const double flex = 13.0 + walking * (7.0 + 0.35 * max(swing, -12.0));
-    const Quatd hang = about_z(s * hang_[side]);
-    give(at(first + 4), chest * about_z(0.12 * s * hang_[side]));
-    const Quatd upper = chest * about_x(swing) * hang;
+    const Arm& arm = arms_[side];
+    give(at(first + 4), chest * arm.collar);
+    const Quatd upper = chest * about_x(swing) * arm.hang;
     give(at(first + 5), upper);
-    give(at(first + 6), chest * about_x(swing + flex) * about_z(-2.0 * s) * hang);
-    give(at(first + 7), turn[at(first + 6)] * about_x(4.0));
+    give(at(first + 6), chest * about_x(swing + flex) * arm.elbow * arm.hang);
+    give(at(first + 7), turn[at(first + 6)] * arm.wrist);
   }
   out.rotations.resize(parents_.size());
   for (std::size_t j = 0; j < parents_.size(); ++j) {
     if (!needed.empty() && needed[j] == 0) continue;
     const std::int32_t p = parents_[j];
     const Quatd above = p < 0 ? Quatd{} : turn[static_cast<std::size_t>(p)];
-    if (set[j] == 0) turn[j] = curl_[j] < 0 || curl_[j] > 0 ? above * about_z(curl_[j]) : above;
-    const Quatd parent = p < 0 ? Quatd{} : above * rest_globals_[static_cast<std::size_t>(p)].rotation;
-    out.rotations[j] = conjugate(parent) * (turn[j] * rest_globals_[j].rotation);
+    if (set[j] == 0) turn[j] = curls_[j] != 0 ? above * curl_[j] : above;
+    global[j] = turn[j] * rest_globals_[j].rotation;
+    const Quatd parent = p < 0 ? Quatd{} : global[static_cast<std::size_t>(p)];
+    out.rotations[j] = conjugate(parent) * global[j];
     normalize(out.rotations[j]);
   }
 }
@@ -171,7 +176,9 @@ void WalkMotion::prepare() {
     const int first = side == 0 ? kRightHip : kLeftHip;
     const Vec3d arm = rest(first + 6) - rest(first + 5);
     // Rotation from the bind pose to an arm that hangs 8 degrees away from the body.
-    hang_[side] = -(82.0 - std::atan2(-arm.y, abs(arm.x)) * 360 / kTau);
+    const double s = side == 0 ? 1.0 : -1.0,
+                 hang = -(82.0 - std::atan2(-arm.y, abs(arm.x)) * 360 / kTau);
+    arms_[side] = {about_z(0.12 * s * hang), about_z(s * hang), about_z(-2.0 * s), about_x(4.0)};
     const Vec3d ankle = rest(first + 2), ball = rest(first + 3);
     // Pivots of the foot: the joint of the toes, so that the toes stay flat on the floor, and the edge
     // of the heel.

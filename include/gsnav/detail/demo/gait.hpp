@@ -74,6 +74,10 @@ class WalkMotion final : public MotionSource {
     Vec3d ankle;
     double pitch = 0, toe = 0;  // degrees, toe up positive
   };
+  /// Rotations of the parts of an arm that are the same in all poses.
+  struct Arm {
+    Quatd collar, hang, elbow, wrist;
+  };
   struct Leg {
     Quatd thigh, shin;
     double stretch;  // of the leg; 1: straight
@@ -109,8 +113,9 @@ class WalkMotion final : public MotionSource {
   std::vector<std::int32_t> parents_;
   LocalPose rest_;
   std::vector<Rest> rest_globals_;
-  std::vector<double> curl_;
-  double hang_[2] = {};
+  std::vector<char> curls_;  // 1 for a finger
+  std::vector<Quatd> curl_;  // of a finger, from its parent
+  Arm arms_[2];
   JointBall joint_ball_;
   Vec3d heel_[2], ball_[2];
   double stride_ = 1.3, pelvis_drop_ = 0.0;
