@@ -26,8 +26,10 @@ concept HasHostThreads = requires(B& b) {
 /// Calls f(i) for i in [0, n) on the threads of a pool, in any order.
 template <class F>
 void for_each_in(ThreadPool& pool, std::size_t n, const F& f) {
-  constexpr std::size_t kPieces = 64;  // more than threads, because items differ in cost
-  const std::size_t piece = n / kPieces + 1;
+  // Many more than threads, because items differ in cost and the last round of pieces is rarely full.
+  constexpr std::size_t kPieces = 128;
+  const std::size_t piece = (n + kPieces - 1) / kPieces;
+  if (n == 0) return;
   pool.run(static_cast<std::uint32_t>((n + piece - 1) / piece), [&f, n, piece](std::uint32_t p) {
     for (std::size_t i = p * piece; i < std::min(n, (p + 1) * piece); ++i) f(i);
   });
