@@ -14,6 +14,8 @@ namespace {
 
 /// Positions tried along each axis of a cube.
 constexpr int kTries = 4;
+/// Largest height, metres. Numbers of cubes must fit in 64 bits.
+constexpr double kMaxHeight = 1e6;
 
 using Key = std::array<std::int64_t, 3>;
 
@@ -68,9 +70,12 @@ Result<std::vector<Vec3d>> navmesh_viewpoints(const NavMesh& mesh, std::span<con
                                               ": must be at least 0.01");
   }
   if (heights.empty()) return Status(Errc::invalid_argument, "navmesh_viewpoints: no height");
-  for (const double h : heights) {
-    if (!std::isfinite(h))
-      return Status(Errc::invalid_argument, "navmesh_viewpoints: a height that is not finite");
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    if (!(std::abs(heights[i]) <= kMaxHeight)) {
+      return Status(Errc::invalid_argument, "navmesh_viewpoints: heights[" + std::to_string(i) +
+                                                "] = " + std::to_string(heights[i]) +
+                                                ": must be within 1e6 metres");
+    }
   }
   std::map<Key, Choice> chosen;
   for (const std::array<Vec3d, 3>& triangle : mesh.triangles()) {

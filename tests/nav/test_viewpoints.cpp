@@ -58,5 +58,7 @@ TEST_CASE("viewpoints: what cannot be is refused by name") {
   CHECK(navmesh_viewpoints(mesh, one, std::numeric_limits<double>::infinity()).code() ==
         Errc::invalid_argument);
   CHECK(navmesh_viewpoints(mesh, {}).message().find("no height") != std::string::npos);
-  CHECK(navmesh_viewpoints(mesh, bad).message().find("height") != std::string::npos);
+  CHECK(navmesh_viewpoints(mesh, bad).message().find("heights[0] = nan") != std::string::npos);
+  const std::vector<double> high{1.5, 1e300};
+  CHECK(navmesh_viewpoints(mesh, high).message().find("heights[1] = 1") != std::string::npos);
 }

@@ -13,7 +13,7 @@ namespace gsnav {
 /// cube of that size that contains candidates, the one nearest to its middle, seen from above, is
 /// returned. World coordinates, metres, in a fixed order.
 /// @return invalid_argument if the spacing is below 1 cm or not finite, or if there are no heights or
-/// one is not finite.
+/// one is not within 1e6 metres.
 Result<std::vector<Vec3d>> navmesh_viewpoints(const NavMesh& mesh, std::span<const double> heights,
                                               double spacing = 0.25);
 
