@@ -129,6 +129,18 @@ void bind_settings_of_mesh(nb::module_& m) {
           nb::sig("def __eq__(self, other: object, /) -> bool"));
 }
 
+std::optional<NavPoint> random_point_near(const NavMesh& mesh, Rng& rng, const Vec3d& point,
+                                          double radius, std::optional<std::size_t> island) {
+  Rng own = rng;  // Other threads may use `rng` while the GIL is released.
+  std::optional<NavPoint> found;
+  {
+    const ReleaseGil release;
+    found = mesh.random_point_near(own, point, radius, island);
+  }
+  rng = own;
+  return found;
+}
+
 void bind_points(nb::class_<NavMesh>& c) {
   c.def("snap_point", &NavMesh::snap_point, nb::arg("point"), nb::arg("options") = SnapOptions{},
         Release(),
@@ -144,8 +156,8 @@ void bind_points(nb::class_<NavMesh>& c) {
            "polygon.")
       .def("random_point", &NavMesh::random_point, nb::arg("rng"), nb::arg("island") = nb::none(),
            "Random point, uniform over the area of the surface or of one island.")
-      .def("random_point_near", &NavMesh::random_point_near, nb::arg("rng"), nb::arg("point"),
-           nb::arg("radius"), nb::arg("island") = nb::none(),
+      .def("random_point_near", random_point_near, nb::arg("rng"), nb::arg("point"), nb::arg("radius"),
+           nb::arg("island") = nb::none(),
            "Random point, uniform over the surface within `radius` metres. None if that part is empty.")
       .def("distance_to_closest_obstacle", &NavMesh::distance_to_closest_obstacle, nb::arg("point"),
            nb::arg("max_radius") = 2.0, nb::arg("options") = SnapOptions{}, Release(),

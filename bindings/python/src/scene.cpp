@@ -8,6 +8,7 @@
 #include "gsnav/open.hpp"
 #include "gsnav/scene/lod_tree.hpp"
 #include "gsnav/scene/visible_sets.hpp"
+#include "guard.hpp"
 
 namespace gsnav::python {
 namespace {
@@ -65,18 +66,30 @@ std::string name_from(nb::handle name) {
 
 OpenedScene open(nb::handle named, OpenOptions options, const nb::object& progress) {
   const std::string name = name_from(named);
+  if (options.levels != SceneLevels::none || options.visible_sets == "auto") {
+    check_fork(options.device, "open_scene");  // Other options do not compute on the device.
+  }
+  std::optional<nb::python_error> stop;
   if (!progress.is_none()) {
-    options.progress = [&progress](const std::string& task, double share) {
+    options.progress = [&progress, &stop](const std::string& task, double share) {
       HoldGil gil;
       try {
         call_python(progress, task, share);
       } catch (nb::python_error& e) {
-        e.discard_as_unraisable("gsnav.open_scene: progress");
+        if (e.matches(PyExc_Exception)) {
+          e.discard_as_unraisable("gsnav.open_scene: progress");
+        } else if (!stop) {
+          stop.emplace(std::move(e));  // Such as Ctrl-C: it is raised when the work is done.
+        }
       }
     };
   }
-  const ReleaseGil release;
-  return open_scene(name, options).value();
+  auto opened = [&] {
+    const ReleaseGil release;
+    return open_scene(name, options);
+  }();
+  if (stop) throw std::move(*stop);
+  return std::move(opened).value();
 }
 
 nb::object itself(nb::handle self) { return nb::borrow(self); }
@@ -150,8 +163,10 @@ void bind_scene(nb::module_& m) {
       "Opens a scene by its name: \"default\" (the flat that gsnav makes without data), a file (PLY, "
       "SOG, "
       "SPZ, glTF, ...), a folder, or a scene of a Habitat dataset.\n\n"
-      "`progress(task, share)` is called from time to time, from any thread. Raises FileNotFound, "
-      "InvalidFile, Unsupported, InvalidArgument or NothingNavigable, naming the file or the option.");
+      "`progress(task, share)` is called from time to time, from any thread. Its errors are printed, "
+      "and "
+      "Ctrl-C in it is raised when the work is done. Raises FileNotFound, InvalidFile, Unsupported, "
+      "InvalidArgument or NothingNavigable, naming the file or the option.");
   m.def(
       "views_around",
       [](const OpenedScene& scene, int count, int width, int height, double hfov) {

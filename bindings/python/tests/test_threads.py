@@ -81,6 +81,14 @@ def test_progress_is_called_and_its_errors_do_not_stop_the_work(capfd):
     assert calls and all(0 <= share <= 1 for _, share in calls)
 
 
+def test_ctrl_c_in_progress_is_not_lost():
+    def stop(task, share):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        gsnav.open_scene("default", gsnav.OpenOptions(navmesh="gaussians", density=0.05), stop)
+
+
 def _in_child(function):
     """Runs function in a forked child. Returns its exit status, or None after 60 s."""
     pid = os.fork()
@@ -110,6 +118,10 @@ def test_fork(opened):
     assert _in_child(lambda: renderer.render(camera)) == 7
     assert _in_child(lambda: gsnav.Renderer("cpu", opened)) == 7
     assert _in_child(lambda: gsnav.Renderer("serial", opened).render(camera)) == 0
+    built = gsnav.OpenOptions(density=0.05, levels=gsnav.SceneLevels.built, device=gsnav.Device.parse("cpu"))
+    assert _in_child(lambda: gsnav.open_scene("default", built)) == 7
+    built.device = gsnav.Device.parse("serial")
+    assert _in_child(lambda: gsnav.open_scene("default", built)) == 0
     assert renderer.render(camera).rgb.any()
 
 
