@@ -24,7 +24,7 @@ using namespace gsnav_test;
 
 namespace {
 
-std::shared_ptr<const AvatarAsset> body_with_levels(std::uint64_t seed, std::size_t gaussians) {
+std::shared_ptr<const AvatarAsset> body_with_levels(std::uint64_t seed, int gaussians) {
   HumanoidOptions options = random_person(seed);
   options.gaussians = gaussians;
   auto body = std::make_shared<AvatarAsset>(make_humanoid(options));
