@@ -10,7 +10,7 @@
 namespace gsnav::python {
 namespace {
 
-using Array = nb::ndarray<nb::ro, nb::device::cpu>;
+using Array = AnyArray<nb::ndarray<nb::ro, nb::device::cpu>>;
 
 [[noreturn]] void wrong_shape(const char* what, const Array& array, std::size_t environments) {
   std::string shape;

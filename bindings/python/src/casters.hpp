@@ -12,6 +12,7 @@
 #include <memory>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 #include "gil.hpp"
 #include "gsnav/device/device.hpp"
@@ -50,10 +51,27 @@ T element(const Array& array, std::size_t i) noexcept {
   return value;
 }
 
+/// Whether nanobind can read the buffer of an object. numpy's scalars of dates and durations export one
+/// of a dimension without strides, which nanobind would read nevertheless.
+inline bool has_strides(nb::handle source) noexcept {
+  Py_buffer view;
+  if (!PyObject_CheckBuffer(source.ptr())) return true;
+  if (PyObject_GetBuffer(source.ptr(), &view, PyBUF_RECORDS_RO) != 0) return PyErr_Clear(), true;
+  const bool good = view.ndim == 0 || view.strides != nullptr;
+  PyBuffer_Release(&view);
+  return good;
+}
+
+/// An nb::ndarray that is made of anything that Python code may pass.
+template <class A>
+struct AnyArray : A {
+  using A::A;
+};
+
 /// Reads `count` numbers from an array of float32 or float64 in host memory, by DLPack or the buffer
 /// protocol. Returns false if it is anything else.
 inline bool read_array(nb::handle source, double* out, Py_ssize_t count) noexcept {
-  nb::ndarray<nb::ro, nb::device::cpu> array;
+  AnyArray<nb::ndarray<nb::ro, nb::device::cpu>> array;
   if (!nb::try_cast(source, array, false) || array.ndim() != 1) return false;
   if (array.shape(0) != static_cast<std::size_t>(count)) return false;
   const bool wide = array.dtype() == nb::dtype<double>();
@@ -125,6 +143,17 @@ T& object_of(nb::handle self) {
 }  // namespace gsnav::python
 
 namespace nanobind::detail {
+
+template <class A>
+struct type_caster<gsnav::python::AnyArray<A>> {
+  NB_TYPE_CASTER(gsnav::python::AnyArray<A>, make_caster<A>::Name)
+  bool from_python(handle source, std::uint32_t flags, cleanup_list* cleanup) noexcept {
+    make_caster<A> array;
+    if (!gsnav::python::has_strides(source) || !array.from_python(source, flags, cleanup)) return false;
+    static_cast<A&>(value) = std::move(array.value);
+    return true;
+  }
+};
 
 template <>
 struct type_caster<gsnav::Vec3d> {

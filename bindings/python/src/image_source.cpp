@@ -19,7 +19,7 @@ ImageSource image_source(std::shared_ptr<PythonImageSource> source, const Device
         "image_source(" + std::to_string(sensor) + ", " + std::to_string(floats) + ")";
     try {
       const nb::object made = call_python(source->function, sensor, floats);
-      nb::ndarray<float, nb::c_contig> array;
+      AnyArray<nb::ndarray<float, nb::c_contig>> array;
       if (!nb::try_cast(made, array, false)) {
         return {Errc::invalid_argument,
                 call + " returned " + type_of(made) + ": return a writable, contiguous float32 array"};

@@ -11,7 +11,7 @@ namespace gsnav::python {
 namespace {
 
 template <class T>
-using Array = nb::ndarray<const T, nb::c_contig, nb::device::cpu>;
+using Array = AnyArray<nb::ndarray<const T, nb::c_contig, nb::device::cpu>>;
 
 template <class T>
 std::vector<std::size_t> shape_of(const Array<T>& image, const char* rule, bool fits) {

@@ -59,7 +59,7 @@ void bind_actions(nb::module_& m) {
                   "PointNav among people, with penalties for coming near them.");
 }
 
-using Image = nb::ndarray<const float, nb::c_contig, nb::device::cpu>;
+using Image = AnyArray<nb::ndarray<const float, nb::c_contig, nb::device::cpu>>;
 
 std::vector<std::size_t> shape_of(const Image& image) {
   std::vector<std::size_t> shape;

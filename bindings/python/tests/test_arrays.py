@@ -278,3 +278,20 @@ def test_objects_without_init_are_refused():
                 value(*{"step": [1], "world": [0], "scene_of": [0], "__getitem__": ["x"]}.get(member, []))
             assert isinstance(caught.value, (TypeError, gsnav.Error)), (name, member, caught.value)
             assert "bad_cast" not in str(caught.value) and str(caught.value), (name, member)
+
+
+@pytest.mark.parametrize("date", [np.datetime64(1, "s"), np.timedelta64(1, "s")])
+def test_dates_of_numpy_are_refused(people, small, envs, date):
+    """Their buffers have no strides, which nanobind follows."""
+    envs.reset(seed=1)
+    camera = gsnav.Camera()
+    episodes = gsnav.generate_episodes(people.navmesh, 3, 1)
+    batch = gsnav.BatchSimulator("cpu", [people], gsnav.BatchConfig(sensors=small.sensors), 3,
+                                 lambda e, k: episodes[e], image_source=lambda sensor, floats: date)
+    calls = [lambda: gsnav.Camera.look_at(date, (0, 0, 0), (0, 1, 0), 4, 4, 90), lambda: envs.step(date),
+             lambda: setattr(camera, "viewmat", np.full(3, date)), lambda: envs.simulator.step(date),
+             lambda: envs.simulator.reset(date), lambda: gsnav.to_bytes(date), lambda: batch.reset(),
+             lambda: gsnav.with_noise(gsnav.NoiseModel(), 1, date)]
+    for call in calls:
+        with pytest.raises((TypeError, ValueError)):
+            call()
