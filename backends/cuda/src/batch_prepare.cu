@@ -21,14 +21,11 @@ using cuda::BatchSet;
 /// longer.
 /// @param tiles Number of tiles of 16 pixels.
 /// @param gaussians Number of Gaussians of all cameras.
-/// @param cuts Whether sets are cuts of levels of detail. Their Gaussians are about as large as a pixel,
-/// so that small tiles share few of them.
-bool is_of_few(std::uint64_t cameras, std::uint64_t tiles, std::uint64_t gaussians, bool cuts,
+bool is_of_few(std::uint64_t cameras, std::uint64_t tiles, std::uint64_t gaussians,
                int multiprocessors) {
   using Policy = cuda::policy::Batch;
-  const bool doubled =
-      gaussians >= Policy::kManyGaussians * cameras || (cuts && tiles <= Policy::kSmallImageTiles);
-  const std::uint64_t each = (doubled ? 2 : 1) * Policy::kFewTilesEach;
+  const std::uint64_t each =
+      gaussians >= Policy::kManyGaussians * cameras ? 2 * Policy::kFewTilesEach : Policy::kFewTilesEach;
   return tiles <= Policy::kFewTiles &&
          cameras * tiles <= each * static_cast<std::uint64_t>(multiprocessors);
 }
@@ -226,14 +223,11 @@ bool CudaBatchRenderer::State::plan_units(std::span<const GaussianSet> sets,
 }
 
 /// Chooses tiles and lists. Returns true if the call has few cameras.
-bool CudaBatchRenderer::State::plan_tiles(std::span<const GaussianSet> sets,
-                                          std::span<const BatchCamera> cameras,
+bool CudaBatchRenderer::State::plan_tiles(std::span<const BatchCamera> cameras,
                                           std::uint64_t gaussians) {
   const int width = cameras[0].camera.width, height = cameras[0].camera.height;
   args.grid = TileGrid::of(width, height, cuda::policy::Batch::kTile);
-  const bool cuts = std::any_of(sets.begin(), sets.end(),
-                                [](const GaussianSet& s) { return !s.selection.drawn_chunks.empty(); });
-  const bool few = is_of_few(args.cameras, args.grid.count(), gaussians, cuts, multiprocessors);
+  const bool few = is_of_few(args.cameras, args.grid.count(), gaussians, multiprocessors);
   if (few) args.grid = TileGrid::of(width, height, cuda::policy::Batch::kSmallTile);
   args.tiles = static_cast<std::uint32_t>(
       std::min<std::uint64_t>(args.cameras * std::uint64_t{args.grid.count()}, ~std::uint32_t{0}));
@@ -321,7 +315,7 @@ Status CudaBatchRenderer::State::prepare(std::span<const GaussianSet> sets,
     set_raster(images);
     return {};
   }
-  const bool few = plan_tiles(sets, cameras, gaussians);
+  const bool few = plan_tiles(cameras, gaussians);
   if (args.tiles > cuda::kMostTiles)
     return {Errc::unsupported, "CudaBatchRenderer: more than 2^31 tiles in one batch"};
   set_raster(images);

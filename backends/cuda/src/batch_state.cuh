@@ -243,8 +243,7 @@ struct CudaBatchRenderer::State {
   void fill_instances(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                       const cuda::InputPlaces& at, bool plain_rules);
   bool plan_units(std::span<const GaussianSet> sets, const cuda::InputPlaces& at);
-  bool plan_tiles(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
-                  std::uint64_t gaussians);
+  bool plan_tiles(std::span<const BatchCamera> cameras, std::uint64_t gaussians);
   void set_raster(const BatchImages& images);
   void guess_capacities(std::uint64_t gaussians, bool few);
   /// True if the call is drawn by lists of regions.

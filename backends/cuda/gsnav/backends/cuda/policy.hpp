@@ -18,8 +18,6 @@ struct Batch {
   /// together have at most kFewTilesEach tiles per multiprocessor. The limits double if a camera sees
   /// kManyGaussians or more.
   static constexpr std::uint64_t kFewTiles = 512, kFewTilesEach = 16, kManyGaussians = 2'500'000;
-  /// The limit also doubles for cuts of levels of detail in images of up to kSmallImageTiles tiles.
-  static constexpr std::uint64_t kSmallImageTiles = 16;
   /// Above this number of tiles per multiprocessor, most lists are short.
   static constexpr std::uint64_t kShortListTiles = 16;
   /// With at least this number of pairs of camera and set, they are prepared on the host's threads.
