@@ -396,7 +396,7 @@ TEST_CASE(
     for (const Vec3d& g : goals) ends.push_back(impl.site(*mesh.snap_point(g)));
     std::vector<NavPoint> points;
     for (int i = 0; i < cases(600); ++i) points.push_back(mesh.random_point(rng, 0));
-    for (std::size_t i = 0; i < points.size(); i += 4) {
+    for (std::size_t i = 0; i + 2 < points.size(); i += 4) {
       points[i].position.x += rng.uniform(-0.2, 0.2);
       points[i].position.z += rng.uniform(-0.2, 0.2);
       const detail::PolyMesh::Poly& poly = impl.polys.polys[points[i + 1].poly];
