@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "gsnav/core/lower_case.hpp"
+#include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/detail/core/pool_backend.hpp"
 #include "gsnav/detail/demo/people.hpp"
 #include "gsnav/detail/io/visible_file.hpp"
@@ -111,12 +112,14 @@ Status add_body_levels(OpeningScene& s) {
     if (places.emplace(asset, bodies.size()).second) bodies.push_back({asset, {}});
   }
   PoolBackend().parallel_for(bodies.size(), [&](std::size_t i) {
-    auto levels = body_levels(*bodies[i].asset);
-    bodies[i].status = levels.status();
-    if (!levels) return;
-    auto with_levels = std::make_shared<AvatarAsset>(*bodies[i].asset);
-    with_levels->levels = std::move(*levels);
-    bodies[i].asset = std::move(with_levels);
+    bodies[i].status = detail::guarded([&]() -> Status {
+      auto levels = body_levels(*bodies[i].asset);
+      if (!levels) return levels.status();
+      auto with_levels = std::make_shared<AvatarAsset>(*bodies[i].asset);
+      with_levels->levels = std::move(*levels);
+      bodies[i].asset = std::move(with_levels);
+      return {};
+    });
   });
   for (AvatarActor& a : s.scene.avatars) {
     const auto at = places.find(a.asset());
