@@ -28,14 +28,15 @@ class ToyBackend {
   void deallocate(void* p, std::size_t) noexcept { std::free(p); }
   void copy(void* dst, const void* src, std::size_t bytes, gsnav::CopyKind kind) {
     copies_to_host += kind == gsnav::CopyKind::device_to_host ? 1 : 0;
-    std::memcpy(dst, src, bytes);
+    empty_copies += bytes == 0 ? 1 : 0;
+    if (bytes > 0) std::memcpy(dst, src, bytes);
   }
   void fill(void* p, unsigned char byte, std::size_t bytes) { std::memset(p, byte, bytes); }
   template <class F>
   void parallel_for(std::size_t n, const F& f);
   gsnav::Status synchronize() { return {}; }
 
-  int allocations = 0, copies_to_host = 0;
+  int allocations = 0, copies_to_host = 0, empty_copies = 0;
 };
 template <class F>
 void ToyBackend::parallel_for(std::size_t n, const F& f) {

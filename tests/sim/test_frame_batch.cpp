@@ -221,6 +221,7 @@ TEST_CASE("batches of a backend that draws many cameras at once have the bits of
       // Rows that lie apart.
       const std::vector<std::uint8_t> mask{1, 0, 1, 1, 0, 0, 1};
       same(sim.reset(mask).value(), expected.reset(mask).value());
+      CHECK(batching.empty_copies == 0);
     }
   }
 }

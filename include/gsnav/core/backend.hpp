@@ -37,7 +37,7 @@ struct NoopFunctor {
 /// using memory_space = HostSpace;                         // or a tag of its own
 /// void* allocate(std::size_t bytes, std::size_t align);   // nullptr when memory is exhausted
 /// void  deallocate(void* p, std::size_t bytes) noexcept;
-/// void  copy(void* dst, const void* src, std::size_t bytes, CopyKind kind);
+/// void  copy(void* dst, const void* src, std::size_t bytes, CopyKind kind);   // bytes > 0
 /// void  fill(void* p, unsigned char byte, std::size_t bytes);
 /// template <class F> void parallel_for(std::size_t n, const F& f);   // f(i) for i in [0, n)
 /// Status synchronize();

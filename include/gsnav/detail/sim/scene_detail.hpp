@@ -219,8 +219,10 @@ class ChosenChunks {
         list_new(cuts);
         there_.resize_discard(std::max(2 * there_.size(), 2 * new_.size()));
       }
-      backend_->copy(there_.data() + used_, new_.data(), new_.size() * sizeof(std::uint32_t),
-                     CopyKind::host_to_device);
+      if (!new_.empty()) {
+        backend_->copy(there_.data() + used_, new_.data(), new_.size() * sizeof(std::uint32_t),
+                       CopyKind::host_to_device);
+      }
       used_ += new_.size();
       for (DetailSets& cut : cuts) {
         cut.place_chunks([&](const auto&, View<const std::uint32_t> list) {
