@@ -13,10 +13,12 @@
 
 #include "bind.hpp"
 #include "fields.hpp"
+#include "gil.hpp"
 #include "gsnav/detail/sim/proximity.hpp"
 #include "gsnav/detail/sim/reward.hpp"
 #include "gsnav/nav.hpp"
 #include "gsnav/sim.hpp"
+#include "guard.hpp"
 
 namespace gsnav::python {
 namespace {
@@ -32,9 +34,14 @@ class AvatarTracker {
     if (!is_finite(height) || height < 0) fail("height = " + std::to_string(height) + ": must be >= 0");
   }
 
-  void reset() { tracker_.reset(0.0), begun_ = false; }
+  void reset() {
+    const Busy::Hold hold(busy_, "AvatarTracker.reset");
+    tracker_.reset(0.0);
+    begun_ = false;
+  }
 
   void begin_action() {
+    const Busy::Hold hold(busy_, "AvatarTracker.begin_action");
     if (begun_) tracker_.add(record());
     begun_ = true;
     action_ = {};
@@ -43,6 +50,7 @@ class AvatarTracker {
   }
 
   Vec3d move(const Vec3d& start, const Vec3d& end, double t0, double t1, bool slide) {
+    const Busy::Hold hold(busy_, "AvatarTracker.move");
     const CapsuleSet bodies = bodies_in(t0, t1);
     const NavMesh& mesh = *scene_->navmesh;
     const std::optional<NavPoint> from = mesh.snap_point(start);
@@ -61,6 +69,7 @@ class AvatarTracker {
   }
 
   double distance(const Vec3d& base, double time, double radius, double height) const {
+    const Busy::Hold hold(busy_, "AvatarTracker.distance");
     const CapsuleSet now = bodies_in(time, time);
     return clearance({base, radius > 0 ? radius : radius_, height > 0 ? height : height_}, now, time)
         .distance;
@@ -68,6 +77,7 @@ class AvatarTracker {
 
   bool blocked(const Vec3d& start, const Vec3d& end, double time, bool slide, double radius,
                double height) const {
+    const Busy::Hold hold(busy_, "AvatarTracker.blocked");
     const CapsuleSet now = bodies_in(time, time);
     const std::optional<NavPoint> from = scene_->navmesh->snap_point(start);
     if (!from || !is_finite(end)) return false;
@@ -78,18 +88,23 @@ class AvatarTracker {
   }
 
   EpisodeMetrics metrics() const {
+    const Busy::Hold hold(busy_, "AvatarTracker.metrics");
     EpisodeTracker now = tracker_;
     if (begun_) now.add(record());
     return now.finish(false, 0.0, 0.0, 0.0);
   }
 
   double action_clearance() const {
+    const Busy::Hold hold(busy_, "AvatarTracker.action_clearance");
     double least = std::numeric_limits<double>::infinity();
     for (const double d : distances_) least = min(least, d);
     return least;
   }
 
-  bool action_collided() const { return action_.avatar_contact || action_.capsule_blocked; }
+  bool action_collided() const {
+    const Busy::Hold hold(busy_, "AvatarTracker.action_collided");
+    return action_.avatar_contact || action_.capsule_blocked;
+  }
 
  private:
   [[noreturn]] static void fail(const std::string& what) {
@@ -117,6 +132,7 @@ class AvatarTracker {
   // Smallest distance to each avatar in this action, metres, sorted by avatar number.
   std::vector<std::uint32_t> avatars_;
   std::vector<double> distances_, near_now_;
+  mutable Busy busy_;
 };
 
 }  // namespace
@@ -139,17 +155,18 @@ void bind_avatar_tracker(nb::module_& m) {
       .def("reset", &A::reset, "Begins an episode.")
       .def("begin_action", &A::begin_action, "Ends the action, if there is one, and begins another.")
       .def("move", &A::move, nb::arg("start"), nb::arg("end"), nb::arg("t0"), nb::arg("t1"),
-           nb::arg("slide") = true,
+           nb::arg("slide") = true, nb::call_guard<ReleaseGil>(),
            "Walks from a point towards another during [t0, t1], seconds, and stops at walls and people. "
            "Returns the position that is reached, shape [3]: `start` if it is off the NavMesh. "
            "Equal points let the agent stand.")
       .def("distance", &A::distance, nb::arg("position"), nb::arg("time"), nb::arg("radius") = -1.0,
-           nb::arg("height") = -1.0,
+           nb::arg("height") = -1.0, nb::call_guard<ReleaseGil>(),
            "Distance in metres from the surface of an agent at a position to the nearest person, "
            "negative "
            "in overlap; infinite without people. A size <= 0 is that of the constructor.")
       .def("blocked", &A::blocked, nb::arg("start"), nb::arg("end"), nb::arg("time"),
            nb::arg("slide") = true, nb::arg("radius") = -1.0, nb::arg("height") = -1.0,
+           nb::call_guard<ReleaseGil>(),
            "Whether a person who stands as at a time would stop or deflect a move.")
       .def("metrics", &A::metrics,
            "Metrics of the actions since reset(). Those of a goal are 0, because there is none.")

@@ -2,6 +2,7 @@
 """AvatarTracker against the simulator: the same moves among the same people give the same metrics."""
 
 import math
+import threading
 
 import gsnav
 import numpy as np
@@ -57,6 +58,29 @@ def test_a_move_through_a_person_is_blocked(people):
             assert gap < 0.3 + 1e-6
         assert tracker.distance(at + step, 2.0) >= gap - 0.3 - 1e-9
     assert touched
+
+
+def test_threads_share_no_tracker(people):
+    tracker, at = gsnav.AvatarTracker(people), people.navmesh.random_point(gsnav.Rng(1)).position
+    alone = tracker.distance(at, 2.0)
+    wrong, refused, ready = [], [], threading.Barrier(4)
+
+    def run():
+        ready.wait()
+        for _ in range(500):
+            try:
+                if tracker.distance(at, 2.0) != alone:
+                    wrong.append(1)
+                tracker.begin_action()
+                tracker.move(at, at, 1.0, 2.0)
+            except gsnav.InvalidArgument as e:
+                refused.append(str(e))
+
+    threads = [threading.Thread(target=run) for _ in range(4)]
+    [t.start() for t in threads]
+    [t.join() for t in threads]
+    assert not wrong and all("AvatarTracker" in words for words in refused)
+    assert tracker.distance(at, 2.0) == alone
 
 
 def test_bad_values_and_scenes_without_people(people):
