@@ -82,6 +82,8 @@ class VectorEnv(BaseVectorEnv):
         config = SimulatorConfig() if config is None else config
         mode = AutoresetMode(getattr(autoreset_mode, "value", autoreset_mode))
         self.metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 4, "autoreset_mode": mode}
+        if not isinstance(num_envs, (int, np.integer)) or isinstance(num_envs, bool):
+            raise TypeError(f"num_envs: expected an integer, got {num_envs!r}")
         self.num_envs = int(num_envs)
         if self.num_envs < 1:
             raise InvalidArgument(f"num_envs = {num_envs}: must be positive")

@@ -159,6 +159,9 @@ def test_wrong_arguments(people, small, square):
             gsnav.VectorEnv(**{"num_envs": 2, "scene": people, "config": small, **change})
     with pytest.raises(TypeError, match="scene"):
         gsnav.Env(7)
+    for number in (3.7, "3", True, None):
+        with pytest.raises(TypeError, match="num_envs: expected an integer"):
+            gsnav.VectorEnv(number, people, config=small)
     with pytest.raises(gsnav.InvalidArgument, match="NavMesh"):
         gsnav.Env(gsnav.open_scene("default", gsnav.OpenOptions(density=0.05)))
     with pytest.raises(FileNotFoundError):
