@@ -123,6 +123,16 @@ std::vector<std::string> knob_names() {
   return out;
 }
 
+std::vector<std::string> knob_values() {
+  std::vector<std::string> out;
+  for (const Knob& knob : knobs()) {
+    for (const std::string& value : knob.values) {
+      if (!contains(out, value)) out.push_back(value);
+    }
+  }
+  return out;
+}
+
 std::vector<Setting> plan(const PlanOptions& o) {
   std::vector<Setting> out;
   bool knobs_done = false;

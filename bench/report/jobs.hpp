@@ -63,6 +63,8 @@ std::vector<Setting> plan(const PlanOptions& options);
 
 /// Names of all knobs, in the order of the report.
 std::vector<std::string> knob_names();
+/// Values of all knobs.
+std::vector<std::string> knob_values();
 
 /// The render configuration of a setting. The knob `storage` changes the scene instead (storage.hpp).
 gsnav::RenderConfig render_config(const Setting& setting, gsnav::SortOrder order);

@@ -10,6 +10,7 @@
 #include "../../tools/common/scene_options.hpp"
 #include "gsnav/core/printable.hpp"
 #include "gsnav/version.hpp"
+#include "scenes.hpp"
 
 namespace gsnav_report {
 
@@ -221,6 +222,15 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
 #endif
   if (o.wants("render") && o.scenes.empty() && o.flats.empty() && !o.default_scene) {
     return fail("no scene: name one by --scene, --default or --flat, or leave `render` out of --kinds");
+  }
+  for (const std::string& text : o.scenes) {
+    if (const auto spec = parse_scene(text); spec.code() == gsnav::Errc::invalid_argument)
+      return fail(spec.message());
+  }
+  const std::vector<std::string> values = knob_values();
+  for (const std::string& value : o.knob_values) {
+    if (std::find(values.begin(), values.end(), value) == values.end())
+      return fail("--knob-values " + value + ": no knob has this value; use any of " + joined(values));
   }
   if (o.cache.empty()) o.cache = o.out + "/references";
   if (o.cache == "none") o.cache.clear();

@@ -122,6 +122,7 @@ int main(int argc, char** argv) try {
       ->check(CLI::Range(1, 1000000));
   gsnav_tools::add_scene_options(app, o);
   gsnav_tools::refuse_value(app, "--navmesh", "none", "agents need one; use auto");
+  gsnav_tools::refuse_value(app, "--storage", "packed", "maps read the floats; use full or compact");
   const auto check = [&o] {
     if (o.shown_episode < o.episodes) return;
     throw CLI::ValidationError("--show " + std::to_string(o.shown_episode) + ": of " +

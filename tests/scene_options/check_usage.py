@@ -5,9 +5,11 @@
 usage: check_usage.py FOLDER PROGRAM...
 
 Wrong are names of outputs in formats that nothing writes, boxes with their corners in the wrong order, and values that
-a program has no use for. A name that is a folder has exit status 1, and is found before the scene is opened.
+a program has no use for. Every option with a number is given one that is not finite, or too large for its type.
+A name that is a folder has exit status 1, and is found before the scene is opened.
 """
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -18,10 +20,12 @@ STRIP = "strip --avatar a.npz --driver d.npz --eye 0,1,2 --target 0,1,0 "
 USAGE = {
     "gsnav-render": [
         ("none.ply --out o --eye 1 1 1 --target 1 1 1", "--eye and --target"),
-        ("none.ply --out o --eye nan 1 1 --target 1 1 1", "--eye: must be finite"),
+        ("none.ply --out o --eye nan 1 1 --target 1 1 1", "--eye: nan: must be finite"),
         ("none.ply --out o --depth-near 2 --depth-far 1", "--depth-near must be below --depth-far"),
         ("none.ply --out o --depth-near 2", "--depth-far"),
         ("none.ply --out o --visible-sets auto", "--visible-sets: sampled"),
+        ("none.ply --out o --orbit 4 --eye 1 1 1 --target 0 0 0", "--orbit"),
+        ("none.ply --out o --cell-size 0", "--cell-size: 0: must be positive"),
     ],
     "gsnav-convert": [
         ("none.ply out.xyz", "out.xyz: unknown kind of file to write: use .ply"),
@@ -30,6 +34,7 @@ USAGE = {
         ("none.ply out.ply --scale nan", "--scale"),
         ("none.ply out.ply --translate nan 0 0", "--translate"),
         ("none.ply out.ply --max-scale -1", "--max-scale"),
+        ("none.ply out.ply --level -1", "--level"),
     ],
     "gsnav-scene": [
         ("flat --out a.xyz", "a.xyz: unknown kind of file to write: use .ply"),
@@ -55,13 +60,20 @@ USAGE = {
         ("none.ply --storage packed", "--storage: packed: journals"),
     ],
     "gsnav-viewer": [("none.ply --navmesh none", "--navmesh: none: agents need one")],
-    "nav_loop": [("none.ply --navmesh none", "--navmesh: none: agents need one")],
+    "nav_loop": [
+        ("none.ply --navmesh none", "--navmesh: none: agents need one"),
+        ("none.ply --storage packed", "--storage: packed: maps"),
+    ],
     "gsnav-replay": [
         ("--out none --video v.gif", "--video: v.gif: unknown kind of file to write: use .webp or .mp4"),
         ("--out none --eye 1 1 1 --target 1 1 1", "--eye and --target"),
         ("--out none --first 3 --last 2", "--first"),
     ],
-    "gsnav-report": [("none.ply --docs page.html", "--docs: page.html: unknown kind of file to write: use .md")],
+    "gsnav-report": [
+        ("none.ply --docs page.html", "--docs: page.html: unknown kind of file to write: use .md"),
+        ("=none.ply", "--scene =none.ply: use [NAME=]SCENE"),
+        ("none.ply --knob-values foo", "--knob-values foo: no knob has this value"),
+    ],
     "gsnav-avatar": [
         ("from-gltf none.glb --out a.ply", "--out: a.ply: unknown kind of file to write: use .npz"),
         ("from-gltf none.glb --out a.npz --driver d.bvh", "--driver: d.bvh: unknown kind of file to write: use .npz"),
@@ -72,9 +84,11 @@ USAGE = {
     ],
 }
 BOXES = [("5 0 0 1 1 1", "--crop: X0 5 must be below X1 1"), ("0 2 0 1 2 1", "--crop: Y0 2 must be below Y1 2"),
-         ("0 0 nan 1 1 1", "--crop: Z0 nan must be below Z1 1")]
+         ("0 0 nan 1 1 1", "--crop: nan: must be finite")]
 CROPPED = {"gsnav-render": "none.ply --out o", "gsnav-convert": "none.ply out.ply", "gsnav-navmesh": "none.ply",
            "gsnav-eval": "none.ply", "gsnav-viewer": "none.ply", "nav_loop": "none.ply"}
+COMMANDS = {"gsnav-scene": ["flat", "rooms", "default", "humanoid"],
+            "gsnav-avatar": ["from-gltf", "walk", "strip"]}
 # Program: arguments, and the folders that stand where it writes files.
 FOLDERS = {
     "gsnav-render": [("none.ply --out o", "o/0003.rgb.png"), ("none.ply --out o --npy", "o/0000.depth.npy")],
@@ -86,6 +100,13 @@ FOLDERS = {
     "gsnav-avatar": [("from-gltf none.glb --out a.npz", "a.npz"), (STRIP + "--out s.png", "s.png")],
     "nav_loop": [("none.ply --out o", "o/strip.png"), ("none.ply --out o", "o/frames/ep000_step0010_rgb.png")],
 }
+
+
+def options_with_numbers(program, command):
+    """Name, type and number of values of each option of a program, or of one of its commands, with numbers."""
+    text = subprocess.run([program, *command, "--help"], capture_output=True, text=True, timeout=60, check=True).stdout
+    found = re.findall(r"^ +(?:-\w,)?(--[\w-]+) (FLOAT|UINT|INT)\b(?:.*? x (\d))?", text, re.M)
+    return [(option, kind, int(count or 1)) for option, kind, count in found]
 
 
 def main():
@@ -109,6 +130,10 @@ def main():
         for box, said in BOXES:
             if name in CROPPED:
                 check(program, f"{CROPPED[name]} --crop {box}", 2, said)
+        for command in [c.split() for c in COMMANDS.get(name, [""])]:
+            for option, kind, count in options_with_numbers(program, command):
+                value = "nan" if kind == "FLOAT" else "9" * 30
+                check(program, " ".join([*command, option, *[value] * count]), 2, f"{option}: ")
         if os.listdir(folder):
             wrong.append(f"{program}: left {os.listdir(folder)} after wrong command lines")
         for arguments, made in FOLDERS.get(name, []):

@@ -39,13 +39,13 @@ void refuse_value(CLI::App& app, const std::string& option, const std::string& v
 gsnav::Status check_files_in(const std::filesystem::path& folder,
                              std::initializer_list<const char*> endings);
 
-/// Adds --crop, the box X0 Y0 Z0 X1 Y1 Z1, whose corners must be finite and in order.
+/// Adds --crop, the box X0 Y0 Z0 X1 Y1 Z1, whose corners must be in order.
 /// @param group Heading in --help. Empty: that of options without one.
 void add_crop_option(CLI::App& app, std::vector<double>& crop, const std::string& what,
                      const std::string& group = {});
 
-/// Throws CLI::ValidationError if --eye and --target, x y z each, are not finite or the same point.
-/// Nothing is checked if both are empty.
+/// Throws CLI::ValidationError if --eye and --target, x y z each, are the same point. Nothing is checked
+/// if both are empty.
 void check_eye_and_target(const std::vector<double>& eye, const std::vector<double>& target);
 
 }  // namespace gsnav_tools

@@ -3,6 +3,9 @@
 
 #include <CLI/CLI.hpp>
 #include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -10,6 +13,7 @@
 #include <functional>
 #include <sstream>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "gsnav/core/printable.hpp"
@@ -25,7 +29,11 @@ std::string program_name;  ///< For check_stdout().
 /// Ends the program with kFailed if its output was lost, for instance on a full disk.
 void check_stdout() {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return;
-  std::fprintf(stderr, "%s: cannot write the output: %s\n", program_name.c_str(), std::strerror(errno));
+  // An error of an earlier line may have been followed by other errors, of files that are not there.
+  const bool known =
+      errno == ENOSPC || errno == EDQUOT || errno == EIO || errno == EPIPE || errno == EBADF;
+  std::fprintf(stderr, "%s: cannot write the output: %s\n", program_name.c_str(),
+               known ? std::strerror(errno) : "a part of it is lost");
   std::_Exit(kFailed);
 }
 
@@ -58,17 +66,36 @@ std::string unknown_command(const CLI::App& app) {
   return "there is no command " + rest.front();
 }
 
-/// Makes negative numbers errors where an option takes an unsigned one. CLI11 would wrap them round.
-void refuse_negative(CLI::App& app) {
-  for (CLI::Option* option : app.get_options()) {
-    if (option->get_type_name() != "UINT") continue;
-    option->check(CLI::Validator(
-        [](const std::string& v) {
-          return v.starts_with('-') ? v + ": must not be negative" : std::string();
-        },
-        ""));
+/// Why CLI11 would read another number than `text` says for an option of this type, or an empty text.
+std::string misread(const std::string& type, const std::string& text) {
+  if (type.starts_with("FLOAT")) {
+    char* end = nullptr;
+    const double value = std::strtod(text.c_str(), &end);
+    // NaN lies outside no range, so checks of ranges accept it.
+    if (end != text.c_str() && !std::isfinite(value)) return text + ": must be finite";
   }
-  for (CLI::App* command : app.get_subcommands({})) refuse_negative(*command);
+  const bool is_unsigned = type.starts_with("UINT");
+  if (is_unsigned && text.starts_with('-')) return text + ": must not be negative";
+  if (is_unsigned || type.starts_with("INT")) {
+    const char* const begin = text.c_str() + (text.starts_with('+') ? 1 : 0);
+    const char* const end = text.c_str() + text.size();
+    std::uint64_t natural = 0;
+    std::int64_t whole = 0;
+    const std::errc error =
+        is_unsigned ? std::from_chars(begin, end, natural).ec : std::from_chars(begin, end, whole).ec;
+    if (error == std::errc::result_out_of_range) return text + ": is too large";
+  }
+  return {};
+}
+
+/// Refuses numbers that CLI11 would read as others: too large, or negative for an unsigned option. Also
+/// refuses numbers that are not finite.
+void check_numbers(CLI::App& app) {
+  for (CLI::Option* option : app.get_options()) {
+    const std::string type = option->get_type_name();
+    option->check(CLI::Validator([type](const std::string& v) { return misread(type, v); }, ""));
+  }
+  for (CLI::App* command : app.get_subcommands({})) check_numbers(*command);
 }
 
 /// Column at which the lines that continue `line` begin: that of its description, or of its text.
@@ -103,7 +130,7 @@ std::optional<int> parse_options(CLI::App& app, int argc, const char* const* arg
                                  const std::function<void()>& check) {
   const std::string name = argc > 0 ? std::filesystem::path(argv[0]).filename().string() : "";
   app.name(name);
-  refuse_negative(app);
+  check_numbers(app);
   app.set_version_flag("--version", name + " " + version());
   std::setvbuf(stdout, nullptr, _IOLBF, BUFSIZ);  // Line buffering keeps output to a pipe in order with
                                                   // errors.

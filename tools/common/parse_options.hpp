@@ -17,7 +17,8 @@ inline constexpr int kUsage = 2;   ///< The command line is invalid.
 
 /// Reads the command line and adds --version. Prints help, the version or an error. Control characters
 /// of arguments are printed as \xHH, so that a file name cannot control the terminal. From now on the
-/// program ends with kFailed if text could not be written to stdout.
+/// program ends with kFailed if text could not be written to stdout. Numbers of options must be finite
+/// and fit their types.
 /// @param check Checks combinations of options. It throws CLI::ValidationError.
 /// @return nothing if the program continues, else the exit status.
 std::optional<int> parse_options(CLI::App& app, int argc, const char* const* argv,

@@ -197,7 +197,8 @@ void add_inputs(CLI::App& app, Options& o) {
   app.add_option("--scene", o.inputs, "an input, like IN; may be repeated")
       ->allow_extra_args(false)
       ->type_name("SCENE");
-  app.add_option("--level", o.level, "level of streamed sets; 0 is the finest");
+  app.add_option("--level", o.level, "level of streamed sets; 0 is the finest")
+      ->check(CLI::NonNegativeNumber);
   app.add_option("--time", o.time, "time of a scene that moves (4D Gaussians), seconds");
   app.add_option("--density", o.density, "density of the Gaussians of the embedded flat")
       ->check(CLI::Range(0.05, 20.0))

@@ -96,6 +96,7 @@ void add_outputs(CLI::App& app, Options& o) {
   app.add_option("--level", o.level,
                  "draw this storey, 0 is the lowest; default: the storey with the largest surface")
       ->excludes(height)
+      ->check(CLI::NonNegativeNumber)
       ->group(write);
   app.add_option("--metres-per-pixel", o.metres_per_pixel,
                  "scale of the image; 0 makes its longer side 1200 pixels")

@@ -53,6 +53,8 @@ void add_cameras(CLI::App& app, Options& o) {
          "number of views around the scene, without --cameras and --eye; default: 4, and views of "
          "the rooms for the embedded flat")
       ->check(CLI::Range(1, 1000))
+      ->excludes(cameras)
+      ->excludes(eye)
       ->group(group);
   app.add_option("--width", o.width,
                  "image width, pixels; default: that of the cameras, else 640; with --height it scales "
