@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // gsnav-report measures speed against error.
+#include <csignal>
 #include <cstdio>
 #include <exception>
 
@@ -11,10 +12,12 @@ int main(int argc, char** argv) {
   const auto options = gsnav_report::parse_options(argc, argv, exit_code);
   if (!options) return exit_code;
   try {
-    if (const gsnav::Status s = gsnav_report::run_report(*options); !s) {
-      std::fprintf(stderr, "gsnav-report: %s\n", s.message().c_str());
+    const gsnav::Result<bool> complete = gsnav_report::run_report(*options);
+    if (!complete) {
+      std::fprintf(stderr, "gsnav-report: %s\n", complete.message().c_str());
       return 1;
     }
+    if (!*complete) return 128 + SIGINT;
   } catch (const std::exception& e) {  // out of memory
     std::fprintf(stderr, "gsnav-report: %s\n", e.what());
     return 1;

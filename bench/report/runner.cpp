@@ -86,6 +86,10 @@ Status render_scenes(const Options& o, CsvFile& csv, const Row& stamp) {
   for (const SceneSpec& spec : *specs) {
     const Result<Scene> scene = load(spec, o.views, o.frame);
     if (!scene) return scene.status();
+    if (scene->views.empty()) {
+      return {Errc::invalid_argument,
+              "scene " + scene->name + " has nothing that views could surround: name its cameras"};
+    }
     const std::vector<Setting> settings =
         plan(plan_options(o, scene->views.size(), scene->cloud.sh_degree, scene->visible.has_value()));
     progress.set_total(total -= each - settings.size());
@@ -137,8 +141,8 @@ Status add_rows(const Options& o, CsvFile& csv, const Row& stamp, const std::str
 
 }  // namespace
 
-Status run_report(const Options& o) {
-  if (Status s = make_output_folder(o.out); !s) return {s.code(), "--out " + s.message()};
+Result<bool> run_report(const Options& o) {
+  if (Status s = make_output_folder(o.out); !s) return Status(s.code(), "--out " + s.message());
   const std::filesystem::path out(o.out), path = out / "report.csv";
   if (Status s = gsnav_tools::check_files_in(out, {"report.html"}); !s) return s;
   if (Status s = o.docs.empty() ? Status() : check_output_path(o.docs); !s) return s;
@@ -193,7 +197,7 @@ Status run_report(const Options& o) {
   }
   if (o.acceptance) std::fputs(targets_text(check_targets(*table)).c_str(), stdout);
   std::printf("%zu rows in %s\n", csv->rows().size(), gsnav::printable(path.string()).c_str());
-  return {};
+  return !interrupted();
 }
 
 }  // namespace gsnav_report

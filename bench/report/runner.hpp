@@ -6,8 +6,9 @@
 
 namespace gsnav_report {
 
-/// Makes all rows that the options ask for, then the pages. An interrupted run succeeds with the rows so
+/// Makes all rows that the options ask for, then the pages. After Ctrl-C it does so with the rows so
 /// far.
-gsnav::Status run_report(const Options& options);
+/// @return true if the rows are complete, false after Ctrl-C
+gsnav::Result<bool> run_report(const Options& options);
 
 }  // namespace gsnav_report

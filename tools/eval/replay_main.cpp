@@ -228,6 +228,12 @@ Status run(const Options& o, const ReplayOptions& r) {
                            std::to_string(journal->records().begin()->first) + " to " +
                            std::to_string(journal->records().rbegin()->first))};
   }
+  const std::size_t actions = found->second.actions.size();
+  if (static_cast<std::size_t>(r.first) > actions) {
+    return {Errc::invalid_argument, "--first " + std::to_string(r.first) + ": episode " +
+                                        std::to_string(r.episode) + " has " + std::to_string(actions) +
+                                        " actions"};
+  }
   auto sim = make_simulator(o, *stage);
   if (!sim) return sim.status();
   auto painter = Painter::create(o, r, *stage);

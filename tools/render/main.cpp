@@ -186,6 +186,8 @@ int main(int argc, char** argv) {
   if (Status s = make_room(o); !s) return fail(s.message());
   const auto scene = gsnav_render::load_scene(o);
   if (!scene) return fail(scene.message());
+  if (scene->cameras.empty())
+    return fail(o.scene + " has nothing that views could surround: choose views by --cameras or --eye");
   if (o.ledger && scene->opened.scene->assets.empty())
     return fail("--ledger: " + o.scene + " has no Gaussians");
   const RenderOptions how = how_to_draw(o, scene->opened);
