@@ -2,6 +2,7 @@
 #include "gsnav/device/device.hpp"
 
 #include <charconv>
+#include <cstdlib>
 #include <optional>
 
 #include "engines.hpp"
@@ -42,6 +43,17 @@ std::optional<int> number_in(std::string_view text, int low, int high) {
   return n;
 }
 
+/// Refuses an unknown instruction set in GSNAV_ISA, which would be read as the slowest one.
+Status check_instruction_set() {
+  const char* const name = std::getenv("GSNAV_ISA");
+  if (name == nullptr) return {};
+  for (const std::string_view known : {"baseline", "avx2", "avx512"}) {
+    if (name == known) return {};
+  }
+  return {Errc::invalid_argument,
+          std::string("GSNAV_ISA=") + name + ": must be baseline, avx2 or avx512"};
+}
+
 }  // namespace
 
 Result<Device> Device::parse(std::string_view text) {
@@ -52,6 +64,9 @@ Result<Device> Device::parse(std::string_view text) {
   const std::optional<std::string_view> number =
       colon == std::string_view::npos ? std::nullopt : std::optional(text.substr(colon + 1));
 
+  if (kind == "best" || kind == "cpu") {
+    if (Status s = check_instruction_set(); !s) return s;
+  }
   if (kind == "best" && !number) {
     if (gpu_count() > 0) return Device(DeviceKind::cuda, 0, 0);
     return kHasCpu ? Device(DeviceKind::cpu, 0, 0) : Device();
