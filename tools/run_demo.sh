@@ -22,10 +22,15 @@ usage_error() {
 
 # Refuses a value that is not of the kind that the help text names for the option.
 check_value() {
-  local option=$1 value=$2 pattern=
-  case $(sed -nE "s/^  $option ([A-Z]+).*/\1/p" "$help") in
-    INT | UINT) pattern='^[+-]?[0-9]+$' ;;
-    FLOAT) pattern='^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?$' ;;
+  local option=$1 value=$2 pattern= kind choices
+  kind=$(sed -nE "s/^  $option ([A-Z]+[^ =]*).*/\1/p" "$help" | head -n 1)
+  case $kind in
+    INT* | UINT*) pattern='^[+-]?[0-9]+$' ;;
+    FLOAT*) pattern='^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?$' ;;
+    *:{*)
+      choices=${kind#*:\{}
+      [[ ,${choices%%\}*}, == *",$value,"* ]] || usage_error "$option $value: nav_loop does not take this value"
+      ;;
   esac
   [[ $option == --device ]] && pattern='^(best|cpu|cuda|serial(64)?)(:[0-9]+)?$'
   [[ $value =~ $pattern ]] || usage_error "$option $value: nav_loop does not take this value"
@@ -58,6 +63,7 @@ for argument in "$@"; do
   [[ $previous == --device ]] && device=$argument
   previous=$argument
 done
+[[ $previous == --* && $previous != *=* ]] && usage_error "$previous needs a value"
 
 cuda=OFF
 if [[ $device == cuda* ]]; then
