@@ -52,29 +52,36 @@ Result<std::optional<NavMeshChoice>> choose(const OpeningScene& s) {
     if (!triangles) return bad(s.source.name + " has no triangles; use gaussians or a file");
     return Choice({"", true});
   }
-  if (asked == "gaussians" || asked == "auto") {
+  if (asked == "gaussians" || asked == "auto" || asked == "build") {
     if (asked == "gaussians" && !gaussians) return bad(s.source.name + " has no Gaussians; use mesh");
     // The triangles of a stage are the whole scene. Those of OpenOptions::meshes stand among Gaussians.
     const bool whole =
         s.source.embedded || !s.source.stage_mesh.empty() || !s.source.collision_mesh.empty();
-    if (asked == "auto" && (whole || !gaussians)) return Choice({"", true});
+    if (asked != "gaussians" && (whole || !gaussians)) return Choice({"", true});
     if (s.scene.assets.front().packed != nullptr)
       return bad("not of packed Gaussians; use storage full or compact, or a file");
     return Choice({"", false});
   }
-  return bad("use auto, none, mesh, gaussians, or a file that ends in .navmesh or .bin");
+  return bad("use auto, none, build, mesh, gaussians, or a file that ends in .navmesh or .bin");
 }
 
-/// Builds a NavMesh for a body of this size. `what` names it in progress.
-Result<NavMesh> build(OpeningScene& s, const NavMeshChoice& choice, double radius, double height,
+/// Settings of the NavMesh for the agent.
+NavMeshSettings settings_of(const OpenOptions& o) {
+  if (o.navmesh_settings) return *o.navmesh_settings;
+  NavMeshSettings settings;
+  settings.agent_radius = o.agent_radius;
+  settings.agent_height = o.agent_height;
+  settings.cell_size = o.cell_size;
+  return settings;
+}
+
+/// Builds a NavMesh. `what` names it in progress.
+Result<NavMesh> build(OpeningScene& s, const NavMeshChoice& choice, NavMeshSettings settings,
                       const std::string& what) {
   const OpenOptions& o = s.options;
-  NavMeshSettings settings = choice.triangles ? NavMeshSettings{} : gaussian_navmesh_settings();
-  settings.agent_radius = radius;
-  settings.agent_height = height;
-  settings.cell_size = o.cell_size;
   if (choice.triangles) return NavMesh::build(settings, s.triangles.vertices, s.triangles.triangles);
-  settings.cell_height = std::max(settings.cell_height, o.cell_size);
+  settings.cell_height = std::max(
+      std::min(settings.cell_height, gaussian_navmesh_settings().cell_height), settings.cell_size);
   GaussianNavOptions how;
   how.crop = o.crop;
   if (o.progress) {
@@ -152,7 +159,10 @@ Status add_people(OpeningScene& s, const std::optional<NavMeshChoice>& choice) {
   // Use a body wider than that of the agent, so that people keep their shoulders clear of furniture.
   std::optional<NavMesh> wide;
   if (choice->file.empty()) {
-    if (auto made = build(s, *choice, 0.3, 1.8, "NavMesh of people")) wide = std::move(*made);
+    NavMeshSettings body = settings_of(o);
+    body.agent_radius = 0.3;
+    body.agent_height = 1.8;
+    if (auto made = build(s, *choice, body, "NavMesh of people")) wide = std::move(*made);
   }
   auto people = walking_people(wide ? *wide : *s.scene.navmesh, o.people, o.seed, o.density);
   if (!people) return people.status();
@@ -171,8 +181,7 @@ Status open_navmesh(OpeningScene& s) {
     s.warn("crop: no NavMesh is built from Gaussians, which alone are cropped");
   if (*choice) {
     const NavMeshChoice& c = **choice;
-    auto mesh =
-        c.file.empty() ? build(s, c, o.agent_radius, o.agent_height, "NavMesh") : load_navmesh(c.file);
+    auto mesh = c.file.empty() ? build(s, c, settings_of(o), "NavMesh") : load_navmesh(c.file);
     if (!mesh) return mesh.status();
     s.out.navmesh_source = !c.file.empty() ? "from " + c.file
                            : c.triangles   ? "from the mesh"

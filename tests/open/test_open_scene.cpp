@@ -128,8 +128,10 @@ TEST_CASE("open: the NavMesh beside a file is read, unless another is asked for"
   }
   o.navmesh = "none";
   CHECK(open_scene(file, o)->scene->navmesh == nullptr);
-  o.navmesh = "gaussians";
-  CHECK(open_scene(file, o)->navmesh_source == "from the Gaussians");
+  for (const char* asked : {"gaussians", "build"}) {
+    o.navmesh = asked;
+    CHECK(open_scene(file, o)->navmesh_source == "from the Gaussians");
+  }
   o.navmesh = (folder / "absent.navmesh").string();
   CHECK(open_scene(file, o).code() == Errc::file_not_found);
   o.navmesh = "mesh";
@@ -160,6 +162,40 @@ TEST_CASE("open: triangles alone are a scene, drawn and walked on") {
   CHECK(norm(both.scene->meshes[0].world_from_surface * Vec3d{0, 0, 1} - Vec3d{0, 1, 0}) < 1e-12);
   o.meshes = {"absent.obj"};
   CHECK(open_scene((folder / "room.ply").string(), o).code() == Errc::file_not_found);
+}
+
+TEST_CASE("open: a NavMesh is built with the settings that are given") {
+  OpenOptions o = coarse();
+  o.navmesh = "build";
+  o.keep_triangles = true;
+  NavMeshSettings settings;
+  settings.cell_size = 0.1;
+  settings.cell_height = 0.1;
+  settings.agent_radius = 0.3;
+  settings.agent_max_climb = 0.5;
+  settings.region_min_size = 4;
+  settings.filter_ledge_spans = false;
+  o.navmesh_settings = settings;
+  o.agent_radius = 5;  // Has no effect.
+  const OpenedScene flat = open_scene("default", o).value();
+  const NavMesh want =
+      NavMesh::build(settings, flat.triangles->vertices, flat.triangles->triangles).value();
+  const NavMesh& got = *flat.scene->navmesh;
+  CHECK(got.settings() == settings);
+  CHECK(got.surface().vertices == want.surface().vertices);
+  CHECK(got.surface().triangles == want.surface().triangles);
+  // The floor of Gaussians has lower voxels.
+  const TempFolder folder("open_settings");
+  REQUIRE(io::save_ply(folder / "room.ply", room_z_up()).ok());
+  settings.cell_height = 0.2;
+  o.navmesh_settings = settings;
+  const OpenedScene room = open_scene((folder / "room.ply").string(), o).value();
+  settings.cell_height = 0.1;
+  CHECK(room.scene->navmesh->settings() == settings);
+  o.navmesh_settings->agent_max_slope = -1;
+  const auto wrong = open_scene("default", o);
+  CHECK(wrong.code() == Errc::invalid_argument);
+  CHECK(wrong.message().find("agent_max_slope") != std::string::npos);
 }
 
 TEST_CASE("open: a Habitat data set's scene comes as the data set says") {

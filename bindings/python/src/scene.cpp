@@ -40,7 +40,11 @@ void bind_options(nb::module_& m) {
       .field("meshes", &O::meshes, "Paths of triangle meshes to draw among the Gaussians.")
       .field("navmesh", &O::navmesh,
              "The NavMesh: \"\" (the one next to the file), \"none\", \"auto\", "
-             "\"mesh\", \"gaussians\" or a file.")
+             "\"build\", \"mesh\", \"gaussians\" or a file.")
+      .field("navmesh_settings", &O::navmesh_settings,
+             "Settings of a built NavMesh, instead of the next three. Gaussians get voxels of at most "
+             "0.05 m "
+             "height, or of cell_size if that is larger.")
       .field("cell_size", &O::cell_size, "Edge of the voxels of a built NavMesh, metres.")
       .field("crop", &O::crop, "Builds the NavMesh in this box only; world frame, metres.")
       .field("agent_radius", &O::agent_radius, "Radius of the agent of a built NavMesh, metres.")

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
+#include "gsnav/detail/nav/navmesh_settings.hpp"
 #include "gsnav/detail/scene/load_report.hpp"
 #include "gsnav/device/device.hpp"
 #include "gsnav/image/camera.hpp"
@@ -64,11 +65,17 @@ struct OpenOptions {
   /// - "": the one that a Habitat dataset names or that is next to the file (`flat.navmesh` for
   ///   `flat.ply`), else none.
   /// - "none": none.
-  /// - "auto": as "", or else a built one.
+  /// - "auto": as "", or else as "build".
+  /// - "build": built from the triangles of a scene that has no Gaussians or a mesh for collisions, else
+  ///   as "gaussians".
   /// - "mesh": built from triangles.
   /// - "gaussians": built from the Gaussians, and from triangles if there are any.
   /// - otherwise a file (.navmesh, .bin).
   std::string navmesh{};
+  /// Settings of a built NavMesh, instead of `cell_size`, `agent_radius` and `agent_height`. Those of
+  /// Gaussians have voxels of at most 0.05 m height, or of the cell size if that is larger. Empty:
+  /// the defaults of NavMeshSettings with the fields below.
+  std::optional<NavMeshSettings> navmesh_settings{};
   double cell_size = 0.05;                        ///< Edge of the voxels from which a NavMesh is built,
                                                   ///< metres.
   std::optional<Aabb<double>> crop{};             ///< Builds the NavMesh in this box only; world frame,
