@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Moves and metrics among people for the distribution gsnav-habitat, whose agents and clock are free.
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/shared_ptr.h>
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -11,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "arrays.hpp"
 #include "bind.hpp"
 #include "fields.hpp"
 #include "gil.hpp"
@@ -68,6 +72,25 @@ class AvatarTracker {
     return r.position;
   }
 
+  void set_capsules(const std::vector<std::array<double, 7>>& rows) {
+    const Busy::Hold hold(busy_, "AvatarTracker.set_capsules");
+    std::vector<Capsule<double>> standing;
+    for (const auto& r : rows) standing.push_back({{r[0], r[1], r[2]}, {r[3], r[4], r[5]}, r[6]});
+    CapsuleSet::standing(standing, own_number()).value();  // Checks them.
+    standing_ = std::move(standing);
+  }
+
+  std::vector<std::array<double, 7>> capsules(double time, std::optional<std::uint32_t> person) const {
+    const Busy::Hold hold(busy_, "AvatarTracker.capsules");
+    const CapsuleSet now = bodies_in(time, time);
+    std::vector<std::array<double, 7>> rows;
+    for (const DynamicCapsule& c : now.capsules()) {
+      const auto& [p, q, radius] = c.motion.begin;
+      if (!person || c.avatar == *person) rows.push_back({p.x, p.y, p.z, q.x, q.y, q.z, radius});
+    }
+    return rows;
+  }
+
   double distance(const Vec3d& base, double time, double radius, double height) const {
     const Busy::Hold hold(busy_, "AvatarTracker.distance");
     const CapsuleSet now = bodies_in(time, time);
@@ -118,14 +141,20 @@ class AvatarTracker {
     return made;
   }
 
+  /// Number of the person that set_capsules stands for.
+  std::uint32_t own_number() const { return static_cast<std::uint32_t>(scene_->avatars.size()); }
+
   CapsuleSet bodies_in(double t0, double t1) const {
     std::vector<DynamicCapsule> capsules;
     append_bodies(*scene_, t0, t1, capsules);
+    for (std::size_t i = 0; i < standing_.size(); ++i)
+      capsules.push_back({{standing_[i], standing_[i]}, own_number(), static_cast<std::uint32_t>(i)});
     return CapsuleSet::create(std::move(capsules), t0, t1).value();
   }
 
   std::shared_ptr<const SimulatorScene> scene_;
   double radius_, height_;
+  std::vector<Capsule<double>> standing_;  // Those of the last set_capsules().
   EpisodeTracker tracker_;
   bool begun_ = false;
   StepRecord action_{};  // Without distances.
@@ -159,6 +188,25 @@ void bind_avatar_tracker(nb::module_& m) {
            "Walks from a point towards another during [t0, t1], seconds, and stops at walls and people. "
            "Returns the position that is reached, shape [3]: `start` if it is off the NavMesh. "
            "Equal points let the agent stand.")
+      .def("set_capsules", &A::set_capsules, nb::arg("capsules"),
+           "Adds capsules that stand still, rows of x0, y0, z0, x1, y1, z1, radius in metres. They "
+           "replace "
+           "those of the last call, and count as one person more. Raises InvalidArgument for a value "
+           "that "
+           "is not finite or a negative radius.")
+      .def(
+          "capsules",
+          [](const A& a, double time, std::optional<std::uint32_t> person) {
+            const auto rows = a.capsules(time, person);
+            const std::size_t count = rows.size();
+            return array_copy(std::span(count > 0 ? rows.front().data() : nullptr, 7 * count),
+                              {count, 7});
+          },
+          nb::arg("time"), nb::arg("person") = nb::none(),
+          nb::sig("def capsules(self, time: float, person: int | None = None) -> "
+                  "numpy.typing.NDArray[numpy.float64]"),
+          "Capsules of all people or one at a time: float64 [N][7], x0, y0, z0, x1, y1, z1, radius in "
+          "metres. Those of set_capsules come last.")
       .def("distance", &A::distance, nb::arg("position"), nb::arg("time"), nb::arg("radius") = -1.0,
            nb::arg("height") = -1.0, nb::call_guard<ReleaseGil>(),
            "Distance in metres from the surface of an agent at a position to the nearest person, "

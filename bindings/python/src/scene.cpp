@@ -99,6 +99,20 @@ OpenedScene open(nb::handle named, OpenOptions options, const nb::object& progre
 nb::object itself(nb::handle self) { return nb::borrow(self); }
 nb::object itself_with_memo(nb::handle self, nb::handle) { return nb::borrow(self); }
 
+std::vector<AvatarActor> chosen(const std::vector<AvatarActor>& all,
+                                const std::vector<std::size_t>& numbers) {
+  std::vector<AvatarActor> out;
+  for (const std::size_t i : numbers) {
+    if (i >= all.size()) {
+      throw nb::index_error(
+          ("SimulatorScene: people: " + std::to_string(i) + " of " + std::to_string(all.size()))
+              .c_str());
+    }
+    out.push_back(all[i]);
+  }
+  return out;
+}
+
 void bind_opened_scene(nb::module_& m) {
   nb::class_<OpenedScene>(
       m, "OpenedScene",
@@ -134,15 +148,20 @@ void bind_scene(nb::module_& m) {
       .def(
           "__init__",
           [](SimulatorScene* self, const std::optional<SceneArg>& scene,
-             std::shared_ptr<const NavMesh> navmesh, std::optional<std::vector<SceneAsset>> assets) {
+             std::shared_ptr<const NavMesh> navmesh, std::optional<std::vector<SceneAsset>> assets,
+             const std::optional<std::vector<std::size_t>>& people) {
             SimulatorScene made = scene ? *scene->scene : SimulatorScene{};
             if (navmesh != nullptr) made.navmesh = std::move(navmesh);
             if (assets) made.assets = std::move(*assets);
+            if (people) made.avatars = chosen(made.avatars, *people);
             new (self) SimulatorScene(std::move(made));
           },
           nb::arg("scene") = nb::none(), nb::arg("navmesh") = nb::none(), nb::arg("assets") = nb::none(),
+          nb::arg("people") = nb::none(),
           "A scene that shares the parts of `scene` (None: nothing), with another NavMesh or other sets "
-          "of Gaussians if they are given.")
+          "of Gaussians if they are given. `people`: numbers of the people that it keeps; None keeps "
+          "all. "
+          "Raises IndexError for a number that is out of range.")
       .def_ro("assets", &SimulatorScene::assets, nb::rv_policy::copy,
               "Sets of static Gaussians: a new list of copies that share their parts.")
       .def_ro("navmesh", &SimulatorScene::navmesh, "Surface that agents walk on, or None.")
