@@ -63,11 +63,19 @@ def _stamp(name: str) -> Any:
     return status.st_mtime_ns, status.st_size
 
 
-def stage(name: str, agent_radius: float, agent_height: float) -> Stage:
+def walker(mesh: Any, capsules: list[list[float]]) -> Any:
+    """A gsnav.AvatarTracker among capsules, of the agent that a NavMesh was built for."""
+    gsnav, body = library(), mesh.settings
+    made = gsnav.AvatarTracker(gsnav.SimulatorScene(navmesh=mesh), body.agent_radius, body.agent_height)
+    made.set_capsules(capsules)
+    return made
+
+
+def stage(name: str, settings: Any) -> Stage:
     """The scene of a name: a path, a name that gsnav.open_scene knows, or NONE for nothing.
 
-    The NavMesh is the file beside the scene, or else one that is built for the agent. Raises FileNotFoundError
-    naming the scene, and the errors of gsnav.open_scene.
+    The NavMesh is the file beside the scene, or else one that is built with a gsnav.NavMeshSettings. Raises
+    FileNotFoundError naming the scene, and the errors of gsnav.open_scene.
     """
     if name in ("NONE", ""):
         return Stage(None)
@@ -75,11 +83,11 @@ def stage(name: str, agent_radius: float, agent_height: float) -> Stage:
     stem, extension = os.path.splitext(name)
     beside = next((p for p in (stem + ".navmesh", name + ".navmesh") if extension and os.path.isfile(p)), None)
     key = (os.path.abspath(name), _stamp(name), beside, beside and _stamp(beside),
-           None if beside else (agent_radius, agent_height), _people())  # fmt: skip
+           None if beside else repr(settings), _people())  # fmt: skip
     with _lock:
         found = _stages.get(key)
         if found is None:
-            found = _stages[key] = Stage(_open(gsnav, name, beside, agent_radius, agent_height))
+            found = _stages[key] = Stage(_open(gsnav, name, beside, settings))
         return found
 
 
@@ -91,16 +99,12 @@ def _people() -> int:
     return int(text)
 
 
-def _open(gsnav: Any, name: str, beside: str | None, agent_radius: float, agent_height: float) -> Any:
+def _open(gsnav: Any, name: str, beside: str | None, settings: Any) -> Any:
     if beside is not None:
         return gsnav.open_scene(name, gsnav.OpenOptions(navmesh=beside, people=_people()))
     try:
-        return gsnav.open_scene(
-            name,
-            gsnav.OpenOptions(
-                navmesh="auto", agent_radius=agent_radius, agent_height=agent_height, people=_people()
-            ),
-        )
+        options = gsnav.OpenOptions(navmesh="auto", navmesh_settings=settings, people=_people())
+        return gsnav.open_scene(name, options)
     except (gsnav.NothingNavigable, gsnav.InvalidArgument) as error:
         logger.warning("%s: no NavMesh: %s", name, error)
         return gsnav.open_scene(name, gsnav.OpenOptions(navmesh="none"))

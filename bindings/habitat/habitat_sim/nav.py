@@ -83,6 +83,12 @@ class NavMeshSettings:
                 raise ValueError(f"{path}: NavMeshSettings has no field {name!r}")
             setattr(self, name, value)
 
+    def _native(self) -> Any:
+        """The same settings as gsnav.NavMeshSettings. Scenes have no objects, so include_static_objects has no
+        effect."""
+        values = {**self.__dict__, "verts_per_poly": int(self.verts_per_poly)}
+        return _engine.library().NavMeshSettings(**values)
+
     @classmethod
     def _of(cls, native: Any) -> "NavMeshSettings":
         made = cls()

@@ -19,7 +19,7 @@ from ._people import TIME_SETTINGS, PeoplePart, _unserved
 from .agent import Agent
 from .agent.agent import AgentState
 from .metadata import MetadataMediator, TemplateManager
-from .nav import PathFinder
+from .nav import NavMeshSettings, PathFinder
 from .scene import SceneGraph
 from .sensor import Sensor, SensorFactory
 from .utils.common import quat_from_angle_axis
@@ -100,9 +100,10 @@ class Simulator(PeoplePart):
                 _draw.check(spec)
         navigator = config.agents[sim_cfg.default_agent_id]
         settings = sim_cfg.navmesh_settings
-        radius, height = (navigator.radius, navigator.height) if settings is None else (
-            settings.agent_radius, settings.agent_height)  # fmt: skip
-        stage = _engine.stage(str(sim_cfg.scene_id), float(radius), float(height))
+        if settings is None:
+            settings = NavMeshSettings()
+            settings.agent_radius, settings.agent_height = navigator.radius, navigator.height
+        stage = _engine.stage(str(sim_cfg.scene_id), settings._native())
         device = _engine.device(int(sim_cfg.gpu_device_id))
         if stage is not self._stage:
             self.pathfinder._mesh = stage.navmesh
@@ -333,20 +334,16 @@ class Simulator(PeoplePart):
         return self.metadata_mediator.object_template_manager
 
     def recompute_navmesh(self, pathfinder: PathFinder, navmesh_settings: Any) -> bool:
-        """Builds a NavMesh of the scene for an agent. Returns False if the scene has no walkable surface.
+        """Builds a NavMesh of the scene. Returns False if the scene has no walkable surface.
 
-        Raises NotImplementedError naming a setting that gsnav.open_scene does not take.
+        Voxels of a scene of Gaussians are at most 0.05 m high. Raises ValueError naming a setting out of range.
         """
-        usual = type(navmesh_settings)()
-        for name in usual._DEFAULTS:
-            given = getattr(navmesh_settings, name)
-            if name not in ("agent_radius", "agent_height", "cell_size") and given != getattr(usual, name):
-                raise NotImplementedError(_shared.message(f"recompute_navmesh with {name} = {given}"))
+        settings = navmesh_settings._native()
+        settings.validate()
+        if self._stage is None or self._stage.scene is None:
+            return False
         gsnav = _engine.library()
-        options = gsnav.OpenOptions(
-            navmesh="auto", agent_radius=navmesh_settings.agent_radius, agent_height=navmesh_settings.agent_height,
-            cell_size=navmesh_settings.cell_size,
-        )  # fmt: skip
+        options = gsnav.OpenOptions(navmesh="build", navmesh_settings=settings)
         try:
             pathfinder._mesh = gsnav.open_scene(str(self.config.sim_cfg.scene_id), options).scene.navmesh
         except (gsnav.NothingNavigable, gsnav.InvalidArgument):
