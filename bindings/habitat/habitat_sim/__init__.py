@@ -9,7 +9,7 @@ import gsnav_habitat as _shared
 
 _shared.claim()
 
-from . import _unserved, agent, errors, geo, logging, metadata, nav  # noqa: E402
+from . import _unserved, agent, errors, gaussian_avatar, geo, logging, metadata, nav  # noqa: E402
 from . import physics, scene, sensor, sensors, simulator, utils  # noqa: E402
 from ._unserved import *  # noqa: E402, F403
 from .agent import (  # noqa: E402

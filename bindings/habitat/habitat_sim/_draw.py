@@ -85,6 +85,10 @@ class Painter:
         self._natives: list[Any] = []  # Their specifications.
         self._key = ""
 
+    def of(self, stage: Any) -> "Painter":
+        """A painter of another stage, on the same device."""
+        return Painter(stage, self._device)
+
     def draw(self, sensors: Any, seconds: float) -> dict[str, np.ndarray]:
         """New arrays by the names of the sensors, at a time on the scene's clock: colour uint8 [height][width][4],
         depth float32 [height][width] in metres with 0 for no return, semantic uint32 [height][width]."""

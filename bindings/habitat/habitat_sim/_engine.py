@@ -28,6 +28,7 @@ class Stage:
         self.opened = opened
         self.scene = None if opened is None else opened.scene
         self._idle: dict[Any, list[tuple[str, Any]]] = {}
+        self._parts: "weakref.WeakValueDictionary[Any, Stage]" = weakref.WeakValueDictionary()
         self._gpu = threading.Lock()
 
     @contextlib.contextmanager
@@ -45,6 +46,17 @@ class Stage:
                 found.set_sensors(specs)
             yield found
             idle.append((key, found))  # Not after an error.
+
+    def showing(self, people: list[int]) -> "Stage":
+        """The scene with these of its people only, for drawing."""
+        if len(people) == self.scene.avatar_count:
+            return self
+        with _lock:
+            found = self._parts.get(tuple(people))
+            if found is None:
+                found = self._parts[tuple(people)] = Stage(None)
+                found.scene = library().SimulatorScene(self.scene, people=people)
+            return found
 
     @property
     def navmesh(self) -> Any:

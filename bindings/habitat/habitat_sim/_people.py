@@ -5,6 +5,8 @@ import math
 import sys
 from typing import Any, NoReturn
 
+import numpy as np
+
 import gsnav_habitat as _shared
 
 from . import _engine
@@ -62,23 +64,28 @@ class PeoplePart:
     pathfinder: Any
     agents: Any
     _stage: Any
+    _painter: Any
+    _capsules: list[list[float]]
 
     def _open_people(self) -> None:
         self._clock = Clock(self.config.sim_cfg)
         self._trackers = {}
+        self._hidden: set[int] = set()
+        self.clear_navmesh_dynamic_capsules()
         if "habitat.core.registry" in sys.modules and "habitat.tasks.nav.nav" in sys.modules:
             # Registers measures. Worker processes import nothing else of this distribution, so it is done here.
             from gsnav_habitat import measures  # noqa: F401
 
     def _tracker(self, agent_id: int) -> Any:
-        """The agent's tracker on the present NavMesh, or None in a scene without people or NavMesh."""
+        """The agent's tracker on the present NavMesh, or None without a NavMesh or without people and capsules."""
         scene, mesh = (None, None) if self._stage is None else (self._stage.scene, self.pathfinder._mesh)
-        if scene is None or mesh is None or scene.avatar_count == 0:
+        if self._stage is None or mesh is None or not (self._capsules or self.get_gaussian_avatar_ids()):
             return None
         found = self._trackers.get(agent_id)
         if found is None or found[0] is not mesh:
             gsnav, body = _engine.library(), self.agents[agent_id].agent_config
             made = gsnav.AvatarTracker(gsnav.SimulatorScene(scene, mesh), float(body.radius), float(body.height))
+            made.set_capsules(self._capsules)
             found = self._trackers[agent_id] = (mesh, made)
         return found[1]
 
@@ -142,6 +149,39 @@ class PeoplePart:
             _triple(start), _triple(end), self._clock.gaussian_time, allow_sliding, agent_radius, agent_height
         )
 
+    def set_navmesh_dynamic_capsules(self, capsules: Any) -> None:
+        """Puts capsules in the way of agents, next to the people of the scene.
+
+        `capsules`: numbers [N][7], rows of x0, y0, z0, x1, y1, z1, radius in metres. They replace those of the last
+        call, stand still, and count as one person in measures. Steps of the PathFinder stop at them too. Raises
+        ValueError for another shape, a value that is not finite or a negative radius.
+        """
+        rows = np.asarray(capsules, dtype=np.float64)
+        if rows.size == 0:
+            rows = rows.reshape(0, 7)
+        if rows.ndim != 2 or rows.shape[1] != 7:
+            raise ValueError(f"set_navmesh_dynamic_capsules: shape {rows.shape}: must be (n, 7)")
+        if not np.isfinite(rows).all() or (rows[:, 6] < 0).any():
+            raise ValueError("set_navmesh_dynamic_capsules: values must be finite, and radii 0 or more")
+        self._capsules = rows.tolist()
+        for _, tracker in self._trackers.values():
+            tracker.set_capsules(self._capsules)
+        self.pathfinder._set_capsules(self._capsules)
+
+    def clear_navmesh_dynamic_capsules(self) -> None:
+        """Takes the capsules of set_navmesh_dynamic_capsules away."""
+        self.set_navmesh_dynamic_capsules([])
+
+    def set_gaussian_avatar_visible(self, avatar_id: int, visible: bool) -> bool:
+        """Draws a person, or leaves it out of images. It stops agents and counts in measures either way. Returns
+        False for a number that no person has."""
+        ids = self.get_gaussian_avatar_ids()
+        if avatar_id not in ids:
+            return False
+        (self._hidden.discard if visible else self._hidden.add)(avatar_id)
+        self._painter = self._painter.of(self._stage.showing([i for i in ids if i not in self._hidden]))
+        return True
+
     def get_gaussian_avatar_ids(self) -> list[int]:
         """Numbers of the people."""
         scene = None if self._stage is None else self._stage.scene
@@ -181,7 +221,6 @@ def _unserved(name: str) -> Any:
 
 for _name in TIME_SETTINGS:
     setattr(PeoplePart, _name, _setting(_name))
-for _name in ("set_gaussian_avatar_visible", "update_gaussian_avatar", "update_gaussian_avatar_pose",
-              "update_gaussian_avatar_attributes", "update_gaussian_avatar_bounds", "set_navmesh_dynamic_capsules",
-              "clear_navmesh_dynamic_capsules"):  # fmt: skip
+for _name in ("update_gaussian_avatar", "update_gaussian_avatar_pose", "update_gaussian_avatar_attributes",
+              "update_gaussian_avatar_bounds"):  # fmt: skip
     setattr(PeoplePart, _name, _unserved(_name))

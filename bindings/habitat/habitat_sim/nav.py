@@ -151,6 +151,8 @@ class PathFinder:
         self._mesh: Any = None
         self._rng: Any = None
         self._seed = 0
+        self._capsules: list[list[float]] = []  # Simulator.set_navmesh_dynamic_capsules.
+        self._walker: Any = None
 
     # ---- The mesh
     @property
@@ -275,6 +277,9 @@ class PathFinder:
     get_random_navigable_point_around = get_random_navigable_point_near
 
     # ---- Steps
+    def _set_capsules(self, rows: list[list[float]]) -> None:
+        self._capsules, self._walker = rows, None
+
     def try_step(self, start: Any, end: Any) -> Vector3:
         """Position after a step that slides along walls. The start is snapped first; where it cannot be, the
         result is `start`."""
@@ -286,6 +291,10 @@ class PathFinder:
 
     def _step(self, start: Any, end: Any, slide: bool) -> Vector3:
         mesh = self._need("try_step")
+        if self._capsules:
+            if self._walker is None or self._walker[0] is not mesh:
+                self._walker = mesh, _engine.walker(mesh, self._capsules)
+            return Vector3(*self._walker[1].move(_triple(start), _triple(end), 0.0, 0.0, slide))
         at = _engine.library().try_step(mesh, _triple(start), _triple(end), slide)
         return Vector3(*start) if at is None else Vector3(*at.position)
 

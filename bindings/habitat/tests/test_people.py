@@ -102,7 +102,8 @@ def test_scenes_without_people_and_calls_that_are_not_served(stage, monkeypatch)
         assert sim.distance_to_avatar_proxy_capsules(point) == math.inf and sim.get_gaussian_avatar_ids() == []
         assert not sim.is_step_blocked_by_avatar_proxy_capsules(point, point)
         assert sim.avatar_metrics() is None and sim.avatar_step() == (math.inf, False)
-        for name in ("update_gaussian_avatar", "set_gaussian_avatar_visible", "set_navmesh_dynamic_capsules"):
+        assert not sim.set_gaussian_avatar_visible(0, False)
+        for name in ("update_gaussian_avatar", "update_gaussian_avatar_pose", "update_gaussian_avatar_bounds"):
             with pytest.raises(NotImplementedError, match=f"gsnav.*{name}"):
                 getattr(sim, name)()
     monkeypatch.setenv("GSNAV_PEOPLE", "many")
