@@ -1,12 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Makes a stand-in for the test data of Habitat: three small scenes and PointNav episodes under the same names.
+"""Makes data for the examples of Habitat-Lab: PointNav episodes in scans, or a stand-in for Habitat's test scenes.
 
-    tools/make_habitat_pack.py FOLDER [--train 10000] [--others 100]
+    tools/make_habitat_pack.py FOLDER SCAN...      episodes in one or more scans
+    tools/make_habitat_pack.py FOLDER              episodes in three small rooms, which are made too
+    ... [--train 10000] [--others 100]             numbers of episodes
 
-Writes FOLDER/data/scene_datasets/habitat-test-scenes/*.glb and *.navmesh, and
-FOLDER/data/datasets/pointnav/habitat-test-scenes/v1/{train,val,test}/*.json.gz. Tests that ask for the files by name
-then run; tests that compare with numbers of the real scenes fail. Needs the package gsnav.
+Both write FOLDER/data/datasets/pointnav/habitat-test-scenes/v1/{train,val,test}/*.json.gz, which the examples read.
+A NavMesh is written beside each scan that has none, for an agent of 0.1 m radius and 1.5 m height. The rooms are
+FOLDER/data/scene_datasets/habitat-test-scenes/*.glb and *.navmesh: tests that ask for the files by name then run;
+tests that compare with numbers of the real scenes fail. Needs the package gsnav.
 """
 
 import argparse
@@ -109,17 +112,43 @@ def navmesh(scene: int) -> gsnav.NavMesh:
     return gsnav.NavMesh.build(gsnav.NavMeshSettings(), np.concatenate(points), np.concatenate(faces))
 
 
-def episodes(mesh: gsnav.NavMesh, name: str, count: int, first: int, seed: int) -> list[gsnav.PointNavEpisode]:
+def episodes(mesh: gsnav.NavMesh, scene: str, count: int, first: int, seed: int) -> list[gsnav.PointNavEpisode]:
     """Episodes of a scene, numbered from `first`."""
     made = gsnav.generate_episodes(mesh, count, seed)
     for i, episode in enumerate(made):
         episode.id = str(first + i)
-        episode.scene_id = f"data/scene_datasets/habitat-test-scenes/{name}.glb"
+        episode.scene_id = scene
     return made
 
 
+def save(root: pathlib.Path, places: list[tuple[gsnav.NavMesh, str]], train: int, others: int) -> None:
+    """Writes the episodes of all splits, divided among the scenes: NavMesh and `scene_id` of each."""
+    for k, split in enumerate(SPLITS):
+        folder = root / f"data/datasets/pointnav/habitat-test-scenes/v1/{split}"
+        folder.mkdir(parents=True, exist_ok=True)
+        count, rows = train if split == "train" else others, []
+        for i, (mesh, scene) in enumerate(places):
+            share = count // len(places) + (i < count % len(places))
+            rows += episodes(mesh, scene, share, len(rows), 10 * k + i)
+        gsnav.io.save_episodes(folder / f"{split}.json.gz", rows)
+
+
+def make_of_scans(root: pathlib.Path, scans: list[pathlib.Path], train: int, others: int) -> None:
+    """Writes episodes in scans below a folder, and a NavMesh beside each scan that has none."""
+    places = []
+    for scan in scans:
+        opened = gsnav.open_scene(scan, gsnav.OpenOptions(navmesh="auto"))
+        mesh = opened.scene.navmesh
+        beside = scan.with_suffix(".navmesh")
+        if not beside.exists():
+            gsnav.save_navmesh(mesh, beside)
+        print(f"{scan}: {mesh.navigable_area():.1f} m2 to stand on, NavMesh {opened.navmesh_source}")
+        places.append((mesh, str(scan.resolve())))
+    save(root, places, train, others)
+
+
 def make(root: pathlib.Path, train: int, others: int) -> None:
-    """Writes the files below a folder, with `train` episodes of one split and `others` of each other one."""
+    """Writes the rooms below a folder, with `train` episodes of one split and `others` of each other one."""
     scenes = root / "data/scene_datasets/habitat-test-scenes"
     scenes.mkdir(parents=True, exist_ok=True)
     meshes = []
@@ -127,24 +156,27 @@ def make(root: pathlib.Path, train: int, others: int) -> None:
         (scenes / f"{name}.glb").write_bytes(glb(i))
         meshes.append(navmesh(i))
         gsnav.save_navmesh(meshes[-1], scenes / f"{name}.navmesh")
-    for k, split in enumerate(SPLITS):
-        folder = root / f"data/datasets/pointnav/habitat-test-scenes/v1/{split}"
-        folder.mkdir(parents=True, exist_ok=True)
-        half = (train if split == "train" else others) // 2
-        rows = [e for i in (0, 1) for e in episodes(meshes[i], SCENES[i], half, i * half, 10 * k + i)]
-        gsnav.io.save_episodes(folder / f"{split}.json.gz", rows)
+    names = [f"data/scene_datasets/habitat-test-scenes/{name}.glb" for name in SCENES[:2]]
+    save(root, list(zip(meshes, names)), train, others)
 
 
 def main() -> None:
     """Reads the arguments and writes the files."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=pathlib.Path, help="folder in which data/ is made")
+    parser.add_argument("scan", type=pathlib.Path, nargs="*", help="scans (PLY, SPZ, SOG, glTF, ...)")
     parser.add_argument("--train", type=int, default=10000, help="episodes of the split train")
     parser.add_argument("--others", type=int, default=100, help="episodes of the splits val and test")
     arguments = parser.parse_args()
-    make(arguments.folder, arguments.train, arguments.others)
-    print(f"{arguments.folder / 'data'}: {len(SCENES)} scenes, {arguments.train} episodes of train, "
-          f"{arguments.others} of val and of test")  # fmt: skip
+    try:
+        if arguments.scan:
+            make_of_scans(arguments.folder, arguments.scan, arguments.train, arguments.others)
+        else:
+            make(arguments.folder, arguments.train, arguments.others)
+    except gsnav.Error as e:
+        sys.exit(f"make_habitat_pack.py: {e}")
+    print(f"{arguments.folder / 'data'}: {len(arguments.scan) or len(SCENES)} scenes, {arguments.train} episodes of "
+          f"train, {arguments.others} of val and of test")  # fmt: skip
 
 
 if __name__ == "__main__":
