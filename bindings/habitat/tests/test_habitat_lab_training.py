@@ -25,20 +25,21 @@ SMALL = [
 
 
 def train(pack, folder, arguments, updates, steps, environments=2, **environment):
-    """Log of a training, and the weights of its policy."""
+    """Log of a training, and the weights of its policy after the last update."""
     import torch
 
     text = run_module(
         ["-m", "habitat_baselines.run", *arguments, *overrides_of(pack), *SMALL,
          f"habitat_baselines.num_environments={environments}", "habitat_baselines.total_num_steps=-1.0",
          f"habitat_baselines.num_updates={updates}", f"habitat_baselines.rl.ppo.num_steps={steps}",
-         "habitat_baselines.num_checkpoints=1", "habitat_baselines.log_interval=1",
+         f"habitat_baselines.num_checkpoints={2 * updates}", "habitat_baselines.log_interval=1",
          "habitat_baselines.rl.ppo.hidden_size=32",
          f"habitat_baselines.checkpoint_folder={folder}", f"habitat_baselines.tensorboard_dir={folder}/tb"],
         folder, **environment,
     )  # fmt: skip
     assert f"Num updates: {updates}" in text
     state = torch.load(folder / "latest.pth", map_location="cpu", weights_only=False)
+    assert state["extra_state"]["step"] == updates * steps * environments
     found = state["state_dict"] if "state_dict" in state else state[0]["state_dict"]
     return text, found
 
