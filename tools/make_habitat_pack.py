@@ -123,6 +123,7 @@ def episodes(mesh: gsnav.NavMesh, scene: str, count: int, first: int, seed: int)
 
 def save(root: pathlib.Path, places: list[tuple[gsnav.NavMesh, str]], train: int, others: int) -> None:
     """Writes the episodes of all splits, divided among the scenes: NavMesh and `scene_id` of each."""
+    (root / "data/scene_datasets").mkdir(parents=True, exist_ok=True)  # Habitat-Lab asks for it.
     for k, split in enumerate(SPLITS):
         folder = root / f"data/datasets/pointnav/habitat-test-scenes/v1/{split}"
         folder.mkdir(parents=True, exist_ok=True)
