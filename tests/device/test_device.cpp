@@ -2,6 +2,7 @@
 // Device, and what runs on a device that is chosen at run time: the same bits as the templates.
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <memory>
 #include <string>
 #include <utility>
@@ -108,6 +109,25 @@ TEST_CASE("a device that is not there is refused, and those that are there are n
   const auto gpu = Device::parse("cuda:4000");
   CHECK(gpu.code() == Errc::unsupported);
   CHECK(has(gpu.message(), "there are: serial"));
+}
+
+TEST_CASE("an unknown instruction set is refused where a device would use it") {
+  const char* const given = std::getenv("GSNAV_ISA");
+  const std::string before = given == nullptr ? "" : given;
+  setenv("GSNAV_ISA", "avx1024", 1);
+  for (const char* text : {"cpu", "cpu:2", "best"}) {
+    const auto device = Device::parse(text);
+    CHECK(device.code() == Errc::invalid_argument);
+    CHECK(has(device.message(), "GSNAV_ISA=avx1024: must be baseline, avx2 or avx512"));
+  }
+  CHECK(Device::parse("serial").ok());
+  setenv("GSNAV_ISA", "avx2", 1);
+  CHECK(Device::parse("cpu").ok());
+  if (given == nullptr) {
+    unsetenv("GSNAV_ISA");
+  } else {
+    setenv("GSNAV_ISA", before.c_str(), 1);
+  }
 }
 
 TEST_CASE("renderer: the bits of the template, on every device, with people at a time") {
