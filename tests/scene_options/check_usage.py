@@ -5,7 +5,7 @@
 usage: check_usage.py FOLDER PROGRAM...
 
 Wrong are names of outputs in formats that nothing writes, boxes with their corners in the wrong order, and values that
-a program has no use for. Every option with a number is given one that is not finite, or too large for its type.
+a program has no use for. Every option with a number is given values that are no number, not finite, or too large.
 A name that is a folder has exit status 1, and is found before the scene is opened.
 """
 import os
@@ -24,6 +24,7 @@ USAGE = {
         ("none.ply --out o --depth-near 2 --depth-far 1", "--depth-near must be below --depth-far"),
         ("none.ply --out o --depth-near 2", "--depth-far"),
         ("none.ply --out o --visible-sets auto", "--visible-sets: sampled"),
+        ("none.ply --out= --orbit 1", "--out= has no value"),
         ("none.ply --out o --orbit 4 --eye 1 1 1 --target 0 0 0", "--orbit"),
         ("none.ply --out o --cell-size 0", "--cell-size: 0: must be positive"),
     ],
@@ -45,6 +46,7 @@ USAGE = {
         ("default --out a --mesh a/flat.ply", "a/flat.ply: unknown kind of file to write"),
         ("humanoid --out a.fbx", "a.fbx: unknown kind of file to write"),
         ("flat --out a.ply --seed -1", "must not be negative"),
+        ("flat --out a.ply --seed 18446744073709551616", "is too large"),
     ],
     "gsnav-navmesh": [
         ("none.ply --out a.ply", "--out: a.ply: unknown kind of file to write: use .navmesh or .bin"),
@@ -87,6 +89,11 @@ BOXES = [("5 0 0 1 1 1", "--crop: X0 5 must be below X1 1"), ("0 2 0 1 2 1", "--
          ("0 0 nan 1 1 1", "--crop: nan: must be finite")]
 CROPPED = {"gsnav-render": "none.ply --out o", "gsnav-convert": "none.ply out.ply", "gsnav-navmesh": "none.ply",
            "gsnav-eval": "none.ply", "gsnav-viewer": "none.ply", "nav_loop": "none.ply"}
+# Programs that draw on the processor.
+DRAWS = {**CROPPED, "gsnav-report": "none.ply --out o", "gsnav-replay": "--out none"}
+# Values that an option with a number refuses, by the type in --help.
+WRONG_NUMBERS = {"FLOAT": ["nan", "1e400", "", "0x10"], "UINT": ["9" * 30, "", " -1", "0x10"],
+                 "INT": ["9" * 30, "", " -1", "0x10"]}
 COMMANDS = {"gsnav-scene": ["flat", "rooms", "default", "humanoid"],
             "gsnav-avatar": ["from-gltf", "walk", "strip"]}
 # Program: arguments, and the folders that stand where it writes files.
@@ -113,11 +120,12 @@ def main():
     folder, programs = sys.argv[1], [os.path.abspath(program) for program in sys.argv[2:]]
     wrong, asked = [], 0
 
-    def check(program, arguments, status, said):
+    def check(program, arguments, status, said, environment=None):
         nonlocal asked
         asked += 1
-        ran = subprocess.run([program, *arguments.split()], cwd=folder, stdout=subprocess.PIPE,
-                             stderr=subprocess.STDOUT, text=True, timeout=60, check=False)
+        words = arguments.split() if isinstance(arguments, str) else arguments
+        ran = subprocess.run([program, *words], cwd=folder, stdout=subprocess.PIPE,
+                             stderr=subprocess.STDOUT, text=True, timeout=60, check=False, env=environment)
         if ran.returncode != status or said not in ran.stdout or "no such file" in ran.stdout:
             wrong.append(f"{program} {arguments}: status {ran.returncode} (want {status} and {said!r}): {ran.stdout}")
 
@@ -132,8 +140,10 @@ def main():
                 check(program, f"{CROPPED[name]} --crop {box}", 2, said)
         for command in [c.split() for c in COMMANDS.get(name, [""])]:
             for option, kind, count in options_with_numbers(program, command):
-                value = "nan" if kind == "FLOAT" else "9" * 30
-                check(program, " ".join([*command, option, *[value] * count]), 2, f"{option}: ")
+                for value in WRONG_NUMBERS[kind]:
+                    check(program, [*command, option, *[value] * count], 2, f"{option}: ")
+        if name in DRAWS:
+            check(program, DRAWS[name], 2, "GSNAV_ISA=sse9: must be", {**os.environ, "GSNAV_ISA": "sse9"})
         if os.listdir(folder):
             wrong.append(f"{program}: left {os.listdir(folder)} after wrong command lines")
         for arguments, made in FOLDERS.get(name, []):

@@ -37,7 +37,7 @@ bool parse_target(const std::string& text, std::pair<std::string, double>& out) 
   out = {text.substr(0, equals), 1.0};
   if (equals == text.npos) return true;
   const auto r = std::from_chars(text.data() + equals + 1, text.data() + text.size(), out.second);
-  return r.ec == std::errc{} && r.ptr == text.data() + text.size();
+  return r.ec == std::errc{} && r.ptr == text.data() + text.size() && std::isfinite(out.second);
 }
 
 void add_clip(CLI::App& app, ClipSource& c) {

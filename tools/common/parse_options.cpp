@@ -2,6 +2,7 @@
 #include "parse_options.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
@@ -66,36 +67,74 @@ std::string unknown_command(const CLI::App& app) {
   return "there is no command " + rest.front();
 }
 
-/// Why CLI11 would read another number than `text` says for an option of this type, or an empty text.
-std::string misread(const std::string& type, const std::string& text) {
-  if (type.starts_with("FLOAT")) {
-    char* end = nullptr;
-    const double value = std::strtod(text.c_str(), &end);
-    // NaN lies outside no range, so checks of ranges accept it.
-    if (end != text.c_str() && !std::isfinite(value)) return text + ": must be finite";
-  }
+/// Why `text` is no value for an option of this type, or an empty text. CLI11 itself reads empty values
+/// as 0, lets numbers wrap round or saturate, and takes leading zeros for octal: they are removed here.
+std::string check_number(const std::string& type, std::string& text) {
+  const std::string shown = text.empty() ? "an empty value" : text;
   const bool is_unsigned = type.starts_with("UINT");
-  if (is_unsigned && text.starts_with('-')) return text + ": must not be negative";
-  if (is_unsigned || type.starts_with("INT")) {
+  if (type.starts_with("FLOAT")) {
     const char* const begin = text.c_str() + (text.starts_with('+') ? 1 : 0);
     const char* const end = text.c_str() + text.size();
+    double value = 0;
+    const auto [read, error] = std::from_chars(begin, end, value);
+    if (read != end || error == std::errc::invalid_argument) return shown + ": must be a number";
+    if (error != std::errc()) value = std::strtod(begin, nullptr);  // 0 or infinity
+    // NaN lies outside no range, so checks of ranges accept it.
+    if (!std::isfinite(value)) return shown + ": must be finite";
+  } else if (is_unsigned || type.starts_with("INT")) {
+    const std::size_t sign = text.starts_with('+') || text.starts_with('-') ? 1 : 0;
+    if (text.size() == sign || text.find_first_not_of("0123456789", sign) != std::string::npos)
+      return shown + ": must be a whole number";
+    const std::size_t digit = std::min(text.find_first_not_of('0', sign), text.size() - 1);
+    text = (text.front() == '-' ? "-" : "") + text.substr(digit);
+    if (is_unsigned && text.front() == '-') return shown + ": must not be negative";
+    const char *const begin = text.c_str(), *const end = begin + text.size();
     std::uint64_t natural = 0;
     std::int64_t whole = 0;
     const std::errc error =
         is_unsigned ? std::from_chars(begin, end, natural).ec : std::from_chars(begin, end, whole).ec;
-    if (error == std::errc::result_out_of_range) return text + ": is too large";
+    if (error != std::errc()) return shown + ": is too large";
   }
   return {};
 }
 
-/// Refuses numbers that CLI11 would read as others: too large, or negative for an unsigned option. Also
-/// refuses numbers that are not finite.
+/// Lets options with numbers take numbers only: finite ones that fit their type.
 void check_numbers(CLI::App& app) {
   for (CLI::Option* option : app.get_options()) {
     const std::string type = option->get_type_name();
-    option->check(CLI::Validator([type](const std::string& v) { return misread(type, v); }, ""));
+    if (type.empty() || option->get_items_expected_max() == 0) continue;  // a flag
+    option->transform(CLI::Validator([type](std::string& v) { return check_number(type, v); }, ""));
   }
   for (CLI::App* command : app.get_subcommands({})) check_numbers(*command);
+}
+
+/// The message with numbers of very many digits, such as the largest one, in short form.
+std::string shortened(const std::string& message) {
+  constexpr std::size_t kLongest = 40;
+  std::string out;
+  for (std::size_t i = 0; i < message.size();) {
+    const std::size_t end = std::min(message.find_first_not_of("0123456789", i), message.size());
+    if (end - i > kLongest) {
+      out += std::string(1, message[i]) + "e" + std::to_string(end - i - 1);
+      i = end;
+      if (i < message.size() && message[i] == '.')
+        i = std::min(message.find_first_not_of("0123456789", i + 1), message.size());
+    } else {
+      out.append(message, i, std::max(end, i + 1) - i);
+      i = std::max(end, i + 1);
+    }
+  }
+  return out;
+}
+
+/// Error message for a word like "--out=", after which CLI11 would take the next word. Else empty.
+std::string missing_value(int argc, const char* const* argv) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (word == "--") break;
+    if (word.starts_with("--") && word.ends_with('=')) return word + " has no value";
+  }
+  return {};
 }
 
 /// Column at which the lines that continue `line` begin: that of its description, or of its text.
@@ -138,6 +177,8 @@ std::optional<int> parse_options(CLI::App& app, int argc, const char* const* arg
   static const int registered = std::atexit(check_stdout);
   static_cast<void>(registered);
   try {
+    if (const std::string missing = missing_value(argc, argv); !missing.empty())
+      throw CLI::ValidationError(missing);
     app.parse(argc, argv);
     if (check) check();
   } catch (const CLI::ParseError& error) {
@@ -151,7 +192,8 @@ std::optional<int> parse_options(CLI::App& app, int argc, const char* const* arg
     std::ostringstream out, err;
     const int status = app.exit(error, out, err);
     std::fputs(gsnav::printable(wrapped(out.str())).c_str(), stdout);
-    std::fputs(gsnav::printable(err.str()).c_str(), stderr);
+    if (status != 0) std::fprintf(stderr, "%s: ", name.c_str());
+    std::fputs(gsnav::printable(shortened(err.str())).c_str(), stderr);
     return status == 0 ? 0 : kUsage;
   }
   return {};
