@@ -180,7 +180,8 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
       "A first look in under a minute: two views of 256x256, RGB-D by OpenMP, profiles exact and "
       "fast, the contract's oracle, three timed runs, nothing else. Options that you name keep their "
       "values");
-  if (const auto status = gsnav_tools::parse_options(app, argc, argv)) {
+  if (const auto status =
+          gsnav_tools::parse_options(app, argc, argv, gsnav_tools::check_instruction_set)) {
     exit_code = *status;
     return std::nullopt;
   }

@@ -2,11 +2,11 @@
 #include "gsnav/device/device.hpp"
 
 #include <charconv>
-#include <cstdlib>
 #include <optional>
 
 #include "engines.hpp"
 #include "gsnav/detail/core/guarded.hpp"
+#include "gsnav/detail/core/instruction_set.hpp"
 
 namespace gsnav {
 namespace {
@@ -43,17 +43,6 @@ std::optional<int> number_in(std::string_view text, int low, int high) {
   return n;
 }
 
-/// Refuses an unknown instruction set in GSNAV_ISA, which would be read as the slowest one.
-Status check_instruction_set() {
-  const char* const name = std::getenv("GSNAV_ISA");
-  if (name == nullptr) return {};
-  for (const std::string_view known : {"baseline", "avx2", "avx512"}) {
-    if (name == known) return {};
-  }
-  return {Errc::invalid_argument,
-          std::string("GSNAV_ISA=") + name + ": must be baseline, avx2 or avx512"};
-}
-
 }  // namespace
 
 Result<Device> Device::parse(std::string_view text) {
@@ -65,7 +54,7 @@ Result<Device> Device::parse(std::string_view text) {
       colon == std::string_view::npos ? std::nullopt : std::optional(text.substr(colon + 1));
 
   if (kind == "best" || kind == "cpu") {
-    if (Status s = check_instruction_set(); !s) return s;
+    if (Status s = detail::check_instruction_set(); !s) return s;
   }
   if (kind == "best" && !number) {
     if (gpu_count() > 0) return Device(DeviceKind::cuda, 0, 0);

@@ -23,6 +23,11 @@ void add_device_option(CLI::App& app, gsnav::Device& device, bool* float64) {
   app.add_option_function<std::string>("--device", read, what)->default_str("best")->force_callback();
 }
 
+void check_instruction_set() {
+  const auto cpu = gsnav::Device::parse("cpu");
+  if (cpu.code() == gsnav::Errc::invalid_argument) throw CLI::ValidationError(cpu.message());
+}
+
 void print_device(const gsnav::Device& device, std::FILE* out) {
   std::fprintf(out, "device: %s\n", device.description().c_str());
 }

@@ -16,6 +16,9 @@ namespace gsnav_tools {
 /// @param float64 Set to true by "serial64". Null: that name is not available.
 void add_device_option(CLI::App& app, gsnav::Device& device, bool* float64 = nullptr);
 
+/// Throws CLI::ValidationError if GSNAV_ISA names no instruction set. For programs without --device.
+void check_instruction_set();
+
 /// Prints "device: " and the device's description on one line.
 void print_device(const gsnav::Device& device, std::FILE* out);
 

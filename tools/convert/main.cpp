@@ -273,7 +273,10 @@ int main(int argc, char** argv) {
   add_edits(app, o);
   add_output(app, o);
   refuse_others(app);
-  const auto status = gsnav_tools::parse_options(app, argc, argv, [&o] { check_options(o); });
+  const auto status = gsnav_tools::parse_options(app, argc, argv, [&o] {
+    gsnav_tools::check_instruction_set();
+    check_options(o);
+  });
   if (status) return *status;
 
   const std::string out = o.paths.back();

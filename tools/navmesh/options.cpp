@@ -292,8 +292,10 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
             {"--avatars", no_people},
             {"--seed", no_people},
             {"--device", "NavMeshes and visible sets are built on the processor: see --threads"}});
-  const auto status =
-      gsnav_tools::parse_options(app, argc, argv, [&] { check_together(app, o, given); });
+  const auto status = gsnav_tools::parse_options(app, argc, argv, [&] {
+    gsnav_tools::check_instruction_set();  // for visible sets
+    check_together(app, o, given);
+  });
   if (status) {
     exit_code = *status;
     return std::nullopt;

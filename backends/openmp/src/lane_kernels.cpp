@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cstdlib>
 #include <cstring>
 
 #include "gsnav/backends/openmp.hpp"
+#include "gsnav/detail/core/instruction_set.hpp"
 
 namespace gsnav {
 
@@ -30,7 +30,7 @@ namespace {
 
 const LaneKernels& choose() noexcept {
 #if defined(GSNAV_ISA_DISPATCH)
-  const char* limit = std::getenv("GSNAV_ISA");
+  const char* const limit = detail::instruction_set_limit();
   const auto allowed = [limit](const char* name) {
     return limit == nullptr || std::strcmp(limit, name) == 0 ||
            (std::strcmp(limit, "avx512") == 0 && std::strcmp(name, "avx2") == 0);
