@@ -390,7 +390,7 @@ TEST_CASE("navmesh tool: what is wrong is said on one line") {
       {quoted(folder / "wall.obj"), {"no walkable cell", "agent_height 1.5", "agent_radius 0.1", "m2"}},
       {floor + " --agent-radius 3", {"no walkable cell", "agent_radius 3", "m2"}},
       {floor + " --region-min-size 1000", {"region_min_size"}},
-      {floor + " --cell-size 0", {"cell_size"}},
+      {floor + " --cell-size 0", {"--cell-size", "must be positive"}},
       {floor + " --up up", {"--up"}},
       {floor + " --object " + quoted(std::filesystem::path((folder / "floor.obj").string() + "@1,2")),
        {"--object", "X,Y,Z"}},

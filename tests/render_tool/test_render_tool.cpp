@@ -166,8 +166,8 @@ TEST_CASE("render tool: cameras that cannot be made are said, and --orbit holds 
   const Outcome one =
       run(folder, "default --density 0.05 --orbit 1 --width 32 --height 32 --png --out one");
   CHECK(one.says("1/1 views"));
-  CHECK(run(folder, "--eye nan 0 0 --target 1 0 0 --out o").says("--eye: must be finite"));
-  CHECK(run(folder, "--eye 0 0 0 --target 1 0 inf --out o").says("--target: must be finite"));
+  CHECK(run(folder, "--eye nan 0 0 --target 1 0 0 --out o").says("--eye: nan: must be finite"));
+  CHECK(run(folder, "--eye 0 0 0 --target 1 0 inf --out o").says("--target: inf: must be finite"));
 }
 
 TEST_CASE("render tool: control characters of a name do not reach the terminal") {
