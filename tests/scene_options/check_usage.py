@@ -24,6 +24,7 @@ USAGE = {
         ("none.ply --out o --depth-near 2 --depth-far 1", "--depth-near must be below --depth-far"),
         ("none.ply --out o --depth-near 2", "--depth-far"),
         ("none.ply --out o --visible-sets auto", "--visible-sets: sampled"),
+        ("none.ply --out o --depth first:0x1p-1", "--depth first:0x1p-1: use"),
         ("none.ply --out= --orbit 1", "--out= has no value"),
         ("none.ply --out o --orbit 4 --eye 1 1 1 --target 0 0 0", "--orbit"),
         ("none.ply --out o --cell-size 0", "--cell-size: 0: must be positive"),
@@ -55,6 +56,7 @@ USAGE = {
         ("none.ply --png a.jpg", "--png: a.jpg: unknown kind of file to write: use .png"),
         ("none.ply --agent-radius -1", "agent_radius"),
         ("none.ply --sigmas 0", "sigmas"),
+        ("none.ply --object m.obj@1,2,3,", "--object"),
         ("none.ply --visible-sets a.vis --visible-rows 5", "rows"),
     ],
     "gsnav-eval": [
@@ -90,7 +92,8 @@ BOXES = [("5 0 0 1 1 1", "--crop: X0 5 must be below X1 1"), ("0 2 0 1 2 1", "--
 CROPPED = {"gsnav-render": "none.ply --out o", "gsnav-convert": "none.ply out.ply", "gsnav-navmesh": "none.ply",
            "gsnav-eval": "none.ply", "gsnav-viewer": "none.ply", "nav_loop": "none.ply"}
 # Programs that draw on the processor.
-DRAWS = {**CROPPED, "gsnav-report": "none.ply --out o", "gsnav-replay": "--out none"}
+DRAWS = {**CROPPED, "gsnav-report": "none.ply --out o", "gsnav-replay": "--out none",
+         "gsnav-avatar": STRIP + "--out s.png"}
 # Values that an option with a number refuses, by the type in --help.
 WRONG_NUMBERS = {"FLOAT": ["nan", "1e400", "", "0x10"], "UINT": ["9" * 30, "", " -1", "0x10"],
                  "INT": ["9" * 30, "", " -1", "0x10"]}

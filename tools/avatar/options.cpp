@@ -8,6 +8,7 @@
 #include "../common/check_values.hpp"
 #include "../common/parse_options.hpp"
 #include "gsnav/core/printable.hpp"
+#include "gsnav/device/device.hpp"
 
 namespace gsnav_avatar {
 namespace {
@@ -186,7 +187,11 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
                              "shape (.target), FILE or FILE=AMOUNT; may be repeated");
   CLI::App* walks = add_walk(app, walk, from, to, via);
   CLI::App* strips = add_strip(app, strip, eye, target);
-  if (const auto status = gsnav_tools::parse_options(app, argc, argv)) {
+  const auto check = [] {  // GSNAV_ISA
+    const auto cpu = gsnav::Device::parse("cpu");
+    if (cpu.code() == gsnav::Errc::invalid_argument) throw CLI::ValidationError(cpu.message());
+  };
+  if (const auto status = gsnav_tools::parse_options(app, argc, argv, check)) {
     exit_code = *status;
     return std::nullopt;
   }

@@ -59,8 +59,9 @@ Status make_strip(const StripCommand& c) {
     if (c.z_up)
       scene.assets.back().world_from_asset = {axis_angle(Vec3d{1, 0, 0}, -1.5707963267948966), {}, 1.0};
   }
-  auto renderer = Renderer::create(Device::parse("cpu").value(),
-                                   std::make_shared<const SimulatorScene>(std::move(scene)));
+  const auto device = Device::parse("cpu");
+  if (!device) return device.status();
+  auto renderer = Renderer::create(*device, std::make_shared<const SimulatorScene>(std::move(scene)));
   if (!renderer) return renderer.status();
   const Camera camera = Camera::look_at(c.eye, c.target, {0, 1, 0}, c.width, c.height, c.fov);
   const auto width = static_cast<std::size_t>(c.width), height = static_cast<std::size_t>(c.height),

@@ -3,11 +3,12 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <charconv>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <sstream>
 #include <string>
+#include <system_error>
 
 #include "../common/check_values.hpp"
 #include "../common/parse_options.hpp"
@@ -35,11 +36,12 @@ std::optional<StaticObject> parse_object(const std::string& text) {
   std::vector<double> numbers;
   std::istringstream rest(text.substr(at + 1));
   for (std::string word; std::getline(rest, word, ',');) {
-    char* end = nullptr;
-    numbers.push_back(std::strtod(word.c_str(), &end));
-    if (word.empty() || *end != 0 || !std::isfinite(numbers.back())) return std::nullopt;
+    const char* const end = word.data() + word.size();
+    const auto [read, error] = std::from_chars(word.data(), end, numbers.emplace_back());
+    if (error != std::errc() || read != end || !std::isfinite(numbers.back())) return std::nullopt;
   }
-  if (out.file.empty() || numbers.size() < 3 || numbers.size() > 5) return std::nullopt;
+  if (text.back() == ',' || out.file.empty() || numbers.size() < 3 || numbers.size() > 5)
+    return std::nullopt;
   out.placed.translation = {numbers[0], numbers[1], numbers[2]};
   const double half = numbers.size() > 3 ? numbers[3] * 0.5 * 3.14159265358979323846 / 180 : 0.0;
   out.placed.rotation = {std::cos(half), 0, std::sin(half), 0};

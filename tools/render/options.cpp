@@ -2,8 +2,9 @@
 #include "options.hpp"
 
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <cstdio>
-#include <exception>
+#include <system_error>
 
 #include "../common/check_values.hpp"
 #include "../common/parse_options.hpp"
@@ -17,12 +18,11 @@ std::optional<DepthChoice> parse_depth(const std::string& text) {
   if (text == "accumulated") return DepthChoice{kAccumulatedDepth, 0.5};
   if (text == "first") return DepthChoice{kFirstHitDepth, 0.5};
   if (text.rfind("first:", 0) == 0) {
-    try {
-      std::size_t used = 0;
-      const double tau = std::stod(text.substr(6), &used);
-      if (used == text.size() - 6 && tau > 0 && tau < 1) return DepthChoice{kFirstHitDepth, tau};
-    } catch (const std::exception&) {
-    }
+    double tau = 0;
+    const char* const end = text.data() + text.size();
+    const auto [read, error] = std::from_chars(text.data() + 6, end, tau);
+    if (error == std::errc() && read == end && tau > 0 && tau < 1)
+      return DepthChoice{kFirstHitDepth, tau};
   }
   return std::nullopt;
 }
