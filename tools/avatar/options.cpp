@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "../common/check_values.hpp"
+#include "../common/device_option.hpp"
 #include "../common/parse_options.hpp"
 #include "gsnav/core/printable.hpp"
-#include "gsnav/device/device.hpp"
 
 namespace gsnav_avatar {
 namespace {
@@ -187,11 +187,8 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
                              "shape (.target), FILE or FILE=AMOUNT; may be repeated");
   CLI::App* walks = add_walk(app, walk, from, to, via);
   CLI::App* strips = add_strip(app, strip, eye, target);
-  const auto check = [] {  // GSNAV_ISA
-    const auto cpu = gsnav::Device::parse("cpu");
-    if (cpu.code() == gsnav::Errc::invalid_argument) throw CLI::ValidationError(cpu.message());
-  };
-  if (const auto status = gsnav_tools::parse_options(app, argc, argv, check)) {
+  if (const auto status =
+          gsnav_tools::parse_options(app, argc, argv, gsnav_tools::check_instruction_set)) {
     exit_code = *status;
     return std::nullopt;
   }

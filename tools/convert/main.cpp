@@ -2,7 +2,6 @@
 // gsnav-convert IN... OUT: edits any scene that the library reads and writes it in any format that it
 // writes.
 #include <CLI/CLI.hpp>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
@@ -71,16 +70,6 @@ void check_options(Options& o) {
   o.inputs.insert(o.inputs.end(), o.paths.begin(), o.paths.end() - 1);
   const Status out = io::check_scene_output(o.paths.back());
   if (out.code() == Errc::unsupported) throw CLI::ValidationError("OUT", out.message());
-  const std::pair<const char*, std::vector<double>> all[] = {{"--rotate", o.rotate},
-                                                             {"--translate", o.translate},
-                                                             {"--scale", {o.scale}},
-                                                             {"--min-opacity", {o.min_opacity}},
-                                                             {"--max-scale", {o.max_scale}}};
-  for (const auto& [name, values] : all) {
-    for (const double v : values) {
-      if (!std::isfinite(v)) throw CLI::ValidationError(name, std::to_string(v) + ": must be finite");
-    }
-  }
   if (!o.rotate.empty() && !(norm(Vec3d{o.rotate[0], o.rotate[1], o.rotate[2]}) > 0))
     throw CLI::ValidationError("--rotate", "the axis is zero");
 }
