@@ -190,10 +190,8 @@ void bind_avatar_tracker(nb::module_& m) {
            "Equal points let the agent stand.")
       .def("set_capsules", &A::set_capsules, nb::arg("capsules"),
            "Adds capsules that stand still, rows of x0, y0, z0, x1, y1, z1, radius in metres. They "
-           "replace "
-           "those of the last call, and count as one person more. Raises InvalidArgument for a value "
-           "that "
-           "is not finite or a negative radius.")
+           "replace those of the last call, and count as one person more. Raises InvalidArgument for a "
+           "value that is not finite or a negative radius.")
       .def(
           "capsules",
           [](const A& a, double time, std::optional<std::uint32_t> person) {

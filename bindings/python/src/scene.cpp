@@ -41,10 +41,10 @@ void bind_options(nb::module_& m) {
       .field("navmesh", &O::navmesh,
              "The NavMesh: \"\" (the one next to the file), \"none\", \"auto\", "
              "\"build\", \"mesh\", \"gaussians\" or a file.")
-      .field("navmesh_settings", &O::navmesh_settings,
-             "Settings of a built NavMesh, instead of the next three. Gaussians get voxels of at most "
-             "0.05 m "
-             "height, or of cell_size if that is larger.")
+      .field(
+          "navmesh_settings", &O::navmesh_settings,
+          "Settings of a built NavMesh, instead of cell_size, agent_radius and agent_height. Gaussians "
+          "get voxels of at most 0.05 m height, or of cell_size if that is larger.")
       .field("cell_size", &O::cell_size, "Edge of the voxels of a built NavMesh, metres.")
       .field("crop", &O::crop, "Builds the NavMesh in this box only; world frame, metres.")
       .field("agent_radius", &O::agent_radius, "Radius of the agent of a built NavMesh, metres.")
@@ -160,8 +160,7 @@ void bind_scene(nb::module_& m) {
           nb::arg("people") = nb::none(),
           "A scene that shares the parts of `scene` (None: nothing), with another NavMesh or other sets "
           "of Gaussians if they are given. `people`: numbers of the people that it keeps; None keeps "
-          "all. "
-          "Raises IndexError for a number that is out of range.")
+          "all. Raises IndexError for a number that is out of range.")
       .def_ro("assets", &SimulatorScene::assets, nb::rv_policy::copy,
               "Sets of static Gaussians: a new list of copies that share their parts.")
       .def_ro("navmesh", &SimulatorScene::navmesh, "Surface that agents walk on, or None.")
