@@ -24,8 +24,9 @@ using cuda::BatchSet;
 bool is_of_few(std::uint64_t cameras, std::uint64_t tiles, std::uint64_t gaussians,
                int multiprocessors) {
   using Policy = cuda::policy::Batch;
-  const std::uint64_t each =
-      gaussians >= Policy::kManyGaussians * cameras ? 2 * Policy::kFewTilesEach : Policy::kFewTilesEach;
+  const bool doubled =
+      gaussians >= Policy::kManyGaussians * cameras || tiles <= Policy::kSmallImageTiles;
+  const std::uint64_t each = (doubled ? 2 : 1) * Policy::kFewTilesEach;
   return tiles <= Policy::kFewTiles &&
          cameras * tiles <= each * static_cast<std::uint64_t>(multiprocessors);
 }

@@ -18,6 +18,8 @@ struct Batch {
   /// together have at most kFewTilesEach tiles per multiprocessor. The limits double if a camera sees
   /// kManyGaussians or more.
   static constexpr std::uint64_t kFewTiles = 512, kFewTilesEach = 16, kManyGaussians = 2'500'000;
+  /// The second limit also doubles for images of up to kSmallImageTiles tiles.
+  static constexpr std::uint64_t kSmallImageTiles = 16;
   /// Above this number of tiles per multiprocessor, most lists are short.
   static constexpr std::uint64_t kShortListTiles = 16;
   /// With at least this number of pairs of camera and set, they are prepared on the host's threads.
