@@ -14,7 +14,7 @@ import time
 
 import numpy as np
 from pointnav_policy import Policy, load, save
-from pointnav_worlds import ACTIONS, HELD_OUT_SEEDS, METRICS, Worlds, device_of, goals, world_arguments
+from pointnav_worlds import ACTIONS, CHANNELS, HELD_OUT_SEEDS, METRICS, Worlds, device_of, goals, world_arguments
 
 import gsnav
 
@@ -34,7 +34,7 @@ def evaluate(args: argparse.Namespace, worlds: Worlds, name: str, policy: Policy
         given[environment] += 1
         return worlds.episodes[playing[environment] % int(args.episodes)]
 
-    simulator = worlds.simulator(args, n, policy is not None and not policy.blind, next_episode,
+    simulator = worlds.simulator(args, n, policy is not None and policy.channels > 0, next_episode,
                                  memory=gsnav.ImageMemory.host)
     follower, rng = gsnav.GeodesicFollower(), np.random.default_rng(args.seed)
     seen, ended, start = simulator.reset(), np.zeros(n, np.bool_), np.ones(n, np.bool_)
@@ -43,7 +43,7 @@ def evaluate(args: argparse.Namespace, worlds: Worlds, name: str, policy: Policy
     shown = time.monotonic()
     while len(rows) < args.episodes:
         if policy is not None:
-            log_p, hidden = policy.act(seen.images.get("depth"), goals(seen), actions, start, hidden)
+            log_p, hidden = policy.act(seen.images.get(args.sensor), goals(seen), actions, start, hidden)
             noise = rng.gumbel(size=log_p.shape) if name == "agent" else 0
             actions = (log_p + noise).argmax(-1)
         elif name == "random":
@@ -83,6 +83,7 @@ def main() -> None:
     if policy is not None and args.save_weights:
         return save(policy, args.save_weights)
     args.size = policy.size if policy is not None else 64
+    args.sensor = "rgb" if policy is not None and policy.channels == CHANNELS["rgb"] else "depth"
     worlds = Worlds(HELD_OUT_SEEDS, args, -(-args.episodes // len(HELD_OUT_SEEDS)))
     print("| policy | " + " | ".join(METRICS) + " |\n" + "|---" * (len(METRICS) + 1) + "|")
     for name in args.policies:

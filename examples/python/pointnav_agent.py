@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import pathlib
 import sys
 from typing import Any
 
 import numpy as np
 import torch
-from pointnav_worlds import ACTIONS, device_of
+from pointnav_worlds import ACTIONS, LEFT, RIGHT, device_of
 from torch import Tensor, nn
 
 import gsnav
@@ -18,7 +19,7 @@ import gsnav
 
 # [snippet: rows]
 class Rows:
-    """Memory of a rollout's images, [T + 1][N][H][W][1]. The simulator draws into row `at`."""
+    """Memory of a rollout's images, [T + 1][N][H][W][C]. The simulator draws into row `at`."""
 
     def __init__(self, images: Tensor) -> None:
         self.images, self.at = images, 0
@@ -28,41 +29,65 @@ class Rows:
 # [/snippet]
 
 
-class Agent(nn.Module):
-    """Three convolutions and a GRU, from depth, goal and last action to the next action and the value."""
+class Mirror:
+    """Swaps left and right in every other environment, so that each flat has a mirrored twin. None if off."""
 
-    def __init__(self, size: int, blind: bool) -> None:
+    def __init__(self, on: bool, first: int, environments: int, device: torch.device) -> None:
+        self.of = on & ((first + np.arange(environments)) % 2 == 1)
+        self.where = torch.from_numpy(self.of)[:, None, None, None].to(device) if on else None
+
+    def images(self, images: Tensor) -> Tensor:
+        """Images [...][N][H][W][C], as the agent sees them."""
+        return images if self.where is None else torch.where(self.where, images.flip(-2), images)
+
+    def goals(self, goals: np.ndarray) -> np.ndarray:
+        """Goals [N][3], of which the last number is a sine."""
+        goals[self.of, 2] *= -1
+        return goals
+
+    def actions(self, actions: np.ndarray) -> np.ndarray:
+        """Actions [N] of the simulator for those of the agent."""
+        return np.where(self.of & (actions >= LEFT), LEFT + RIGHT - actions, actions)
+
+
+class Agent(nn.Module):
+    """Three convolutions and a GRU, from an image, goal and last action to the next action and the value."""
+
+    def __init__(self, size: int, channels: int) -> None:
         super().__init__()
-        self.size, self.cnn = size, None
-        if not blind:
-            layers = [nn.Conv2d(1, 32, 8, 4), nn.Conv2d(32, 64, 4, 2), nn.Conv2d(64, 32, 3, 1)]
+        self.shape, self.cnn = (channels, size, size), None
+        if channels:
+            layers = [nn.Conv2d(channels, 32, 8, 4), nn.Conv2d(32, 64, 4, 2), nn.Conv2d(64, 32, 3, 1)]
             self.cnn = nn.Sequential(*(part for layer in layers for part in (layer, nn.ReLU())), nn.Flatten())
             with torch.no_grad():
-                layers[0].weight.div_(10.0)  # depth in units of 10 m, without a pass over the images
-                length = self.cnn(torch.zeros(1, 1, size, size)).shape[1]
+                if channels == 1:
+                    layers[0].weight.div_(10.0)  # depth in units of 10 m, without a pass over the images
+                length = self.cnn(torch.zeros(1, *self.shape)).shape[1]
             self.image = nn.Sequential(nn.Linear(length, 256), nn.ReLU())
         self.goal, self.last = nn.Linear(3, 32), nn.Embedding(ACTIONS + 1, 32)
-        self.gru = nn.GRU(64 if blind else 320, 256)
+        self.gru = nn.GRU(320 if channels else 64, 256)
         self.policy, self.value = nn.Linear(256, ACTIONS), nn.Linear(256, 1)
         with torch.no_grad():
             self.policy.weight.mul_(0.01)
 
-    def features(self, depth: Tensor, goal: Tensor, last: Tensor) -> Tensor:
-        """Inputs of the GRU for images [B][H][W][1], goals [B][3] and last actions [B]."""
+    def features(self, images: Tensor, goal: Tensor, last: Tensor) -> Tensor:
+        """Inputs of the GRU for images [B][H][W][C], goals [B][3] and last actions [B]."""
         parts = [self.goal(goal), self.last(last)]
         if self.cnn is not None:
-            parts.append(self.image(self.cnn(depth.view(-1, 1, self.size, self.size))))
+            c, h, w = self.shape
+            rows = images.view(-1, c, h, w) if c == 1 else images.view(-1, h, w, c).movedim(-1, 1)
+            parts.append(self.image(self.cnn(rows)))
         return torch.cat(parts, -1)
 
     def heads(self, y: Tensor) -> tuple[Tensor, Tensor]:
         """Logarithms of the actions' probabilities, [B][4], and values, [B]."""
         return torch.log_softmax(self.policy(y), -1), self.value(y)[:, 0]
 
-    def act(self, depth: Tensor, goal: Tensor, last: Tensor, start: Tensor, hidden: Tensor,
+    def act(self, images: Tensor, goal: Tensor, last: Tensor, start: Tensor, hidden: Tensor,
             noise: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Samples actions: actions, their log-probabilities, values and hidden states."""
         last = torch.where(start > 0, ACTIONS, last)
-        y, hidden = self.gru(self.features(depth, goal, last)[None], (hidden * (1 - start[:, None]))[None])
+        y, hidden = self.gru(self.features(images, goal, last)[None], (hidden * (1 - start[:, None]))[None])
         log_p, value = self.heads(y[0])
         action = (log_p - torch.log(-torch.log(noise))).argmax(-1)
         return action, log_p.gather(-1, action[:, None])[:, 0], value, hidden[0]
@@ -103,6 +128,15 @@ def pieces(start: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.nd
 def clear(noise: Tensor) -> Tensor:
     """Random numbers whose logarithm of the logarithm is finite."""
     return noise.clamp_(1e-9, 1 - 1e-7)
+
+
+def hash_of(digest: bytes, agent: nn.Module, optimizer: torch.optim.Optimizer) -> str:
+    """Hash of a digest, weights and optimiser state."""
+    h = hashlib.sha256(digest)
+    for group in (agent.state_dict(), *optimizer.state_dict()["state"].values()):
+        for name in sorted(group):
+            h.update(group[name].detach().cpu().numpy().tobytes())
+    return h.hexdigest()[:16]
 
 
 def devices_of(name: str) -> tuple[str, torch.device]:

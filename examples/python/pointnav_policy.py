@@ -29,32 +29,33 @@ def convolved(x: Array, weight: Array, bias: Array, stride: int) -> Array:
 
 
 class Policy:
-    """Chooses actions from depth, goal and last action. All numbers are float32."""
+    """Chooses actions from images, goal and last action. All numbers are float32."""
 
     def __init__(self, weights: dict[str, Array], size: int) -> None:
         self.weights, self.size = {name: w.astype(np.float32) for name, w in weights.items()}, size
-        self.blind = "cnn.0.weight" not in weights
+        self.channels = weights["cnn.0.weight"].shape[1] if "cnn.0.weight" in weights else 0  # 0: a blind agent
 
     def linear(self, name: str, x: Array) -> Array:
         y: Array = x @ self.weights[f"{name}.weight"].T + self.weights[f"{name}.bias"]
         return y
 
-    def features(self, depth: Array | None, goal: Array, last: Array) -> Array:
+    def features(self, images: Array | None, goal: Array, last: Array) -> Array:
         parts = [self.linear("goal", goal), self.weights["last.weight"][last]]
-        if depth is not None and not self.blind:
+        if images is not None and self.channels:
             for layer, stride in enumerate(STRIDES):
                 name = f"cnn.{2 * layer}"
-                depth = convolved(depth, self.weights[f"{name}.weight"], self.weights[f"{name}.bias"], stride)
-            flat = depth.transpose(0, 3, 1, 2).reshape(len(depth), -1)
+                images = convolved(images, self.weights[f"{name}.weight"], self.weights[f"{name}.bias"], stride)
+            flat = images.transpose(0, 3, 1, 2).reshape(len(images), -1)
             parts.append(np.maximum(self.linear("image.0", flat), 0))
         return np.concatenate(parts, -1)
 
-    def act(self, depth: Array | None, goal: Array, last: Array, start: Array, hidden: Array) -> tuple[Array, Array]:
+    def act(self, images: Array | None, goal: Array, last: Array, start: Array, hidden: Array) -> tuple[Array, Array]:
         """Logarithms of the actions' probabilities, [N][4], and the next hidden states, [N][256].
 
-        depth [N][H][W][1] in metres; goal [N][3], see goals(); last actions [N]; start [N]: an episode begins."""
+        images [N][H][W][C], depth in metres; goal [N][3], see goals(); last actions [N]; start [N]: an episode begins.
+        """
         none = len(self.weights["last.weight"]) - 1  # stands for the action before the first
-        x = self.features(depth, goal.astype(np.float32), np.where(start, none, last))
+        x = self.features(images, goal.astype(np.float32), np.where(start, none, last))
         hidden = hidden * ~start[:, None]
         input_part, hidden_part = (v @ self.weights[f"gru.weight_{k}_l0"].T + self.weights[f"gru.bias_{k}_l0"]
                                    for v, k in ((x, "ih"), (hidden, "hh")))

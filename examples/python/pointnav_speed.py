@@ -48,7 +48,7 @@ def main() -> None:
     rates = rates[1:]
     print(f"{args.device}: {statistics.median(rates):,.0f} environment steps/s, median of {len(rates)} runs "
           f"({min(rates):,.0f} to {max(rates):,.0f}); {args.environments} environments, {args.people} people per flat, "
-          f"{'no images' if args.blind else f'depth {args.size}x{args.size}'}, density {args.density}")
+          f"{'no images' if args.blind else f'{args.sensor} {args.size}x{args.size}'}, density {args.density}")
 
 
 if __name__ == "__main__":

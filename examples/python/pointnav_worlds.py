@@ -16,7 +16,8 @@ import numpy as np
 
 import gsnav
 
-ACTIONS = 4  # stop, forward, left, right
+ACTIONS, LEFT, RIGHT = 4, 2, 3  # stop, forward, left, right
+CHANNELS = {"depth": 1, "rgb": 3}  # numbers per pixel of a sensor
 TRAIN_SEEDS, HELD_OUT_SEEDS = range(64), range(64, 80)
 METRICS = ("success", "spl", "soft_spl", "collision_rate", "psi", "steps")
 
@@ -27,12 +28,18 @@ class Worlds:
     def __init__(self, seeds: range, args: argparse.Namespace, episodes: int, success: float = 2.5) -> None:
         self.task = gsnav.TaskConfig.avatar_pointnav() if args.people else gsnav.TaskConfig()
         self.task.reward.success = success
+        self.lod = gsnav.LodChoice() if args.quality == "lod" else None
         self.quality = gsnav.Quality.exact() if args.quality == "exact" else gsnav.Quality.fast()
 
         def make(seed: int) -> tuple[gsnav.SimulatorScene, list[gsnav.PointNavEpisode]]:
             plan = gsnav.FloorPlanOptions(seed=seed, rooms=args.rooms)
             scene = gsnav.planned_simulator_scene(plan, args.people, seed, args.density, self.task)
             assert scene.navmesh is not None
+            if self.lod is not None:
+                assets = scene.assets
+                for asset in assets:
+                    asset.lod = gsnav.build_lod("cpu:1", asset.cloud)
+                scene = gsnav.SimulatorScene(scene, assets=assets)
             return scene, list(gsnav.generate_episodes(scene.navmesh, episodes, seed))
 
         with concurrent.futures.ThreadPoolExecutor(min(16, os.cpu_count() or 1)) as pool:
@@ -45,12 +52,13 @@ class Worlds:
                   next_episode: Callable[[int, int], gsnav.BatchEpisode],
                   image_source: Callable[[int, int], Any] | None = None,
                   memory: gsnav.ImageMemory = gsnav.ImageMemory.backend) -> gsnav.BatchSimulator:
-        """Environments with a depth sensor, or with none. After an episode, a step without effect begins the next."""
-        depth = gsnav.SensorSpec(uuid="depth", kind=gsnav.SensorKind.depth, resolution=[args.size, args.size])
+        """Environments with one sensor, or with none. After an episode, a step without effect begins the next."""
+        sensor = gsnav.SensorSpec(uuid=args.sensor, kind=gsnav.SensorKind[args.sensor],
+                                  resolution=[args.size, args.size])
         # With as many slots as environments, one pass draws all images.
-        config = gsnav.BatchConfig(task=self.task, sensors=[depth] if images else [], pose_slots=environments,
-                                   render=gsnav.RenderConfig(quality=self.quality), images=memory,
-                                   auto_reset=gsnav.AutoReset.next_step)
+        config = gsnav.BatchConfig(task=self.task, sensors=[sensor] if images else [], pose_slots=environments,
+                                   render=gsnav.RenderConfig(quality=self.quality), lod=self.lod,
+                                   images=memory, auto_reset=gsnav.AutoReset.next_step)
         return gsnav.BatchSimulator(args.device, self.scenes, config, environments, next_episode,
                                     image_source=image_source)
 
@@ -89,13 +97,15 @@ def world_arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--people", type=int, default=0, help="people in each flat")
     p.add_argument("--density", type=float, default=0.05, help="factor on the number of Gaussians")
     p.add_argument("--rooms", type=int, default=4, help="rooms of a flat")
-    p.add_argument("--quality", default="exact", choices=["exact", "fast"], help="error budget of the images")
+    p.add_argument("--quality", default="exact", choices=["exact", "fast", "lod"],
+                   help="error budget of the images, or levels of detail")
 
 
 def sensor_arguments(p: argparse.ArgumentParser) -> None:
     """Adds the arguments for the sensor of an agent."""
     p.add_argument("--blind", action="store_true", help="the agent sees no images")
-    p.add_argument("--size", type=int, default=64, help="edge of the depth images, pixels, 36 or more")
+    p.add_argument("--sensor", default="depth", choices=list(CHANNELS), help="what the agent sees")
+    p.add_argument("--size", type=int, default=64, help="edge of the images, pixels, 36 or more")
 
 
 def device_of(name: str) -> gsnav.Device:

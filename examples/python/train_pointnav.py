@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Trains a PointNav agent from depth with DD-PPO, in random flats. Needs torch; --help explains the arguments.
+"""Trains a PointNav agent from images with DD-PPO, in random flats. Needs torch; --help explains the arguments.
 
     train_pointnav.py --out run --steps 1e8              # train, or go on from the checkpoint in run/
     torchrun --nproc-per-node 2 train_pointnav.py ...    # one process per GPU
@@ -27,8 +27,9 @@ except ImportError:
     sys.exit("train_pointnav.py needs PyTorch: pip install torch")
 import numpy as np
 import torch.distributed as dist
-from pointnav_agent import Agent, Reorder, Rows, clear, devices_of, pieces, progress, write_log
-from pointnav_worlds import ACTIONS, METRICS, TRAIN_SEEDS, Draw, Worlds, goals, mixed, sensor_arguments, world_arguments
+from pointnav_agent import Agent, Mirror, Reorder, Rows, clear, devices_of, hash_of, pieces, progress, write_log
+from pointnav_worlds import (ACTIONS, CHANNELS, METRICS, TRAIN_SEEDS, Draw, Worlds, goals, mixed, sensor_arguments,
+                             world_arguments)
 from torch import Tensor, nn
 from torch.nn.utils.rnn import PackedSequence
 
@@ -38,7 +39,7 @@ GAMMA, LAMBDA, CLIP, VALUE_COEF, ENTROPY_COEF, MAX_NORM = 0.99, 0.95, 0.2, 0.5, 
 # Arguments that a checkpoint keeps: with others, training would not go on as it began.
 KEPT = ("seed", "flats", "episodes_per_flat", "people", "blind", "size", "density", "rooms", "environments",
         "rollout", "chunks", "epochs", "lr", "horizon", "every", "cut_off", "ranks", "quality", "success",
-        "critic_updates")
+        "critic_updates", "sensor", "mirror")
 
 
 class Learner:
@@ -57,8 +58,8 @@ class Learner:
             pinned = host and self.device.type == "cuda"
             return torch.zeros(*shape, dtype=dtype, device="cpu" if host else self.device, pin_memory=pinned)
 
-        self.depth = made(t + 1, n, size, size, 1)
-        self.rows = Rows(self.depth)
+        self.images = made(t + 1, n, size, size, CHANNELS[args.sensor])
+        self.rows, self.mirror = Rows(self.images), Mirror(args.mirror, self.rank * n, n, self.device)
         self.simulator = worlds.simulator(args, n, not args.blind, self.draw, self.rows)
         self.goal, self.start = made(t + 1, n, 3), made(t + 1, n)
         self.action, self.log_p, self.values = made(t, n, dtype=torch.int64), made(t, n), made(t + 1, n)
@@ -108,7 +109,7 @@ class Learner:
 
     def observe(self, t: int, start: np.ndarray) -> None:
         """Stores the observations before action t. The simulator has drawn the images in their row."""
-        self.host_goal.numpy()[t] = goals(self.seen)
+        self.host_goal.numpy()[t] = self.mirror.goals(goals(self.seen))
         self.host_start.numpy()[t] = self.starts = start
 
     def act(self, t: int) -> None:
@@ -118,8 +119,8 @@ class Learner:
         self.start[t].copy_(self.host_start[t], non_blocking=True)
         if t < steps and t % (steps // self.args.chunks) == 0:
             self.first_hidden[t * self.args.chunks // steps].copy_(self.hidden)
-        action, log_p, value, hidden = self.agent.act(self.depth[t], self.goal[t], self.last[t], self.start[t],
-                                                      self.hidden, self.noise[t])
+        action, log_p, value, hidden = self.agent.act(self.mirror.images(self.images[t]), self.goal[t], self.last[t],
+                                                      self.start[t], self.hidden, self.noise[t])
         self.values[t].copy_(value)
         if t < steps:
             self.action[t].copy_(action), self.log_p[t].copy_(log_p), self.last[t + 1].copy_(action)
@@ -155,7 +156,7 @@ class Learner:
                 torch.cuda.current_stream().synchronize()
             self.note("act")
             self.rows.at = t + 1
-            self.seen = self.simulator.step(self.host_action.numpy())
+            self.seen = self.simulator.step(self.mirror.actions(self.host_action.numpy()))
             self.note("simulate")
             # After the end of an episode comes a step without effect, which begins the next episode.
             reward[t], valid[t], start = self.seen.rewards, ~self.ended, self.ended
@@ -201,7 +202,8 @@ class Learner:
             return values[rows].reshape(-1)[order]
 
         last = torch.where(self.start[rows] > 0, ACTIONS, self.last[rows])
-        x = self.agent.features(self.depth[rows], self.goal[rows].reshape(-1, 3), last.reshape(-1))
+        images = self.mirror.images(self.images[rows])
+        x = self.agent.features(images, self.goal[rows].reshape(-1, 3), last.reshape(-1))
         hidden = self.first_hidden[chunk][env] * (1 - fresh)[:, None]
         y = self.agent.gru(PackedSequence(Reorder.apply(x, order, inverse), sizes), hidden[None])[0].data
         policy_learns = self.update_count >= self.args.critic_updates
@@ -247,19 +249,11 @@ class Learner:
                 nn.utils.clip_grad_norm_(parameters, MAX_NORM)
                 self.optimizer.step()
         self.last[0].copy_(self.last[self.used])
-        self.depth[0].copy_(self.depth[self.used])
+        self.images[0].copy_(self.images[self.used])
         self.observe(0, self.starts)
         self.update_count += 1
         self.losses /= self.args.epochs * self.args.chunks
         self.note("learn")
-
-    def hash(self) -> str:
-        """Hash of weights, optimiser state and the metrics of all episodes."""
-        h = hashlib.sha256(self.digest)
-        for group in (self.agent.state_dict(), *self.optimizer.state_dict()["state"].values()):
-            for name in sorted(group):
-                h.update(group[name].detach().cpu().numpy().tobytes())
-        return h.hexdigest()[:16]
 
 
 def save(learner: Learner, log: list[dict[str, float]], out: pathlib.Path) -> None:
@@ -340,7 +334,7 @@ def train(args: argparse.Namespace, agent: Agent) -> None:
         steps = max(1.0, log[-1]["frames"] - first) / args.environments / args.ranks
         print("\n| part | ms per step of all environments |\n|---|---|")
         print("\n".join(f"| {name} | {1e3 * t / steps:.3f} |" for name, t in learner.times.items()))
-        print(f"hash {learner.hash()}")
+        print(f"hash {hash_of(learner.digest, agent, learner.optimizer)}")
 
 
 def arguments() -> argparse.Namespace:
@@ -363,6 +357,7 @@ def arguments() -> argparse.Namespace:
     p.add_argument("--every", type=int, default=50, help="updates from one checkpoint to the next")
     p.add_argument("--cut-off", type=float, default=1.0, help="fraction of ranks whose end ends the rollouts of the "
                    "others. DD-PPO has 0.6; below 1, runs on several ranks are not reproducible")
+    p.add_argument("--mirror", action="store_true", help="swap left and right in every other environment")
     p.add_argument("--success", type=float, default=2.5, help="reward for a success")
     world_arguments(p), sensor_arguments(p)
     a = p.parse_args()
@@ -388,7 +383,7 @@ def main() -> None:
     args.ranks = dist.get_world_size() if local >= 0 else 1
     args.out.mkdir(parents=True, exist_ok=True)
     torch.manual_seed(args.seed)
-    agent = Agent(args.size, args.blind).to(args.torch_device)
+    agent = Agent(args.size, 0 if args.blind else CHANNELS[args.sensor]).to(args.torch_device)
     train(args, agent)
     if local >= 0:
         dist.destroy_process_group()

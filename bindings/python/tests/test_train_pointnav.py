@@ -95,7 +95,7 @@ def test_the_policy_in_numpy_is_the_agent(first, monkeypatch, tmp_path):
     from pointnav_policy import load, save
 
     state = torch.load(first[0] / "checkpoint.pt", weights_only=True)
-    agent = Agent(64, blind=False)
+    agent = Agent(64, channels=1)
     agent.load_state_dict(state["agent"])
     policy = load(first[0] / "checkpoint.pt")
     rng = np.random.default_rng(1)
@@ -117,3 +117,38 @@ def test_the_speed_of_the_environments_is_printed():
                           "--environments", "4", "--steps", "3", "--runs", "2"], capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
     assert re.search(r"cpu:1: [\d,]+ environment steps/s", run.stdout)
+
+
+def test_turns_of_a_mirrored_environment_are_seen_mirrored(monkeypatch):
+    monkeypatch.syspath_prepend(FOLDER)
+    from pointnav_agent import Mirror
+    from pointnav_worlds import LEFT, goals
+
+    import gsnav
+
+    scene = gsnav.default_simulator_scene(people=0, density=0.05)
+    episode = gsnav.BatchEpisode(scene=0, episode=gsnav.generate_episodes(scene.navmesh, 1, 1)[0])
+    sensor = gsnav.SensorSpec(uuid="depth", kind=gsnav.SensorKind.depth, resolution=[64, 64])
+    simulator = gsnav.BatchSimulator("cpu:1", [scene], gsnav.BatchConfig(sensors=[sensor]), 4, lambda e, n: episode)
+    mirror = Mirror(True, 0, 4, torch.device("cpu"))
+
+    def angles(step):
+        _, cosine, sine = mirror.goals(goals(step)).T
+        return np.degrees(np.arctan2(sine, cosine))
+
+    def images(step):
+        return mirror.images(torch.from_numpy(step.images["depth"].copy())).numpy()[..., 0]
+
+    before = simulator.reset()
+    first = angles(before)
+    assert np.allclose(first, first[0] * np.array([1, -1, 1, -1]), atol=1e-4)
+    assert np.array_equal(images(before)[1], images(before)[0][:, ::-1])
+    # A turn to the left moves the goal and the image to the right, in all environments.
+    seen = images(before)
+    after = simulator.step(mirror.actions(np.full(4, LEFT)))
+    turned = (first - angles(after) + 180) % 360 - 180
+    assert np.allclose(turned, turned[0], atol=1e-4) and turned[0] > 5
+    for was, now in zip(seen, images(after)):
+        error = [np.median(np.abs(was[:, 16:-16] - now[:, 16 + s:48 + s])) for s in range(-16, 17)]
+        assert np.argmin(error) > 16, error
+    assert np.array_equal(Mirror(False, 0, 4, torch.device("cpu")).actions(np.arange(4)), np.arange(4))
