@@ -16,10 +16,11 @@ import numpy as np
 import gsnav
 
 DENSITY = 0.3
+WARM_UP = 5  # first steps, which allocate memory, are not counted; reference.cpp has the same number
 
 
 def python_ms(scene, args, copy):
-    """Milliseconds per step of VectorEnv."""
+    """Milliseconds per step of VectorEnv after the first ones."""
     episode = gsnav.generate_episodes(scene.navmesh, 1, 1)
     sensors = gsnav.rgbd_sensors(args.side, args.side)[1 if args.sensors == "depth" else 0:]
     images = gsnav.ImageMemory.backend if args.device.startswith("cuda") else gsnav.ImageMemory.host
@@ -31,8 +32,8 @@ def python_ms(scene, args, copy):
         actions = 1 + (np.arange(args.environments) + i) % 3
         start = time.perf_counter()
         envs.step(actions)
-        seconds += time.perf_counter() - start
-    return 1000 * seconds / args.steps
+        seconds += time.perf_counter() - start if i >= WARM_UP else 0
+    return 1000 * seconds / (args.steps - WARM_UP)
 
 
 def main():
@@ -42,9 +43,11 @@ def main():
     parser.add_argument("--side", type=int, default=64, help="rows and columns of an image")
     parser.add_argument("--sensors", choices=["rgbd", "depth"], default="rgbd")
     parser.add_argument("--device", default="cpu", help="name of a device; on a GPU, images stay there")
-    parser.add_argument("--steps", type=int, default=20, help="steps of a run")
+    parser.add_argument("--steps", type=int, default=20, help="steps of a run, more than 5")
     parser.add_argument("--pairs", type=int, default=5, help="pairs of runs")
     args = parser.parse_args()
+    if args.steps <= WARM_UP:
+        parser.error(f"--steps {args.steps}: must be more than {WARM_UP}")
     scene = gsnav.default_simulator_scene(people=0, seed=1, density=DENSITY)
     ratios = {True: [], False: []}
     sizes = map(str, (args.environments, args.side, args.steps, DENSITY))
