@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -9,103 +8,26 @@
 #include <utility>
 #include <vector>
 
-#include "fiber.hpp"
-#include "gsnav/core/rng.hpp"
-#include "gsnav_emulated_device.hpp"
-#include "settings.hpp"
-
-// Each thread of a block is a fiber that yields where it waits: at a barrier of the block or at an
-// operation of its warp. One thread of the host runs all fibers.
+#include "block.hpp"
 
 namespace gsnav::emulated {
 
 namespace {
 
-constexpr unsigned kMostThreads = 1024, kWarp = 32;
 /// How often paused threads are woken while no other thread makes progress.
 constexpr unsigned kMostInVain = 10000;
 
-struct Thread {
-  unsigned mask = 0;
-  std::uint64_t value = 0;
-  const char* what = nullptr;
-  Gathered* gathered = nullptr;
-  dim3 index;
-  Fiber fiber;
-  std::vector<std::pair<void*, std::vector<char>>> copies;  ///< Started, but not yet waited for.
-};
-
-/// Sets of a warp's threads, one bit per thread.
-struct Warp {
-  unsigned there = 0, ready = 0, at_warp = 0, at_block = 0, paused = 0, done = 0;
-  std::array<Gathered, kWarp> gathered;
-};
-
-/// Index of the lowest set bit.
-unsigned first_of(unsigned bits) { return static_cast<unsigned>(__builtin_ctz(bits)); }
-
-/// The function that every thread of a grid runs, and its name.
-struct Kernel {
-  const char* name = "";
-  void (*thread)(const void* arguments) = nullptr;
-  const void* arguments = nullptr;
-};
-
-class Block {
- public:
-  Block() : scheduler_(Fiber::of_this_thread()), threads_(kMostThreads), warps_(kMostThreads / kWarp) {
-    for (Warp& w : warps_) {
-      for (Gathered& g : w.gathered) g.readers = 0;
-    }
-  }
-
-  void run(const Launch& launch, const dim3& at, const Kernel& kernel);
-  Gathered& gather(unsigned mask, std::uint64_t value, const char* what);
-  int barrier(int number);
-  void interleave();
-  void pause();
-  unsigned current() const { return current_; }
-  Thread& self() { return threads_[current_]; }
-  void* shared() { return shared_.data(); }
-
- private:
-  struct alignas(16) Line {
-    unsigned char bytes[16];
-  };
-
-  static void main();
-  /// Puts all threads at the start of the kernel.
-  void start(const Launch& launch);
-  /// Runs the threads of a warp that can run. Returns false if there are none.
-  bool run_warp(unsigned index);
-  void enter(unsigned index);
-  void resume(unsigned index);
-  void leave();
-  void release_barrier();
-  bool wake_paused();
-  std::string who_waits() const;
-  Warp& warp() { return warps_[current_ / kWarp]; }
-  unsigned warp_count() const { return (size_ + kWarp - 1) / kWarp; }
-  unsigned bit() const { return 1u << current_ % kWarp; }
-  [[noreturn]] void fail(const std::string& why) const;
-
-  Fiber scheduler_;
-  std::vector<Thread> threads_;
-  std::vector<Warp> warps_;
-  std::vector<Line> shared_;
-  unsigned size_ = 0, current_ = 0, alive_ = 0, waiting_ = 0;
-  int sum_ = 0, result_ = 0;
-  unsigned in_vain_ = 0;               ///< Number of times that paused threads were woken since the last
-                                       ///< progress.
-  const std::uint64_t seed_ = seed();  ///< GSNAV_EMULATED_SEED.
-  Rng random_;
-  Kernel kernel_;
-  dim3 at_;
-};
-
-Block& block() {
+Block& first_block_of_this_thread() {
   static thread_local Block b;
   return b;
+}
+
+}  // namespace
+
+GSNAV_UNCHECKED Block& block() {
+  static thread_local constinit Block* known = nullptr;
+  if (known == nullptr) known = &first_block_of_this_thread();
+  return *known;
 }
 
 void Block::fail(const std::string& why) const {
@@ -152,49 +74,14 @@ void Block::leave() {
   Fiber::change(own, self().fiber);
 }
 
-Gathered& Block::gather(unsigned mask, std::uint64_t value, const char* what) {
-  Warp& w = warp();
-  in_vain_ = 0;
-  if ((mask & bit()) == 0) fail(std::string(what) + " with a mask that it is not of");
-  if ((mask & ~w.there) != 0) fail(std::string(what) + " waits for threads that the block has not");
-  if ((mask & w.done) != 0) {
-    fail(std::string(what) + " waits for thread " +
-         std::to_string(current_ / kWarp * kWarp + first_of(mask & w.done)) + ", which has ended");
-  }
-  Thread* const lanes = &threads_[current_ / kWarp * kWarp];
-  Thread& t = self();
-  t.mask = mask;
-  t.value = value;
-  t.what = what;
-  w.at_warp |= bit();
-  bool complete = (mask & w.at_warp) == mask;
-  for (unsigned left = complete ? mask : 0; left != 0; left &= left - 1) {
-    const Thread& other = lanes[first_of(left)];
-    complete = complete && other.mask == mask && other.what == what;
-  }
-  if (!complete) {
-    leave();
-    return *t.gathered;
-  }
-  Gathered* g = w.gathered.begin();
-  while (g != w.gathered.end() && g->readers != 0) ++g;
-  if (g == w.gathered.end()) fail("more operations of a warp at once than it has threads");
-  for (unsigned left = mask; left != 0; left &= left - 1) {
-    Thread& other = lanes[first_of(left)];
-    g->value[first_of(left)] = other.value;
-    other.gathered = g;
-    ++g->readers;
-  }
-  w.at_warp &= ~mask;
-  w.ready |= mask & ~bit();
-  return *g;
-}
-
 void Block::release_barrier() {
   result_ = sum_;
   sum_ = 0;
   waiting_ = 0;
-  for (Warp& w : warps_) w.ready |= std::exchange(w.at_block, 0u);
+  for (unsigned i = 0; i < warp_count(); ++i) {
+    warps_[i].ready |= warps_[i].at_block;
+    warps_[i].at_block = 0;
+  }
 }
 
 int Block::barrier(int number) {
@@ -223,7 +110,7 @@ void Block::pause() {
 
 bool Block::wake_paused() {
   bool any = false;
-  for (Warp& w : warps_) {
+  for (Warp& w : all_warps_) {
     any = any || w.paused != 0;
     w.ready |= std::exchange(w.paused, 0u);
   }
@@ -296,16 +183,11 @@ std::string Block::who_waits() const {
   return text;
 }
 
-}  // namespace
-
-Gathered& gather(unsigned mask, std::uint64_t value, const char* what) {
-  return block().gather(mask, value, what);
-}
-int block_barrier(int number) { return block().barrier(number); }
-void interleave() { block().interleave(); }
+GSNAV_UNCHECKED int block_barrier(int number) { return block().barrier(number); }
+GSNAV_UNCHECKED void interleave() { block().interleave(); }
 void pause() { block().pause(); }
-unsigned lane() { return block().current() % kWarp; }
-unsigned thread_rank() { return block().current(); }
+GSNAV_UNCHECKED unsigned lane() { return block().current() % kWarp; }
+GSNAV_UNCHECKED unsigned thread_rank() { return block().current(); }
 void* dynamic_shared() { return block().shared(); }
 
 void copy_later(void* to, const void* from, std::size_t bytes) {

@@ -90,7 +90,8 @@ void Fiber::began() {
 #endif
 }
 
-void Fiber::change(Fiber& from, Fiber& to) {
+__attribute__((no_sanitize("address"), no_sanitize("undefined"))) void Fiber::change(Fiber& from,
+                                                                                     Fiber& to) {
 #if defined(GSNAV_ASAN)
   __sanitizer_start_switch_fiber(&from.fake_stack_, to.stack_, to.bytes_);
 #endif

@@ -22,16 +22,16 @@ struct dim3 {
 
 namespace gsnav::emulated {
 
-/// Values of the threads of a warp, after all threads of the mask have arrived.
-struct Gathered {
-  std::uint64_t value[32];
-  int readers;
-};
-
-/// Waits until all threads of `mask` have called with the same `what`, and returns their values. Ends
+/// Operations of a warp. Each waits until all threads of `mask` have called with the same `what`. Ends
 /// the program, with kernel, block and thread, if one of them has ended, does not exist, or is not in
 /// its own mask.
-Gathered& gather(unsigned mask, std::uint64_t value, const char* what);
+void sync_warp(unsigned mask, const char* what);
+/// Value of thread `from`. If that thread is not in the mask, a bit pattern that no thread has set.
+std::uint64_t value_of_thread(unsigned mask, std::uint64_t value, unsigned from, const char* what);
+/// The threads of the mask whose value is not 0, one bit per thread.
+unsigned threads_that_have_any(unsigned mask, std::uint64_t value, const char* what);
+/// The threads of the mask that have the caller's value.
+unsigned threads_that_have_same(unsigned mask, std::uint64_t value, const char* what);
 
 /// Barrier of the block for all threads that have not ended. Returns the sum of their numbers.
 int block_barrier(int number);
@@ -77,25 +77,9 @@ T value_of_bits(std::uint64_t bits) {
   return value;
 }
 
-/// Access to gathered values. Releases them when destroyed.
-class Reading {
- public:
-  Reading(unsigned mask, std::uint64_t value, const char* what) : g_(gather(mask, value, what)) {}
-  ~Reading() { --g_.readers; }
-  Reading(const Reading&) = delete;
-  Reading& operator=(const Reading&) = delete;
-  std::uint64_t operator[](unsigned lane) const { return g_.value[lane]; }
-
- private:
-  Gathered& g_;
-};
-
-/// Value of thread `from`. If that thread is not in the mask, a bit pattern that no thread has set.
 template <class T>
 T shuffled(unsigned mask, const T& value, unsigned from, const char* what) {
-  const Reading all(mask, bits_of_value(value), what);
-  return (mask >> from & 1u) != 0 ? value_of_bits<T>(all[from])
-                                  : value_of_bits<T>(0xdeadbeefdeadbeefull);
+  return value_of_bits<T>(value_of_thread(mask, bits_of_value(value), from, what));
 }
 
 /// Replaces *to by changed(*to) and returns the old value. It is atomic, because one host thread runs
@@ -144,7 +128,7 @@ inline int __syncthreads_count(int predicate) {
 }
 inline int __syncthreads_or(int predicate) { return __syncthreads_count(predicate) != 0 ? 1 : 0; }
 
-inline void __syncwarp(unsigned mask = 0xffffffffu) { gsnav::emulated::Reading(mask, 0, "__syncwarp"); }
+inline void __syncwarp(unsigned mask = 0xffffffffu) { gsnav::emulated::sync_warp(mask, "__syncwarp"); }
 template <class T>
 T __shfl_sync(unsigned mask, T value, int from, int width = 32) {
   const unsigned lane = gsnav::emulated::lane(), w = static_cast<unsigned>(width);
@@ -170,20 +154,14 @@ T __shfl_xor_sync(unsigned mask, T value, int bits, int width = 32) {
                                    "__shfl_xor_sync");
 }
 inline unsigned __ballot_sync(unsigned mask, int predicate) {
-  const gsnav::emulated::Reading all(mask, predicate != 0, "__ballot_sync");
-  unsigned votes = 0;
-  for (unsigned i = 0; i < 32; ++i) votes |= (mask >> i & 1u & static_cast<unsigned>(all[i])) << i;
-  return votes;
+  return gsnav::emulated::threads_that_have_any(mask, predicate != 0 ? 1 : 0, "__ballot_sync");
 }
 inline int __any_sync(unsigned mask, int predicate) { return __ballot_sync(mask, predicate) != 0; }
 inline int __all_sync(unsigned mask, int predicate) { return __ballot_sync(mask, predicate) == mask; }
 template <class T>
 unsigned __match_any_sync(unsigned mask, T value) {
-  const std::uint64_t mine = gsnav::emulated::bits_of_value(value);
-  const gsnav::emulated::Reading all(mask, mine, "__match_any_sync");
-  unsigned same = 0;
-  for (unsigned i = 0; i < 32; ++i) same |= ((mask >> i & 1u) != 0 && all[i] == mine ? 1u : 0u) << i;
-  return same;
+  return gsnav::emulated::threads_that_have_same(mask, gsnav::emulated::bits_of_value(value),
+                                                 "__match_any_sync");
 }
 
 template <class T>
