@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 #include <system_error>
+#include <unordered_map>
 #include <utility>
 
 #include "gsnav/core/replace_file.hpp"
@@ -70,12 +71,17 @@ bool next_record(const std::string& text, std::size_t& at, std::vector<std::stri
 }  // namespace
 
 std::size_t Row::index(std::string_view column) {
-  const auto it = std::find(kColumns.begin(), kColumns.end(), column);
-  if (it == kColumns.end()) {
+  static const auto places = [] {
+    std::unordered_map<std::string_view, std::size_t> map;
+    for (const std::string_view c : kColumns) map.emplace(c, map.size());
+    return map;
+  }();
+  const auto it = places.find(column);
+  if (it == places.end()) {
     throw gsnav::Error(Errc::invalid_argument,
                        "no column \"" + std::string(column) + "\" in the report");
   }
-  return static_cast<std::size_t>(it - kColumns.begin());
+  return it->second;
 }
 
 std::optional<double> Row::number(std::string_view column) const {
