@@ -10,6 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 
+EVERY = ("serial", "openmp", "cuda")  # backends that share the formulas
+
+
 @dataclass(frozen=True)
 class Edit:
     function: str  # or struct or constant; "Outer::inner" where `inner` alone says too little
@@ -26,6 +29,11 @@ class Fault:
     why: str = ""
     more: tuple[str, ...] = ()  # compiled with it: what the test needs of the libraries
     on: tuple[str, ...] = ()    # backends of hard cases, each of which must notice it by itself
+
+    @property
+    def on_device(self) -> bool:
+        """Whether the test needs the emulated CUDA runtime."""
+        return self.source.endswith(".cu") or "cuda" in self.on
 
 
 def fault(name: str, function: str, old: str, new: str, source: str, *cases: str, why: str = "",

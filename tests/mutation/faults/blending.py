@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Blending a pixel's stack, and its depths."""
-from . import fault
+from . import EVERY, fault
 
 STACK_TEST = "tests/hard_cases/test_stack.cpp"
 DEPTH_TEST = "tests/hard_cases/test_depth.cpp"
@@ -35,7 +35,7 @@ FAULTS = [
           "return exponent >= L(rules.log2_alpha_min + S(0.01));",
           STACK_TEST, "N43_faint_fog", why="0.7 % above 1/255"),
     fault("alpha_not_limited", "alpha_in_footprint", "return min(alpha, largest);", "return alpha;",
-          STACK_TEST, "N41_single_opaque"),
+          STACK_TEST, "N41_single_opaque", on=EVERY),
     fault("exp2_cubic", "exp2_method",
           "q.exponential == Exponential::fast ? Exp2::degree3 : Exp2::degree5", "Exp2::degree3",
           "tests/hard_cases/test_response.cpp", "N01_ewa_offaxis_grid", why="off by 1e-4 of alpha"),
@@ -50,7 +50,7 @@ FAULTS = [
     fault("depth_reference_of_the_last", "z_ref",
           "select((step.before >= L(S(1))) && (step.weight > L(S(0))), z, z_ref)",
           "select(step.weight > L(S(0)), z, z_ref)",
-          DEPTH_TEST, "N45_depth_definitions", "N47_depth_far"),
+          DEPTH_TEST, "N45_depth_definitions", "N47_depth_far", on=EVERY),
     fault("depth_of_the_centre", "make_splat_depth", "  if (camera.compat != Compat::none) return d;\n",
           "  return d;\n",
           DEPTH_TEST, "N46_depth_tilted_disk", "N47_depth_far", why="wrong by decimetres on tilted disks"),
@@ -62,7 +62,7 @@ FAULTS = [
     fault("depth_of_edge_on_divided", "ray_depth", DELTA, "  const L defined = delta;\n",
           "tests/hard_cases/test_determinant.cpp", "N06_det_flat_edge_on", why="0 / 0"),
     fault("median_of_the_last", "median", CROSSES, "select(step.after <= L(kMedianLevel<S>), z, median)",
-          DEPTH_TEST, "N45_depth_definitions"),
+          DEPTH_TEST, "N45_depth_definitions", on=EVERY),
     fault("median_before_the_crossing", "median", CROSSES, "select(step.before > L(kMedianLevel<S>), z, median)",
           DEPTH_TEST, "N48_depth_no_return", why="a pixel that stays half open has no median"),
     fault("median_alone_from_the_centre", "blend_drawn",
@@ -80,7 +80,7 @@ FAULTS = [
     fault("lists_filled_up_with_a_splat", "blend_list", "list[i] = kNothing;", "list[i] = list[0];",
           CUT_TEST, "N63_determinism_100 of work that is cut"),
     fault("first_hit_of_the_last", "first_hit", FIRST, "select(step.after <= L(S(1) - first_hit_tau), z, first_hit)",
-          DEPTH_TEST, "N45_depth_definitions"),
+          DEPTH_TEST, "N45_depth_definitions", on=EVERY),
     fault("first_hit_before_the_crossing", "first_hit", FIRST,
           "select(step.before > L(S(1) - first_hit_tau), z, first_hit)",
           DEPTH_TEST, "N45_depth_definitions", "N48_depth_no_return"),
@@ -96,7 +96,7 @@ FAULTS = [
     fault("expected_image_accumulated", "pixel_value", "return pixel_expected_depth(args, state);",
           "return pixel_accumulated_depth(state);", DEPTH_TEST, "N45_depth_definitions"),
     fault("closed_not_scaled", "finished", "select(open, one, one / (one - t))", "one", STACK_TEST,
-          "normalize_closed: a closed pixel is divided by its alpha, an open one is not"),
+          "normalize_closed: a closed pixel is divided by its alpha, an open one is not", on=EVERY),
     fault("open_pixel_normalized", "finished", "select(open, t, L(S(0)))", "L(S(0))", STACK_TEST,
           "normalize_closed: a closed pixel is divided by its alpha, an open one is not"),
     fault("blue_written_as_green", "write_pixel", "image[3 * pixel + 1] = value.y;", "image[3 * pixel + 1] = value.z;",

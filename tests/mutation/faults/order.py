@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Footprints, keys and order."""
-from . import fault
+from . import EVERY, fault
 
 FOOTPRINT = "tests/hard_cases/test_footprint.cpp"
 ORDER = "tests/hard_cases/test_order.cpp"
 KEYS = "tests/hard_cases/test_keys.cpp"
 CULLING = "tests/hard_cases/test_culling.cpp"
-EACH = ("serial", "openmp")
 
 FAULTS = [
     fault("three_sigma_box", "project",
@@ -29,7 +28,7 @@ FAULTS = [
     fault("strip_turned_wrong", "columns",
           "    const L y_right = select(negative_k_, at_k, against_k);\n",
           "    const L y_right = select(negative_k_, against_k, at_k);\n",
-          FOOTPRINT, "N11_tile_cover_conservative"),
+          FOOTPRINT, "N11_tile_cover_conservative", on=EVERY),
     fault("cull_by_means", "reach",
           "    const double reach = f * bounds.scale_max * sqrt(1 + limit * limit);\n",
           "    const double reach = 0 * f * bounds.scale_max * sqrt(1 + limit * limit);\n",
@@ -104,10 +103,10 @@ FAULTS = [
           ORDER, "N22_depth_tie_grid", why="an asset that is placed larger is farther away, too"),
     fault("last_pixel_of_a_box_lost", "pixel_range", "select(l > last, l - one, l) + one",
           "select(l > last, l - one, l)",
-          ORDER, "N22_depth_tie_grid", on=EACH),
+          ORDER, "N22_depth_tie_grid", on=EVERY),
     fault("rank_of_the_stored_row", "ViewedSet::rank_of",
           "(gaussians.row_ids.empty() ? row : gaussians.row_ids[row])", "row",
-          CULLING, "N21_depth_ties_keep_file_order when rows are sorted in space", on=EACH),
+          CULLING, "N21_depth_ties_keep_file_order when rows are sorted in space", on=EVERY),
     fault("ranks_of_lanes_by_the_stored_row", "ranks_of", "args.rank_of(rows[l] < last ? rows[l] : last)",
           "args.first_rank + (rows[l] < last ? rows[l] : last)",
           CULLING, "N21_depth_ties_keep_file_order when rows are sorted in space", on=("openmp",)),

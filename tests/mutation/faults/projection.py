@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Projection: determinants, the exponent, filters, responses."""
-from . import fault
+from . import EVERY, fault
 
 DETERMINANT = "tests/hard_cases/test_determinant.cpp"
 EXPONENT = "tests/hard_cases/test_exponent.cpp"
@@ -29,10 +29,10 @@ FAULTS = [
           why="positive powers and holes in long needles"),
     fault("exponent_from_the_corner", "column_exponent", "const L w2 = whitened_2(terms.w2, py - ref_y, b);",
           "const L w2 = fma(py, b, fma(-ref_y, b, terms.w2));",
-          EXPONENT, "N07_alpha_long_needle", why="offsets from the image's corner cancel", on=("serial", "openmp")),
+          EXPONENT, "N07_alpha_long_needle", why="offsets from the image's corner cancel", on=EVERY),
     fault("response_ignored", "splat_exponent", "if (along_rays) return perspective_exponent",
           "if (false) return perspective_exponent",
-          RESPONSE, "N02_exact_ray_grid", why="the ellipse of the linearised response"),
+          RESPONSE, "N02_exact_ray_grid", why="the ellipse of the linearised response", on=EVERY),
     fault("needles_in_float", "needs_double",
           "  return (fma(abs(p.k), length_x, p.b * length_y) > L(S(512))) ||\n"
           "         (fma(abs(p.k), abs(ref.dx), p.b * abs(ref.dy)) > L(S(16)));",
@@ -40,7 +40,7 @@ FAULTS = [
           EXPONENT, "N07_alpha_long_needle", "N09_huge_needle_tilelocal"),
     fault("offset_of_the_reference_unturned", "splat_geometry", "fma(p.k, ref.dx, p.b * ref.dy), p.log2_opacity};",
           "p.b * ref.dy, p.log2_opacity};",
-          RESPONSE, "N01_ewa_offaxis_grid", "N02_exact_ray_grid", why="w2 has a part along x"),
+          RESPONSE, "N01_ewa_offaxis_grid", "N02_exact_ray_grid", why="w2 has a part along x", on=EVERY),
     fault("mean_in_float", "make_splat",
           "  return make_splat<GeometryOnly>(camera, depth, projected, mean_x, mean_y, out);",
           "  return make_splat<GeometryOnly>(camera, depth, projected, projected.splat.mean_x, projected.splat.mean_y,"
@@ -99,10 +99,10 @@ FAULTS = [
           "return select(f > L(S(0)), exponent, L(S(-1e30)));", "return exponent;",
           FOOTPRINT, "N11_tile_cover_conservative"),
     fault("near_inclusive", "beyond_near_plane", "return z > F(near_plane);", "return z >= F(near_plane);",
-          "tests/hard_cases/test_near.cpp", "N16_near_plane_cross", on=("serial", "openmp")),
+          "tests/hard_cases/test_near.cpp", "N16_near_plane_cross", on=EVERY),
     fault("near_sigma_ignored", "project",
           "if (camera.near_sigma > S(0)) {", "if (camera.near_sigma > S(1e9)) {",
           "tests/hard_cases/test_near.cpp", "N17_camera_inside_splat"),
     fault("behind_kept", "beyond_near_plane", "return z > F(near_plane);", "return abs(z) > F(near_plane);",
-          "tests/hard_cases/test_order.cpp", "N24_neg_zero_depth", on=("serial", "openmp")),
+          "tests/hard_cases/test_order.cpp", "N24_neg_zero_depth", on=EVERY),
 ]
