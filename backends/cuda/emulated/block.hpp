@@ -46,7 +46,9 @@ struct Warp {
 };
 
 /// Index of the lowest set bit.
-GSNAV_UNCHECKED inline unsigned first_of(unsigned bits) { return static_cast<unsigned>(__builtin_ctz(bits)); }
+GSNAV_UNCHECKED inline unsigned first_of(unsigned bits) {
+  return static_cast<unsigned>(__builtin_ctz(bits));
+}
 
 /// The function that every thread of a grid runs, and its name.
 struct Kernel {

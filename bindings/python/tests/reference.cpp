@@ -66,7 +66,8 @@ int main(int argc, char** argv) try {
     if (i >= kWarmUp) seconds += took.count();
   }
   for (const gsnav::BatchObservation& image : out.images) h = on_gpu ? 0 : hash(h, image.data);
-  std::printf("%016llx %.4f\n", static_cast<unsigned long long>(h), 1000 * seconds / std::max(1, steps - kWarmUp));
+  std::printf("%016llx %.4f\n", static_cast<unsigned long long>(h),
+              1000 * seconds / std::max(1, steps - kWarmUp));
 } catch (const std::exception& e) {
   return std::fprintf(stderr, "%s\n", e.what()), 1;
 }
