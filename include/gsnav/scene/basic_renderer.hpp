@@ -62,8 +62,8 @@ class BasicRenderer {
   /// @return the frames, or an error:
   /// - invalid_argument: a field is out of range (the message names it), there is no camera, or cameras
   ///   differ in size.
-  /// - unsupported: a frame has 2^32 Gaussians or triangles or more; or there are meshes and the backend
-  ///   cannot draw them, or MeshAlpha::blend together with Composite::hard_depth.
+  /// - unsupported: a frame has 2^32 Gaussians or triangles or more, or there are meshes with
+  ///   MeshAlpha::blend and Composite::hard_depth.
   /// - backend_failure: the backend reports an error.
   /// - out_of_memory: images or scratch cannot be allocated. The message has the number and size of the
   ///   frames and their Gaussians. Images larger than the machine's memory are refused before anything
