@@ -29,7 +29,7 @@ bool fits_regions(const GaussianSet& set, const Camera& camera) {
   return set.filter == Filter::classic && set.gaussians.shape.axes.empty() &&
          !set.gaussians.shape.packed() && set.gaussians.color.rotations.empty() &&
          set.gaussians.shape.origin_ids.empty() && set.selection.drawn_chunks.empty() &&
-         whitened_per_pixel(set) * (camera.width + camera.height) * 1.01 < 512;
+         whitened_per_pixel(set) * (camera.width + camera.height) * 1.01 < detail::kFloatLength;
 }
 
 cuda::RegionView region_view(const cuda::BatchInstance& instance, const GaussianSet& set,
@@ -55,7 +55,8 @@ cuda::RegionView region_view(const cuda::BatchInstance& instance, const Gaussian
   v.limit2_y = static_cast<float>(limit_y * limit_y * 1.00001);
   v.inverse_scale = static_cast<float>(1 / c.scale);
   v.near_sigma = instance.args.camera.near_sigma;
-  v.far_limit = static_cast<float>(0.5 * (c.width + c.height) + 15.5 / whitened_per_pixel(set) - 2);
+  v.far_limit = static_cast<float>(0.5 * (c.width + c.height) +
+                                   (detail::kFloatOffset - 0.5) / whitened_per_pixel(set) - 2);
   v.rounding = static_cast<float>((std::abs(c.fx) + std::abs(c.fy)) * 4e-6);
   v.camera = instance.camera;
   return v;

@@ -34,8 +34,8 @@ FAULTS = [
           "if (false) return perspective_exponent",
           RESPONSE, "N02_exact_ray_grid", why="the ellipse of the linearised response", on=EVERY),
     fault("needles_in_float", "needs_double",
-          "  return (fma(abs(p.k), length_x, p.b * length_y) > L(S(512))) ||\n"
-          "         (fma(abs(p.k), abs(ref.dx), p.b * abs(ref.dy)) > L(S(16)));",
+          "  return (fma(abs(p.k), length_x, p.b * length_y) > L(S(kFloatLength))) ||\n"
+          "         (fma(abs(p.k), abs(ref.dx), p.b * abs(ref.dy)) > L(S(kFloatOffset)));",
           "  return length_x + length_y + ref.dx + ref.dy < L(S(-1e30));",
           EXPONENT, "N07_alpha_long_needle", "N09_huge_needle_tilelocal"),
     fault("offset_of_the_reference_unturned", "splat_geometry", "fma(p.k, ref.dx, p.b * ref.dy), p.log2_opacity};",

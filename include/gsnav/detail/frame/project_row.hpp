@@ -142,6 +142,10 @@ GSNAV_HD ReferencePixel<L> reference_of(int width, int height, const U& mean_x,
 
 namespace detail {
 
+/// Largest whitened length in the image, and largest whitened offset of the reference pixel, for which
+/// float is precise enough.
+inline constexpr double kFloatLength = 512, kFloatOffset = 16;
+
 /// True if the whitened form is too inexact in float. k dx + b dy then cancels over the visible length
 /// of a long needle, or between a distant mean and the image. Such rows are projected in double.
 template <class L>
@@ -151,8 +155,8 @@ GSNAV_HD mask_of<L> needs_double(const ProjectionCamera<scalar_of<L>>& camera,
   const ReferencePixel<L> ref = reference_of<L>(camera.width, camera.height, p.mean_x, p.mean_y);
   const L length_x = min(p.half_width, L(static_cast<S>(camera.width)));
   const L length_y = min(p.half_height, L(static_cast<S>(camera.height)));
-  return (fma(abs(p.k), length_x, p.b * length_y) > L(S(512))) ||
-         (fma(abs(p.k), abs(ref.dx), p.b * abs(ref.dy)) > L(S(16)));
+  return (fma(abs(p.k), length_x, p.b * length_y) > L(S(kFloatLength))) ||
+         (fma(abs(p.k), abs(ref.dx), p.b * abs(ref.dy)) > L(S(kFloatOffset)));
 }
 
 /// Pixels of [0, size) whose centre is within [center - half, center + half], as a half-open range.
