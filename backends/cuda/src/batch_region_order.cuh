@@ -107,10 +107,10 @@ __device__ inline void order_neighbors(unsigned long long (&row)[E]) {
   }
 }
 
-/// Puts n <= 32 E rows in order of key and word: first 32-bit numbers (leading bits of the key, place),
-/// then neighbours that these bits do not tell apart. Each lane has E adjacent numbers. Lists come in
-/// bins of depth, so that few rounds of merging with a neighbour are needed. Returns true if two keys
-/// are equal.
+/// Puts n <= 32 E rows in order of key and word. First it sorts 32-bit numbers, each made of the leading
+/// bits of a key and the row's place. Then it sorts neighbours whose leading bits are equal. Each lane
+/// has E adjacent numbers. Lists come in bins of depth, so that few rounds of merging with a neighbour
+/// are needed. Returns true if two keys are equal.
 template <int E>
 __device__ __noinline__ inline bool order_rows(uint2* rows, std::uint32_t n) {
   constexpr std::uint32_t kRows = 32 * E;

@@ -13,8 +13,9 @@ struct RowOfInstance {
   Vec3<float> delta;
 };
 
-/// Geometry and bounds of a row. Returns false if it covers no pixel of the image. `InDouble`:
-/// rows that need double have no records.
+/// Geometry and bounds of a row. Returns false if it covers no pixel of the image.
+/// @tparam InDouble true: rows that need double are projected here. false: the kernel of far rows has
+/// made their records.
 template <bool Color, bool InDouble>
 __device__ inline bool project_source(const BatchArgs& a, const RegionArgs& r,
                                       std::uint32_t camera_index, std::uint32_t source, Splat& splat,

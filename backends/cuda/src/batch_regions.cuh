@@ -30,7 +30,8 @@ struct alignas(16) RegionView {
   float axis[3], nearest;    ///< View axis and near plane, in asset units.
   float limit2_x, limit2_y;  ///< Squares of the limits of x/z and y/z in the Jacobian.
   float inverse_scale, near_sigma;
-  float far_limit;  ///< Rows whose centre is farther from the image's may need double: sum over axes.
+  float far_limit;  ///< A row may need double if |dx| + |dy| exceeds this, pixels. (dx, dy) is its
+                    ///< centre minus that of the image.
   float rounding;   ///< Pixels.
   std::uint32_t first_row;      ///< Number of the set's first row among the rows of the call.
   std::uint32_t first_in_view;  ///< Index of its first place in `in_view`.

@@ -152,8 +152,7 @@ void for_each_set(const BatchCamera& camera, std::size_t sets, const F& f) {
 }
 
 /// Where a call's inputs lie: offsets in bytes from the start of a block, and that block in pinned
-/// memory
-/// (`host`) and on the device.
+/// memory (`host`) and on the device.
 struct InputPlaces {
   std::size_t sets = 0, instances = 0, plain = 0, first = 0, list = 0, offsets = 0;
   std::size_t region_sets = 0, region_views = 0, camera_rows = 0;  ///< If regions have lists.

@@ -31,7 +31,8 @@ class LodCells {
   /// Limit of the memory of the cuts that are kept, in chunk numbers: 256 MB.
   static constexpr std::size_t kMostChunks = std::size_t{1} << 26;
 
-  /// The cut of the cell of `camera`. Beyond the cells that have a number, the camera gets its own.
+  /// The cut of the cell of `camera`. Cells far from the origin have no number; a camera in one of them
+  /// gets a cut of its own.
   /// @param asset number of the asset, with its tree and cloud.
   /// @param seen, seen_cell set of VisibleSets that applies to the camera, and its number. Empty:
   /// everything may be seen.
@@ -159,7 +160,7 @@ class DetailSets {
   /// arrays.
   const LodCut& cut(std::size_t a) const noexcept { return *cuts_[a]; }
   /// Number of Gaussians that the last select() left out because they are invisible from the camera's
-  /// cell. If visibility is known only per chunk, it may be less than a chunk too low.
+  /// cell. Where visibility is known only per chunk, the number may be too low, by less than a chunk.
   std::uint64_t unseen() const noexcept {
     std::uint64_t sum = 0;
     for (const auto& [sets, cell, rows] : looked_from_) sum += rows - sets->count_seen_rows(cell, rows);
