@@ -16,10 +16,6 @@
 
 namespace gsnav::emulated {
 
-// The emulator's own functions that run at every operation of a warp are not instrumented: sanitizers
-// are for device code. They call no functions of containers: those are instrumented, so not inlined.
-#define GSNAV_UNCHECKED __attribute__((no_sanitize("address"), no_sanitize("undefined")))
-
 constexpr unsigned kMostThreads = 1024, kWarp = 32;
 
 /// Values of the threads of a warp, after all threads of the mask have arrived.

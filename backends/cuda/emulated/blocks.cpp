@@ -25,6 +25,7 @@ Block& first_block_of_this_thread() {
 }  // namespace
 
 GSNAV_UNCHECKED Block& block() {
+  // `constinit`: reading it calls no function that initialises.
   static thread_local constinit Block* known = nullptr;
   if (known == nullptr) known = &first_block_of_this_thread();
   return *known;

@@ -90,8 +90,7 @@ void Fiber::began() {
 #endif
 }
 
-__attribute__((no_sanitize("address"), no_sanitize("undefined"))) void Fiber::change(Fiber& from,
-                                                                                     Fiber& to) {
+GSNAV_UNCHECKED void Fiber::change(Fiber& from, Fiber& to) {
 #if defined(GSNAV_ASAN)
   __sanitizer_start_switch_fiber(&from.fake_stack_, to.stack_, to.bytes_);
 #endif

@@ -3,6 +3,10 @@
 
 #include <cstddef>
 
+// The emulator's own functions that run at every operation of a warp are not instrumented: sanitizers
+// are for device code. They call no functions of containers: those are instrumented, so not inlined.
+#define GSNAV_UNCHECKED __attribute__((no_sanitize("address"), no_sanitize("undefined")))
+
 namespace gsnav::emulated {
 
 /// A function with its own stack that takes turns with others on one thread of the host.

@@ -15,10 +15,9 @@ struct Batch {
   static constexpr int kTile = 16, kSmallTile = 8;  ///< Tile width in pixels. The small size is for few
                                                     ///< cameras.
   /// A call has few cameras if an image has at most kFewTiles tiles of 16 pixels, and all images
-  /// together have at most kFewTilesEach tiles per multiprocessor. The limits double if a camera sees
-  /// kManyGaussians or more.
+  /// together have at most kFewTilesEach tiles per multiprocessor. The second limit doubles if a camera
+  /// sees kManyGaussians or more, or if an image has at most kSmallImageTiles tiles.
   static constexpr std::uint64_t kFewTiles = 512, kFewTilesEach = 16, kManyGaussians = 2'500'000;
-  /// The second limit also doubles for images of up to kSmallImageTiles tiles.
   static constexpr std::uint64_t kSmallImageTiles = 16;
   /// Above this number of tiles per multiprocessor, most lists are short.
   static constexpr std::uint64_t kShortListTiles = 16;
