@@ -30,7 +30,7 @@ class Rows:
 
 
 class Mirror:
-    """Swaps left and right in every other environment, so that each flat has a mirrored twin. None if off."""
+    """Swaps left and right in every other environment, so that each flat has a mirrored twin, if `on`."""
 
     def __init__(self, on: bool, first: int, environments: int, device: torch.device) -> None:
         self.of = on & ((first + np.arange(environments)) % 2 == 1)
@@ -41,7 +41,7 @@ class Mirror:
         return images if self.where is None else torch.where(self.where, images.flip(-2), images)
 
     def goals(self, goals: np.ndarray) -> np.ndarray:
-        """Goals [N][3], of which the last number is a sine."""
+        """Goals [N][3] as the agent sees them: their sines, the last numbers, are negated in place."""
         goals[self.of, 2] *= -1
         return goals
 

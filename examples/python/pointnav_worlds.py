@@ -16,7 +16,8 @@ import numpy as np
 
 import gsnav
 
-ACTIONS, LEFT, RIGHT = 4, 2, 3  # stop, forward, left, right
+ACTIONS = 4  # stop, forward, left, right
+LEFT, RIGHT = int(gsnav.Action.turn_left), int(gsnav.Action.turn_right)
 CHANNELS = {"depth": 1, "rgb": 3}  # numbers per pixel of a sensor
 TRAIN_SEEDS, HELD_OUT_SEEDS = range(64), range(64, 80)
 METRICS = ("success", "spl", "soft_spl", "collision_rate", "psi", "steps")

@@ -43,7 +43,7 @@ def main():
     parser.add_argument("--side", type=int, default=64, help="rows and columns of an image")
     parser.add_argument("--sensors", choices=["rgbd", "depth"], default="rgbd")
     parser.add_argument("--device", default="cpu", help="name of a device; on a GPU, images stay there")
-    parser.add_argument("--steps", type=int, default=20, help="steps of a run, more than 5")
+    parser.add_argument("--steps", type=int, default=20, help=f"steps of a run, more than {WARM_UP}")
     parser.add_argument("--pairs", type=int, default=5, help="pairs of runs")
     args = parser.parse_args()
     if args.steps <= WARM_UP:

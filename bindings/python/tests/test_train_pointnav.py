@@ -142,9 +142,9 @@ def test_turns_of_a_mirrored_environment_are_seen_mirrored(monkeypatch):
     before = simulator.reset()
     first = angles(before)
     assert np.allclose(first, first[0] * np.array([1, -1, 1, -1]), atol=1e-4)
-    assert np.array_equal(images(before)[1], images(before)[0][:, ::-1])
-    # A turn to the left moves the goal and the image to the right, in all environments.
     seen = images(before)
+    assert np.array_equal(seen[1], seen[0][:, ::-1])
+    # A turn to the left moves the goal and the image to the right, in all environments.
     after = simulator.step(mirror.actions(np.full(4, LEFT)))
     turned = (first - angles(after) + 180) % 360 - 180
     assert np.allclose(turned, turned[0], atol=1e-4) and turned[0] > 5
