@@ -90,8 +90,19 @@ def sensor_space(sensor: SensorSpec) -> Box:
 
 @contextlib.contextmanager
 def memory_for_spaces(config: SimulatorConfig, environments: int) -> Iterator[None]:
-    """Names the sensors if there is no memory for the spaces of their images."""
+    """Checks the sensors, and names them if there is no memory for the spaces of their images.
+
+    Linux may promise more memory than there is, and then kills the process that uses it. So the size is compared
+    with that of the machine.
+    """
+    for sensor in config.sensors:
+        sensor.validate()
     try:
+        pixels = sum(math.prod(s.resolution) * (3 if s.kind in (SensorKind.rgb, SensorKind.normal) else 1)
+                     for s in config.sensors)
+        needed, present = 8 * environments * pixels, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        if needed > present > 0:  # two bounds of 4 bytes
+            raise MemoryError(f"{needed / 1e9:.0f} GB of {present / 1e9:.0f}")
         yield
     except MemoryError as e:
         sizes = ", ".join(f"{s.uuid!r}: resolution = {list(s.resolution)}" for s in config.sensors)
@@ -107,7 +118,6 @@ def observation_space(config: SimulatorConfig) -> Dict:
     for sensor in config.sensors:
         if sensor.uuid == POINT_GOAL:
             raise InvalidArgument(f"config.sensors: the name {POINT_GOAL!r} is taken by the goal; use another uuid")
-        sensor.validate()  # its size too, before there is an array of it
         spaces[sensor.uuid] = sensor_space(sensor)
     low, high = np.array([0, -math.pi], np.float32), np.array([LARGEST, math.pi], np.float32)
     spaces[POINT_GOAL] = Box(low, high, dtype=np.float32)
