@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Steps a BatchSimulator without Python, as the truth for the bits and the speed of the Python package.
 // usage: gsnav_python_reference ENVIRONMENTS SIDE STEPS DENSITY [rgbd|depth [DEVICE]]
-// It prints a hash of the images of the last step, and ms per step after the first five, which allocate
-// memory. On a GPU, images stay there, and the hash is 0.
-#include <algorithm>
+// It prints a hash of the images of the last step. On a GPU, images stay there, and the hash is 0.
+// If STEPS is 0, it reads numbers of steps from standard input, and answers each with ms per step.
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <iostream>
 #include <memory>
 #include <string_view>
 #include <vector>
@@ -26,6 +26,28 @@ std::uint64_t hash(std::uint64_t h, std::span<const float> values) {
   }
   return h;
 }
+
+/// A simulator, and the number of its last step.
+struct Run {
+  gsnav::BatchSimulator sim;
+  std::size_t environments = 0, i = 0;
+  gsnav::BatchStep out;
+
+  /// Milliseconds per step of `count` steps.
+  double step(int count) {
+    std::chrono::duration<double, std::milli> took{};
+    for (int k = 0; k < count; ++k, ++i) {
+      std::vector<gsnav::Action> actions;
+      for (std::size_t e = 0; e < environments; ++e) {
+        actions.push_back(static_cast<gsnav::Action>(1 + (e + i) % 3));
+      }
+      const auto start = std::chrono::steady_clock::now();
+      out = sim.step(actions).value();
+      took += std::chrono::steady_clock::now() - start;
+    }
+    return took.count() / count;
+  }
+};
 
 }  // namespace
 
@@ -45,29 +67,27 @@ int main(int argc, char** argv) try {
   const auto device = gsnav::Device::parse(argc > 6 ? argv[6] : "cpu").value();
   const bool on_gpu = device.kind() == gsnav::DeviceKind::cuda;
   if (on_gpu) config.images = gsnav::ImageMemory::backend;
-  auto sim =
+  Run run{
       gsnav::BatchSimulator::create(device, {scene}, config, environments,
                                     [&](std::size_t, std::size_t) -> gsnav::Result<gsnav::BatchEpisode> {
                                       return gsnav::BatchEpisode{0, episodes[0]};
                                     })
-          .value();
-  gsnav::BatchStep out = sim.reset().value();
-  std::uint64_t h = 0xcbf29ce484222325ull;
-  constexpr int kWarmUp = 5;
-  double seconds = 0;
-  for (int i = 0; i < steps; ++i) {
-    std::vector<gsnav::Action> actions;
-    for (std::size_t e = 0; e < environments; ++e) {
-      actions.push_back(static_cast<gsnav::Action>(1 + (e + static_cast<std::size_t>(i)) % 3));
+          .value(),
+      environments,
+      0,
+      {}};
+  run.out = run.sim.reset().value();
+  if (steps == 0) {
+    for (int count = 0; std::cin >> count && count > 0;) {
+      std::printf("%.5f\n", run.step(count));
+      std::fflush(stdout);
     }
-    const auto start = std::chrono::steady_clock::now();
-    out = sim.step(actions).value();
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-    if (i >= kWarmUp) seconds += took.count();
+    return 0;
   }
-  for (const gsnav::BatchObservation& image : out.images) h = on_gpu ? 0 : hash(h, image.data);
-  std::printf("%016llx %.4f\n", static_cast<unsigned long long>(h),
-              1000 * seconds / std::max(1, steps - kWarmUp));
+  run.step(steps);
+  std::uint64_t h = 0xcbf29ce484222325ull;
+  for (const gsnav::BatchObservation& image : run.out.images) h = on_gpu ? 0 : hash(h, image.data);
+  std::printf("%016llx\n", static_cast<unsigned long long>(h));
 } catch (const std::exception& e) {
   return std::fprintf(stderr, "%s\n", e.what()), 1;
 }

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compares the frames per second of VectorEnv with those of the C++ batch, in pairs of runs.
+"""Compares the frames per second of VectorEnv with those of the C++ batch.
+
+Two processes take turns: one makes some steps, then the other makes the same number. So both numbers of a pair
+belong to the same state of the machine. The first pair, which allocates memory, is not counted.
 
     speed.py REFERENCE --side 64 --sensors depth
     speed.py REFERENCE --side 128
-    speed.py REFERENCE --side 256 --device cuda
+    speed.py REFERENCE --side 256 --device cuda --steps 100
 """
 
 import argparse
@@ -16,24 +19,49 @@ import numpy as np
 import gsnav
 
 DENSITY = 0.3
-WARM_UP = 5  # first steps, which allocate memory, are not counted; reference.cpp has the same number
 
 
-def python_ms(scene, args, copy):
-    """Milliseconds per step of VectorEnv after the first ones."""
-    episode = gsnav.generate_episodes(scene.navmesh, 1, 1)
-    sensors = gsnav.rgbd_sensors(args.side, args.side)[1 if args.sensors == "depth" else 0:]
-    images = gsnav.ImageMemory.backend if args.device.startswith("cuda") else gsnav.ImageMemory.host
-    envs = gsnav.VectorEnv(args.environments, scene, device=args.device, episodes=episode, copy=copy,
-                           config=gsnav.BatchConfig(sensors=sensors, images=images))
-    envs.reset(seed=1)
-    seconds = 0.0
-    for i in range(args.steps):
-        actions = 1 + (np.arange(args.environments) + i) % 3
-        start = time.perf_counter()
-        envs.step(actions)
-        seconds += time.perf_counter() - start if i >= WARM_UP else 0
-    return 1000 * seconds / (args.steps - WARM_UP)
+class Reference:
+    """The C++ batch in a process of its own."""
+
+    def __init__(self, args):
+        sizes = map(str, (args.environments, args.side, 0, DENSITY))
+        self.process = subprocess.Popen([args.reference, *sizes, args.sensors, args.device], text=True,
+                                        stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+
+    def ms(self, steps):
+        """Milliseconds per step of the next steps."""
+        self.process.stdin.write(f"{steps}\n")
+        self.process.stdin.flush()
+        return float(self.process.stdout.readline())
+
+    def close(self):
+        self.process.stdin.close()
+        self.process.wait()
+
+
+class Ours:
+    """A VectorEnv, stepped as the C++ batch is."""
+
+    def __init__(self, scene, args, copy):
+        episode = gsnav.generate_episodes(scene.navmesh, 1, 1)
+        sensors = gsnav.rgbd_sensors(args.side, args.side)[1 if args.sensors == "depth" else 0:]
+        images = gsnav.ImageMemory.backend if args.device.startswith("cuda") else gsnav.ImageMemory.host
+        self.envs = gsnav.VectorEnv(args.environments, scene, device=args.device, episodes=episode, copy=copy,
+                                    config=gsnav.BatchConfig(sensors=sensors, images=images))
+        self.envs.reset(seed=1)
+        self.step = 0
+
+    def ms(self, steps):
+        """Milliseconds per step of the next steps."""
+        seconds = 0.0
+        for _ in range(steps):
+            actions = 1 + (np.arange(self.envs.num_envs) + self.step) % 3
+            self.step += 1
+            start = time.perf_counter()
+            self.envs.step(actions)
+            seconds += time.perf_counter() - start
+        return 1000 * seconds / steps
 
 
 def main():
@@ -43,23 +71,21 @@ def main():
     parser.add_argument("--side", type=int, default=64, help="rows and columns of an image")
     parser.add_argument("--sensors", choices=["rgbd", "depth"], default="rgbd")
     parser.add_argument("--device", default="cpu", help="name of a device; on a GPU, images stay there")
-    parser.add_argument("--steps", type=int, default=20, help=f"steps of a run, more than {WARM_UP}")
-    parser.add_argument("--pairs", type=int, default=5, help="pairs of runs")
+    parser.add_argument("--steps", type=int, default=10, help="steps of a turn")
+    parser.add_argument("--pairs", type=int, default=9, help="pairs of turns")
     args = parser.parse_args()
-    if args.steps <= WARM_UP:
-        parser.error(f"--steps {args.steps}: must be more than {WARM_UP}")
+    if args.steps < 1 or args.pairs < 1:
+        parser.error("--steps and --pairs must be positive")
     scene = gsnav.default_simulator_scene(people=0, seed=1, density=DENSITY)
-    ratios = {True: [], False: []}
-    sizes = map(str, (args.environments, args.side, args.steps, DENSITY))
-    command = [args.reference, *sizes, args.sensors, args.device]
-    for _ in range(args.pairs):
-        for copy, results in ratios.items():
-            run = subprocess.run(command, check=True, capture_output=True, text=True)
-            results.append(float(run.stdout.split()[1]) / python_ms(scene, args, copy))
-    for copy, results in ratios.items():
+    for copy in (True, False):
+        both = Reference(args), Ours(scene, args, copy)
+        pairs = [[one.ms(args.steps) for one in both] for _ in range(args.pairs + 1)][1:]
+        both[0].close()
+        ratios = sorted(100 * theirs / ours for theirs, ours in pairs)
         print(f"{args.device}, {args.environments} environments, {args.side} x {args.side} {args.sensors}, "
-              f"copy={copy}: VectorEnv has {100 * statistics.median(results):.1f} % of the C++ frames per second "
-              f"({100 * min(results):.1f} to {100 * max(results):.1f})")
+              f"copy={copy}: VectorEnv has {statistics.median(ratios):.1f} % of the C++ frames per second "
+              f"(pairs {ratios[0]:.1f} to {ratios[-1]:.1f}; medians {statistics.median(p[0] for p in pairs):.4f} and "
+              f"{statistics.median(p[1] for p in pairs):.4f} ms per step)")
 
 
 if __name__ == "__main__":
