@@ -15,9 +15,12 @@
 namespace gsnav::python {
 namespace {
 
-/// dtypes of structured arrays. They live as long as the process.
+/// dtypes of structured arrays, and the arrays of a step that ends no episode. They live as long as the
+/// process.
 struct Types {
   nb::object infos = step_info_dtype(), metrics = metrics_dtype();
+  nb::object no_goals = array_copy(std::span<const double>(), {0, 2});
+  nb::object no_metrics = structured_copy(std::span<const EpisodeMetrics>(), metrics);
 };
 const Types& types() {
   static const Types* const made = new Types;
@@ -70,8 +73,9 @@ PythonStep step_arrays(const BatchStep& s, const BatchCore& b, nb::handle self) 
   const std::size_t ended = finished.size();
   out.finished = array_from(std::move(finished), {ended});
   const auto* const goals = reinterpret_cast<const double*>(s.final_point_goals.data());
-  out.final_point_goals = array_copy(std::span(goals, 2 * ended), {ended, 2});
-  out.final_metrics = structured_copy(s.final_metrics, types().metrics);
+  const Types& t = types();
+  out.final_point_goals = ended == 0 ? t.no_goals : array_copy(std::span(goals, 2 * ended), {ended, 2});
+  out.final_metrics = ended == 0 ? t.no_metrics : structured_copy(s.final_metrics, t.metrics);
   // Images are views of memory that belongs to the simulator, or to the arrays of the source.
   const nb::object owner = b.images->given.size() == 0
                                ? nb::borrow(self)
