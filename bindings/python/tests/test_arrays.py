@@ -33,7 +33,6 @@ def library(name):
     if name == "torch":
         return pytest.importorskip("torch").from_numpy
     jax = pytest.importorskip("jax")
-    jax.config.update("jax_platforms", "cpu")  # has no effect if a test before has used a GPU
     return lambda values: jax.device_put(values, jax.devices("cpu")[0])
 
 

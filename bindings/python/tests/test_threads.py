@@ -110,7 +110,7 @@ def _in_child(function):
     return None
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore:os.fork:RuntimeWarning")  # of Python, of JAX
 def test_fork(opened):
     camera = gsnav.framing_camera(opened, 64, 64)
     renderer = gsnav.Renderer("cpu:2", opened)
