@@ -88,7 +88,7 @@ TEST_CASE("cuda batch regions: several scenes, placed, in lists of each camera's
       config.quality = quality;
       config.background = {0.25, 0.5, 0.75};
       CudaBatchRenderer renderer(cuda, config);
-      renderer.set_least_gaussians_of_regions(0);
+      renderer.set_least_of_regions(cuda::policy::Regions::kLeastCameras, 0);
       for (const unsigned outputs : kSmallOutputs) {
         if (is_emulated() && outputs == kRgb) continue;
         CAPTURE(width);
@@ -123,7 +123,7 @@ TEST_CASE("cuda batch regions: rows that need double, and more of them than have
     }
     const RenderConfig config;
     CudaBatchRenderer renderer(cuda, config);
-    renderer.set_least_gaussians_of_regions(0);
+    renderer.set_least_of_regions(cuda::policy::Regions::kLeastCameras, 0);
     for (const unsigned outputs : {unsigned{kMedianDepth}, kRgb | kAlpha | kMedianDepth}) {
       const Batch got = draw_batch(cuda, renderer, sets, cameras, {}, outputs, false);
       check_some(cuda, got, sets, cameras, {}, config, outputs);
@@ -158,7 +158,7 @@ TEST_CASE("cuda batch regions: thousands of rows of one key are in order of rank
     const GaussianArrays<CudaBackend> arrays(cuda, cloud);
     const RenderConfig config;
     CudaBatchRenderer renderer(cuda, config);
-    renderer.set_least_gaussians_of_regions(0);
+    renderer.set_least_of_regions(cuda::policy::Regions::kLeastCameras, 0);
     const unsigned outputs = kMedianOnly;
     const Batch got = draw_batch(cuda, renderer, {arrays.set()}, cameras, {}, outputs, false);
     REQUIRE(got.stats.by_regions);
@@ -204,7 +204,7 @@ TEST_CASE("cuda batch regions: visible sets of chunks and rows; depth against fl
   for (std::size_t c = 0; c < kCameras; ++c)
     seen.push_back({{there.data() + begins[c % 3], begins[c % 3 + 1] - begins[c % 3]}});
   CudaBatchRenderer renderer(cuda);
-  renderer.set_least_gaussians_of_regions(0);
+  renderer.set_least_of_regions(cuda::policy::Regions::kLeastCameras, 0);
   const Batch got =
       draw_batch(cuda, renderer, {arrays.set()}, cameras, {}, kMedianDepth, false, {}, seen);
   REQUIRE(got.stats.by_regions);
@@ -233,7 +233,7 @@ TEST_CASE("cuda batch regions: calls that they cannot draw are drawn by tiles, a
   const GaussianArrays<CudaBackend> arrays(cuda, wide), on_mip(cuda, filtered);
   const std::vector<Camera> cameras = ring(kCameras, 48, 48);
   CudaBatchRenderer renderer(cuda);
-  renderer.set_least_gaussians_of_regions(0);
+  renderer.set_least_of_regions(cuda::policy::Regions::kLeastCameras, 0);
   const Batch first = draw_batch(cuda, renderer, {arrays.set()}, cameras, {}, kMedianDepth, false);
   CHECK(first.stats.reruns > 0);
   check_some(cuda, first, {arrays.set()}, cameras, {}, {}, kMedianDepth);

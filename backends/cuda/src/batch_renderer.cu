@@ -187,7 +187,8 @@ CudaBatchRenderer::CudaBatchRenderer(CudaBackend& backend, const RenderConfig& c
     : state_(std::make_unique<State>(backend, config)) {}
 CudaBatchRenderer::~CudaBatchRenderer() = default;
 const BatchStats& CudaBatchRenderer::stats() const noexcept { return state_->stats; }
-void CudaBatchRenderer::set_least_gaussians_of_regions(std::uint64_t gaussians) noexcept {
+void CudaBatchRenderer::set_least_of_regions(std::size_t cameras, std::uint64_t gaussians) noexcept {
+  state_->least_cameras_of_regions = cameras;
   state_->least_gaussians_of_regions = gaussians;
 }
 

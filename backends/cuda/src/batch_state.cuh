@@ -277,6 +277,7 @@ struct CudaBatchRenderer::State {
 
   CudaBackend& backend;
   RenderConfig config;
+  std::size_t least_cameras_of_regions = cuda::policy::Regions::kLeastCameras;
   std::uint64_t least_gaussians_of_regions = cuda::policy::Regions::kLeastGaussians;
   int multiprocessors = 0;
   std::uint32_t shared_bytes = 0;  ///< Largest shared memory of a block.

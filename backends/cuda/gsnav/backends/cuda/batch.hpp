@@ -109,9 +109,10 @@ class CudaBatchRenderer {
   /// Throws like render().
   Status finish();
 
-  /// Sets the number of Gaussians that cameras must see each, on average, for lists of regions. It
-  /// changes the time of a call and no bit of an image. Default: policy::Regions::kLeastGaussians.
-  void set_least_gaussians_of_regions(std::uint64_t gaussians) noexcept;
+  /// Sets the fewest cameras of a call that is drawn by lists of regions, and the fewest Gaussians that
+  /// each of them must see on average. It changes the time of a call and no bit of an image. Default:
+  /// policy::Regions::kLeastCameras and kLeastGaussians.
+  void set_least_of_regions(std::size_t cameras, std::uint64_t gaussians) noexcept;
 
   /// Statistics of the last batch that finish() has completed.
   const BatchStats& stats() const noexcept;
