@@ -2,32 +2,66 @@
 // What hard cases draw with, compiled once.
 #include "hard_cases/backends.hpp"
 
+#include <algorithm>
 #include <functional>
 
 #include "hard_cases/arrays.hpp"
 #include "support/image_hashes.hpp"
+#if defined(GSNAV_HAS_CUDA)
+#include "ops/cuda_batch_images.hpp"
+#endif
 
 namespace gsnav_test {
 
 using namespace gsnav;
 
+namespace {
+
+/// A scene in the memory of a backend.
+template <class B>
+struct Uploaded {
+  std::vector<GaussianArrays<B>> arrays;
+  std::vector<GaussianSet> sets;
+  std::vector<MeshArrays<B>> mesh_arrays;
+  std::vector<MeshInstance> instances;
+
+  Uploaded(B& backend, const std::vector<Placed>& scene, const std::vector<MeshInstance>& meshes) {
+    arrays.reserve(scene.size());
+    for (const Placed& p : scene) sets.push_back(arrays.emplace_back(backend, *p.cloud).set(p.place));
+    mesh_arrays.reserve(meshes.size());
+    for (const MeshInstance& m : meshes) {
+      instances.push_back(mesh_arrays.emplace_back(backend, m.mesh).instance(m.world_from_mesh, m.id));
+    }
+  }
+};
+
+/// A cloud with extras in the memory of a backend.
+template <class B>
+struct UploadedExtras {
+  GaussianArrays<B> arrays;
+  Arrays<B> more;
+  GaussianSet set;
+
+  UploadedExtras(B& backend, const GaussianCloud& cloud, const SetExtras& extras)
+      : arrays(backend, cloud), more(backend), set(arrays.set()) {
+    for (std::size_t k = 0; k < 4 && !extras.sh_rotations[0].empty(); ++k) {
+      set.gaussians.color.rotations.set(k, more.in(extras.sh_rotations[k]));
+    }
+    for (std::size_t k = 0; k < 9 && !extras.axes[0].empty(); ++k)
+      set.gaussians.shape.axes.set(k, more.in(extras.axes[k]));
+  }
+};
+
+}  // namespace
+
 template <class S, class B>
 Frames<S> CaseRenderer<S, B>::render(const std::vector<Placed>& scene,
                                      const std::vector<Camera>& cameras, const RenderConfig& config,
                                      const std::vector<MeshInstance>& meshes) {
-  std::vector<GaussianArrays<B>> arrays;
-  std::vector<GaussianSet> sets;
-  arrays.reserve(scene.size());
-  for (const Placed& p : scene) sets.push_back(arrays.emplace_back(*backend_, *p.cloud).set(p.place));
-  std::vector<MeshArrays<B>> mesh_arrays;
-  std::vector<MeshInstance> instances;
-  mesh_arrays.reserve(meshes.size());
-  for (const MeshInstance& m : meshes) {
-    instances.push_back(mesh_arrays.emplace_back(*backend_, m.mesh).instance(m.world_from_mesh, m.id));
-  }
+  const Uploaded<B> there(*backend_, scene, meshes);
   BasicRenderer<S, B> renderer(*backend_, config);
-  renderer.set_meshes(instances);
-  Frames<S> frames = renderer.render(sets, cameras).value();
+  renderer.set_meshes(there.instances);
+  Frames<S> frames = renderer.render(there.sets, cameras).value();
   record_hashes(frames, this->name());
   return frames;
 }
@@ -35,17 +69,64 @@ Frames<S> CaseRenderer<S, B>::render(const std::vector<Placed>& scene,
 template <class S, class B>
 Frames<S> CaseRenderer<S, B>::render_with(const GaussianCloud& cloud, const SetExtras& extras,
                                           const Camera& camera, const RenderConfig& config) {
-  const GaussianArrays<B> arrays(*backend_, cloud);
-  Arrays<B> more(*backend_);
-  GaussianSet set = arrays.set();
-  for (std::size_t k = 0; k < 4 && !extras.sh_rotations[0].empty(); ++k) {
-    set.gaussians.color.rotations.set(k, more.in(extras.sh_rotations[k]));
-  }
-  for (std::size_t k = 0; k < 9 && !extras.axes[0].empty(); ++k)
-    set.gaussians.shape.axes.set(k, more.in(extras.axes[k]));
+  const UploadedExtras<B> there(*backend_, cloud, extras);
   BasicRenderer<S, B> renderer(*backend_, config);
-  return renderer.render(set, camera).value();
+  Frames<S> frames = renderer.render(there.set, camera).value();
+  record_hashes(frames, this->name());
+  return frames;
 }
+
+#if defined(GSNAV_HAS_CUDA)
+namespace {
+
+/// Renders by CudaBatchRenderer: by tiles, or by lists of regions where the frame allows them. What no
+/// batch supports is rendered by BasicRenderer.
+class BatchCases final : public CaseImages<float> {
+ public:
+  BatchCases(const char* name, bool by_regions) : CaseImages<float>(name), by_regions_(by_regions) {}
+
+  using CaseImages<float>::render;
+  Frames<float> render(const std::vector<Placed>& scene, const std::vector<Camera>& cameras,
+                       const RenderConfig& config, const std::vector<MeshInstance>& meshes) override {
+    const Uploaded<CudaBackend> there(cuda_, scene, meshes);
+    return draw(there.sets, cameras, config, {there.instances, {}});
+  }
+  Frames<float> render_with(const GaussianCloud& cloud, const SetExtras& extras, const Camera& camera,
+                            const RenderConfig& config) override {
+    const UploadedExtras<CudaBackend> there(cuda_, cloud, extras);
+    return draw({there.set}, {camera}, config, {});
+  }
+
+ private:
+  Frames<float> draw(const std::vector<GaussianSet>& sets, const std::vector<Camera>& cameras,
+                     const RenderConfig& config, const MeshFrame& meshes) {
+    const auto same_size = [&](const Camera& c) {
+      return c.width == cameras[0].width && c.height == cameras[0].height;
+    };
+    if (!CudaBatchRenderer::supports(config, sets, meshes) ||
+        !std::all_of(cameras.begin(), cameras.end(), same_size)) {
+      BasicRenderer<float, CudaBackend> renderer(cuda_, config);
+      renderer.set_meshes(meshes.instances);
+      return renderer.render(sets, cameras).value();
+    }
+    CudaBatchRenderer renderer(cuda_, config);
+    renderer.set_least_of_regions(by_regions_ ? 1 : cameras.size() + 1, 0);
+    Frames<float> frames = draw_batch(cuda_, renderer, sets, cameras, {}, config.outputs, false,
+                                      std::vector<MeshFrame>(cameras.size(), meshes))
+                               .frames;
+    frames.cameras = cameras.size();
+    frames.width = cameras[0].width;
+    frames.height = cameras[0].height;
+    record_hashes(frames, name());
+    return frames;
+  }
+
+  bool by_regions_;
+  CudaBackend cuda_;
+};
+
+}  // namespace
+#endif
 
 template class CaseRenderer<float, SerialBackend>;
 template class CaseRenderer<double, SerialBackend>;
@@ -66,6 +147,19 @@ void visit_renderers(const std::function<void(CaseImages<float>&)>& in_float,
       in_double(renderer);
     }
   });
+#if defined(GSNAV_HAS_CUDA)
+  if (CudaBackend::device_count() == 0) return;
+  // A batch has much memory to prepare, which takes an emulated GPU minutes. `images` draws batches
+  // there.
+  if (is_emulated() && std::getenv("GSNAV_CASES_ON") == nullptr &&
+      std::getenv("GSNAV_IMAGE_HASHES") == nullptr) {
+    static const int once = std::printf("SKIP: hard cases in batches on the emulated GPU\n");
+    (void)once;
+    return;
+  }
+  run_if_wanted(BatchCases("cuda tiles float", false), in_float);
+  run_if_wanted(BatchCases("cuda regions float", true), in_float);
+#endif
 }
 
 void check_bits(const Frames<float>& frames, Frames<float>& reference) {

@@ -102,17 +102,21 @@ extern template class CaseRenderer<float, gsnav::OpenMPBackend>;
 extern template class CaseRenderer<float, gsnav::CudaBackend>;
 #endif
 
+/// Calls f(renderer), unless the environment variable GSNAV_CASES_ON ("openmp") says that only renderers
+/// whose names begin with it are tested.
+template <class R, class F>
+void run_if_wanted(R&& renderer, const F& f) {
+  const char* const wanted = std::getenv("GSNAV_CASES_ON");
+  if (wanted != nullptr && !renderer.name().starts_with(wanted)) return;
+  CAPTURE(renderer.name());
+  f(renderer);
+}
+
 /// Calls f(renderer) for every backend and precision there is, with its type; the scalar reference comes
-/// first. With GSNAV_CASES_ON in the environment for those alone whose names begin so ("openmp"): what
-/// that backend's images show by themselves.
+/// first.
 template <class F>
 void for_each_backend(const F& f) {
-  const char* const wanted = std::getenv("GSNAV_CASES_ON");
-  const auto run = [&f, wanted](auto&& renderer) {
-    if (wanted != nullptr && !renderer.name().starts_with(wanted)) return;
-    CAPTURE(renderer.name());
-    f(renderer);
-  };
+  const auto run = [&f](auto&& renderer) { run_if_wanted(renderer, f); };
   using namespace gsnav;
   run(CaseRenderer<float, SerialBackend>("serial float"));
   run(CaseRenderer<double, SerialBackend>("serial double"));
@@ -131,7 +135,8 @@ void for_each_backend(const F& f) {
 #endif
 }
 
-/// The same for functions of both precisions.
+/// The same for functions of both precisions, and for batches on a GPU too, whose frames have no
+/// `stats`.
 void visit_renderers(const std::function<void(CaseImages<float>&)>& in_float,
                      const std::function<void(CaseImages<double>&)>& in_double);
 

@@ -80,8 +80,10 @@ TEST_CASE("N65_cull_invariance of chunks in space") {
         const auto b = renderer.render({{&in_chunks, place}}, camera, config);
         CAPTURE(i);
         CAPTURE(renderer.name());
-        CHECK(a.stats[0].visible == b.stats[0].visible);
-        CHECK(a.stats[0].tile_intersections == b.stats[0].tile_intersections);
+        if (!a.stats.empty()) {
+          CHECK(a.stats[0].visible == b.stats[0].visible);
+          CHECK(a.stats[0].tile_intersections == b.stats[0].tile_intersections);
+        }
         CHECK(same_images(a, b));
       });
     }

@@ -80,7 +80,7 @@ TEST_CASE("N65_cull_invariance of slices of depth") {
       CAPTURE(i);
       CAPTURE(renderer.name());
       CHECK(same_images(a, b));
-      CHECK(b.stats[0].visible <= a.stats[0].visible);
+      if (!b.stats.empty()) CHECK(b.stats[0].visible <= a.stats[0].visible);
       if (renderer.name() == "openmp float, 1 thread") {
         drawn += b.stats[0].visible;
         all += a.stats[0].visible;

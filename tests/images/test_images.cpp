@@ -52,6 +52,7 @@ bool shows_something(const Frames<float>& f) {
 }  // namespace
 
 TEST_CASE("images: every storage and selection of rows draws the same bits on every backend") {
+  int by_regions_count = 0;
   for (const ImageScene& scene : image_scenes()) {
     CAPTURE(scene.name);
     SerialBackend serial;
@@ -77,14 +78,23 @@ TEST_CASE("images: every storage and selection of rows draws the same bits on ev
                       .empty()) {  // the device has an exponential of its own there (docs/notes/cuda.md)
         CHECK(image_error(single.rgb, reference.rgb, 3).psnr > 80);
       }
-      if (scene.in_batches) {
+      for (const bool by_regions : {false, true}) {
+        if (!scene.in_batches) break;
         CudaBatchRenderer renderer(cuda, there.config());
+        renderer.set_least_of_regions(by_regions ? 1 : 2, 0);
         const Batch batch = draw_batch(cuda, renderer, there.sets(), {scene.camera}, {},
                                        scene.config.outputs, false, {MeshFrame{there.meshes(), {}}});
-        record_hashes(batch.frames, "cuda batch, " + scene.name);
+        if (by_regions && !batch.stats.by_regions) continue;
+        by_regions_count += by_regions ? 1 : 0;
+        record_hashes(batch.frames, (by_regions ? "cuda regions, " : "cuda batch, ") + scene.name);
         check_same_bits(batch.frames, single);
       }
     }
 #endif
   }
+#if defined(GSNAV_HAS_CUDA)
+  if (CudaBackend::device_count() > 0) CHECK(by_regions_count > 10);
+#else
+  CHECK(by_regions_count == 0);
+#endif
 }

@@ -10,7 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 
-EVERY = ("serial", "openmp", "cuda")  # backends that share the formulas
+# Renderers of hard cases that share the formulas.
+EVERY = ("serial", "openmp", "cuda float", "cuda tiles", "cuda regions")
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Fault:
     @property
     def on_device(self) -> bool:
         """Whether the test needs the emulated CUDA runtime."""
-        return self.source.endswith(".cu") or "cuda" in self.on
+        return self.source.endswith(".cu") or any(name.startswith("cuda") for name in self.on)
 
 
 def fault(name: str, function: str, old: str, new: str, source: str, *cases: str, why: str = "",
