@@ -10,6 +10,7 @@
 #include "support/scenes.hpp"
 
 #if defined(GSNAV_HAS_CUDA)
+#include "gsnav/backends/cuda/policy.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "ops/cuda_batch_images.hpp"
 #include "ops/no_gpu.hpp"
@@ -20,7 +21,8 @@ using namespace gsnav_test;
 
 namespace {
 
-constexpr int kCameras = 130;  ///< At least policy::Regions::kLeastCameras.
+constexpr int kCameras = 130;
+static_assert(kCameras >= cuda::policy::Regions::kLeastCameras);
 
 /// Images of the cameras with these numbers.
 Frames<float> of_cameras(const Frames<float>& all, const std::vector<std::size_t>& numbers) {
