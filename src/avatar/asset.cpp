@@ -71,7 +71,7 @@ Status AvatarAsset::validate() const {
   if (!cloud.origins.empty()) {
     return {Errc::unsupported, "AvatarAsset: a canonical Gaussian lies more than 32 m from the root"};
   }
-  if (!cloud.shN_half.empty()) return bad("the cloud is compact: expand_sh first");
+  if (cloud.compact()) return bad("the cloud is compact: expand_sh first");
   if (influences != kInfluences4 && influences != kInfluences8) {
     return bad("influences is " + std::to_string(influences) + "; 4 or 8 are supported");
   }

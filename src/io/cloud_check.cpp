@@ -11,7 +11,7 @@ std::size_t rest_width(const GaussianCloud& cloud) noexcept {
 
 Status check_arrays(const std::filesystem::path& path, const GaussianCloud& c) {
   const std::size_t n = c.size();
-  if (!c.shN_half.empty()) {
+  if (c.compact()) {
     return {Errc::invalid_argument,
             path.string() + ": the cloud is compact: expand_sh first, or save_scene"};
   }

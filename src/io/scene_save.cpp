@@ -72,7 +72,7 @@ Status unknown_name(const std::filesystem::path& path) {
 }  // namespace
 
 Status save_scene(const std::filesystem::path& path, const GaussianCloud& cloud) {
-  if (!cloud.shN_half.empty()) {
+  if (cloud.compact()) {
     return detail::guarded(path.string(), [&] {
       GaussianCloud widened = cloud;
       expand_sh(widened);

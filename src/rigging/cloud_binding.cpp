@@ -120,7 +120,7 @@ Result<BoundCloud> bind_cloud(const GaussianCloud& cloud, const SkinnedMesh& mes
   if (!(to.scale > 0) || !is_finite(to.scale) || !is_finite(to.translation))
     return bad("mesh_from_cloud has no scale above zero");
   if (!(options.furthest > 0)) return bad("furthest must be positive");
-  if (!cloud.shN_half.empty()) return bad("the cloud is compact: expand_sh first");
+  if (cloud.compact()) return bad("the cloud is compact: expand_sh first");
   if (cloud.sh_degree > 0 && !(abs(to.rotation.w) > 1 - 1e-9)) {
     return {Errc::unsupported, "bind_cloud: colours of SH degree " + std::to_string(cloud.sh_degree) +
                                    " in a turned frame"};

@@ -93,10 +93,7 @@ bool has_plain_rules(const RenderConfig& config, std::span<const GaussianSet> se
          config.sort_order == SortOrder::z_depth &&
          std::all_of(cameras.begin(), cameras.end(),
                      [](const BatchCamera& c) { return c.camera.near_sigma == 0; }) &&
-         std::all_of(sets.begin(), sets.end(), [](const GaussianSet& s) {
-           return s.filter == Filter::classic && s.gaussians.shape.axes.empty() &&
-                  s.gaussians.color.rotations.empty() && s.gaussians.shape.origin_ids.empty();
-         });
+         std::all_of(sets.begin(), sets.end(), cuda::has_plain_rows);
 }
 
 }  // namespace

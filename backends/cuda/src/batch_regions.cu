@@ -26,9 +26,7 @@ double whitened_per_pixel(const GaussianSet& set) {
 
 bool fits_regions(const GaussianSet& set, const Camera& camera) {
   // Lengths of the image alone never ask for double.
-  return set.filter == Filter::classic && set.gaussians.shape.axes.empty() &&
-         !set.gaussians.shape.packed() && set.gaussians.color.rotations.empty() &&
-         set.gaussians.shape.origin_ids.empty() && set.selection.drawn_chunks.empty() &&
+  return cuda::has_plain_rows(set) && set.selection.drawn_chunks.empty() &&
          whitened_per_pixel(set) * (camera.width + camera.height) * 1.01 < detail::kFloatLength;
 }
 

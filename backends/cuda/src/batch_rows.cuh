@@ -33,7 +33,9 @@ struct LaneRow {
 template <bool PlainRules>
 __device__ inline LaneRow read_row(const ShapeRows& rows, std::size_t row) {
   ShapeRows from = rows;
-  if (!PlainRules && !rows.axes.empty()) {  // The values are not used, but their addresses must exist.
+  if (!PlainRules &&
+      rows.encoding() ==
+          ShapeEncoding::factors) {  // The values are not used, but their addresses must exist.
     from.quats.data[0] = from.quats.data[1] = from.quats.data[2] = from.quats.data[3] =
         from.scales.data[0] = from.scales.data[1] = from.scales.data[2] = rows.means.data[0];
   }
@@ -77,7 +79,7 @@ __device__ __noinline__ inline void ask_for_bands(const ColorRows& sh, std::size
   for (unsigned row = 0; row < rows; ++row) {
     if (lane >= kept) continue;  // Degree 2 has 24 values.
     const std::size_t from = begin + rest * row + lane;
-    if (sh.shN_half.empty()) {
+    if (sh.band_encoding() == BandEncoding::floats) {
       __pipeline_memcpy_async(to.sh + kept * row + lane, sh.shN.data + from, sizeof(float));
     } else {
       to.sh_half[kept * row + lane] = sh.shN_half.data[from];
@@ -93,7 +95,7 @@ __device__ inline void ask_for_sh(const ColorRows& sh, std::size_t size, int deg
   if (degree < sh.degree) return ask_for_bands(sh, size, degree, first, to);
   const std::size_t rest = sh.rest(), rows = size - first < 32 ? size - first : 32;
   const unsigned n = static_cast<unsigned>(rest * rows);
-  if (sh.shN_half.empty()) {
+  if (sh.band_encoding() == BandEncoding::floats) {
     copy_async(to.sh, sh.shN.data + rest * first, n);
   } else {
     const std::uint16_t* const from = sh.shN_half.data + rest * first;
@@ -116,7 +118,7 @@ __device__ inline SplatColor<float> row_color(const ColorRows& sh, int degree, s
   ColorRows v;  // Rows of the warp.
   v.degree = degree;
   v.sh0 = {sh.sh0.data + 3 * first, 3 * 32};
-  if (sh.shN_half.empty()) {
+  if (sh.band_encoding() == BandEncoding::floats) {
     v.shN = {rows.sh, 1};
   } else {
     v.shN_half = {rows.sh_half, 1};

@@ -24,6 +24,13 @@ inline void need(cudaError_t e, const char* what) {
   }
 }
 
+/// True if projection may read the rows of this set for PlainCamera.
+inline bool has_plain_rows(const GaussianSet& set) {
+  const GaussianRows& g = set.gaussians;
+  return set.filter == Filter::classic && g.shape.encoding() == ShapeEncoding::ellipsoids &&
+         g.color.rotations.empty() && g.shape.origin_ids.empty();
+}
+
 /// Everything that the launches of a call depend on, except the contents of its inputs.
 struct LaunchKey {
   BatchArgs args;

@@ -46,7 +46,7 @@ nb::object means(const Cloud& c) {
 
 nb::object higher_bands(const Cloud& c) {
   const auto bands = static_cast<std::size_t>(sh_coefficient_count(c.sh_degree) - 1);
-  if (c.shN_half.empty()) return array_copy(std::span<const float>(c.shN), {c.size(), bands, 3});
+  if (!c.compact()) return array_copy(std::span<const float>(c.shN), {c.size(), bands, 3});
   std::vector<float> made(c.shN_half.size());
   {
     const ReleaseGil release;
@@ -166,7 +166,7 @@ void bind_scene_files(nb::module_& m) {
   m.def(
       "count_clamped",
       [](const std::filesystem::path& path, const Cloud& cloud) {
-        if (cloud.shN_half.empty()) return io::count_clamped(path, cloud);
+        if (!cloud.compact()) return io::count_clamped(path, cloud);
         Cloud wide = cloud;
         expand_sh(wide);
         return io::count_clamped(path, wide);

@@ -82,8 +82,25 @@ GSNAV_HD Vec3d origin_of(const View<const std::uint32_t>& ids, const View<const 
   return origins.empty() ? Vec3d{} : origins[origin_id(ids, i)];
 }
 
-/// Positions, shapes and opacities of N Gaussians, in metres in the asset's frame. Shapes are in one of
-/// three encodings: quats and scales, axes, or codes.
+/// How shapes are stored.
+enum class ShapeEncoding : std::uint8_t {
+  ellipsoids,  ///< quats and scales
+  factors,     ///< axes
+  codes,       ///< packed, with opacities and, where `means` is empty, means
+};
+
+/// How the SH coefficients above degree 0 are stored.
+enum class BandEncoding : std::uint8_t { floats, halves, codes };
+
+/// Bytes of a number that is stored so.
+GSNAV_HD constexpr std::size_t bytes_of(BandEncoding encoding) noexcept {
+  return encoding == BandEncoding::codes    ? 1
+         : encoding == BandEncoding::halves ? sizeof(std::uint16_t)
+                                            : sizeof(float);
+}
+
+/// Positions, shapes and opacities of N Gaussians, in metres in the asset's frame. The arrays that are
+/// not empty say how shapes are stored: `encoding`.
 struct ShapeRows {
   std::size_t size = 0;           ///< number of Gaussians, N
   Planes<const float, 3> means;   ///< x, y, z offsets from the row's origin, metres
@@ -105,16 +122,19 @@ struct ShapeRows {
       kMeans = 7,                    ///< first plane with means
       kCodePlanes = 10;              ///< number of planes
 
-  /// True if shapes and opacities are packed. Always false in device code.
-  GSNAV_HD bool packed() const noexcept { return GSNAV_DEVICE_CODE == 0 && !codes.empty(); }
+  /// Encoding of the shapes. Device code reads no codes.
+  GSNAV_HD ShapeEncoding encoding() const noexcept {
+    if (GSNAV_DEVICE_CODE == 0 && !codes.empty()) return ShapeEncoding::codes;
+    return axes.empty() ? ShapeEncoding::ellipsoids : ShapeEncoding::factors;
+  }
   /// Number of chunks that N rows make.
   GSNAV_HD std::size_t chunk_count() const noexcept {
     return (size + kProjectChunk - 1) / kProjectChunk;
   }
 };
 
-/// SH coefficients of N Gaussians in one of three encodings: floats; degree 0 as floats and the rest as
-/// halves; packed.
+/// SH coefficients of N Gaussians. The arrays that are not empty say how they are stored: `packed` for
+/// degree 0, `band_encoding` above it.
 struct ColorRows {
   int degree = 0;         ///< SH degree, 0 to 3
   View<const float> sh0;  ///< [N][3], coefficients of degree 0
@@ -137,6 +157,11 @@ struct ColorRows {
 
   /// True if the coefficients of degree 0 are packed. Always false in device code.
   GSNAV_HD bool packed() const noexcept { return GSNAV_DEVICE_CODE == 0 && !sh0_half.empty(); }
+  /// Encoding of the coefficients above degree 0. Device code reads no codes.
+  GSNAV_HD BandEncoding band_encoding() const noexcept {
+    if (packed() && !shN_codes.empty()) return BandEncoding::codes;
+    return shN_half.empty() ? BandEncoding::floats : BandEncoding::halves;
+  }
   /// Number of values per row above degree 0.
   GSNAV_HD std::size_t rest() const noexcept {
     return static_cast<std::size_t>(3 * (sh_coefficient_count(degree) - 1));

@@ -59,6 +59,8 @@ struct GaussianCloud {
   ColorSpace color_space = ColorSpace::display;  ///< Space in which colours are blended.
 
   std::size_t size() const noexcept { return opacities.size(); }  ///< Number of Gaussians, N.
+  /// True if the coefficients above degree 0 are halves (compact_sh).
+  bool compact() const noexcept { return !shN_half.empty(); }
 
   /// Mean of Gaussian i in the asset's frame, metres.
   Vec3d mean(std::size_t i) const noexcept {
@@ -237,7 +239,7 @@ inline double compact_sh(GaussianCloud& cloud) {
 
 /// Undoes compact_sh, except for the rounding.
 inline void expand_sh(GaussianCloud& cloud) {
-  if (cloud.shN_half.empty()) return;
+  if (!cloud.compact()) return;
   cloud.shN = moved_through<float>(cloud.shN_half, cloud.shN_half.size(),
                                    [](std::uint16_t v) { return half_to_float(v); });
 }
@@ -253,7 +255,7 @@ struct LoadedCloud {
 /// becomes `b`. On an error `a` is unchanged: invalid_argument if filters, sort orders or colour spaces
 /// differ, or if one cloud is compact (expand_sh).
 inline Status append(GaussianCloud& a, const GaussianCloud& b) {
-  if (!a.shN_half.empty() || !b.shN_half.empty()) {
+  if (a.compact() || b.compact()) {
     return {Errc::invalid_argument, "compact clouds cannot be merged: expand_sh first"};
   }
   if (a.size() == 0) {

@@ -98,7 +98,7 @@ inline Real3 stored_coefficient(const ColorRows& gs, std::size_t row, int k) noe
   if (k == 0) return {gs.sh0[3 * row], gs.sh0[3 * row + 1], gs.sh0[3 * row + 2]};
   const std::size_t rest = static_cast<std::size_t>((gs.degree + 1) * (gs.degree + 1) - 1);
   const std::size_t at = 3 * (rest * row + static_cast<std::size_t>(k - 1));
-  if (gs.shN_half.empty()) return {gs.shN[at], gs.shN[at + 1], gs.shN[at + 2]};
+  if (gs.band_encoding() == BandEncoding::floats) return {gs.shN[at], gs.shN[at + 1], gs.shN[at + 2]};
   return {half_to_float(gs.shN_half[at]), half_to_float(gs.shN_half[at + 1]),
           half_to_float(gs.shN_half[at + 2])};
 }
@@ -165,7 +165,7 @@ struct OracleSet {
   RealColumns factor(std::size_t row) const noexcept {
     const ShapeRows& gs = set.gaussians.shape;
     RealColumns m;
-    if (!gs.axes.empty()) {
+    if (gs.encoding() == ShapeEncoding::factors) {
       for (std::size_t k = 0; k < 3; ++k)
         m[k] = {gs.axes[k][row], gs.axes[3 + k][row], gs.axes[6 + k][row]};
     } else {

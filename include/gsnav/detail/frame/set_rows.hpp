@@ -78,7 +78,7 @@ struct OneRow {
   }
   /// Constants that decode the row, or null if shapes are floats.
   GSNAV_HD const PackedChunk* chunk() const noexcept {
-    return shape.packed() ? &shape.chunks[i / kProjectChunk] : nullptr;
+    return shape.encoding() == ShapeEncoding::codes ? &shape.chunks[i / kProjectChunk] : nullptr;
   }
   /// The element of `offsets` (one per origin) that belongs to the row.
   GSNAV_HD Vec3d offset(const View<const Vec3d>& offsets) const noexcept {
@@ -100,7 +100,7 @@ struct SetRows {
                                                       : floats3(at.shape.means);
   }
   /// True if the shape is a factor M (ShapeRows::axes) instead of a quaternion and scales.
-  GSNAV_HD bool has_factor() const noexcept { return !at.shape.axes.empty(); }
+  GSNAV_HD bool has_factor() const noexcept { return at.shape.encoding() == ShapeEncoding::factors; }
   GSNAV_HD Mat3<L> factor() const noexcept {
     return {{floats3(at.shape.axes), floats3(at.shape.axes, 3), floats3(at.shape.axes, 6)}};
   }
@@ -149,9 +149,15 @@ GSNAV_HD float opacity_of(const ShapeRows& shape, std::size_t i) noexcept {
 /// Value `at` of the bands above degree 0 ([N][rest]), whichever way they are kept. It is of coefficient
 /// k of a row of `chunk`.
 GSNAV_HD float band_value(const ColorRows& rows, std::size_t at, std::size_t chunk, int k) noexcept {
-  if (rows.packed() && !rows.shN_codes.empty())
-    return sh_value(rows.shN_codes[at], rows.chunks[chunk].sh_steps[packed_band(k)]);
-  return rows.shN_half.empty() ? sh_value(rows.shN[at]) : sh_value(rows.shN_half[at]);
+  switch (rows.band_encoding()) {
+    case BandEncoding::codes:
+      return sh_value(rows.shN_codes[at], rows.chunks[chunk].sh_steps[packed_band(k)]);
+    case BandEncoding::halves:
+      return sh_value(rows.shN_half[at]);
+    case BandEncoding::floats:
+      break;
+  }
+  return sh_value(rows.shN[at]);
 }
 
 /// Three values from p on, as they are stored.
@@ -180,7 +186,7 @@ GSNAV_HD auto with_coefficients(const ColorRows& rows, std::size_t i, const F& f
                  GSNAV_INLINED { return k == 0 ? sh_values(sh0) : sh_values(bands + 3 * (k - 1)); });
   };
   const std::size_t at = rows.rest() * i;
-  if (!rows.shN_half.empty()) return of_bands(rows.shN_half.data + at);
+  if (rows.band_encoding() == BandEncoding::halves) return of_bands(rows.shN_half.data + at);
   return of_bands(rows.shN.data + at);
 }
 

@@ -51,10 +51,10 @@ GSNAV_HD SplatColor<F> gaussian_colors(const ColorRows& sh, int degree, const st
   for (int k = 0; k < 3; ++k) c[k] = dc[k].v;
   const std::size_t stride = sh.rest();
   const int columns = 3 * (sh_coefficient_count(degree) - 1);  // 0, 9, 24 or 45
-  const bool bytes = packed && !sh.shN_codes.empty();
+  const BandEncoding encoding = sh.band_encoding();
   for (int first = 0; first < columns; first += kGroup) {
     const int from = first + kGroup <= columns ? first : columns - kGroup;
-    if (bytes) {  // all rows belong to the same chunk
+    if (encoding == BandEncoding::codes) {  // all rows belong to the same chunk
       float steps[kGroup];
       const PackedChunk& chunk = sh.chunks[rows[0] / kProjectChunk];
       for (int k = 0; k < kGroup; ++k) steps[k] = chunk.sh_steps[packed_band(1 + (from + k) / 3)];
@@ -63,7 +63,7 @@ GSNAV_HD SplatColor<F> gaussian_colors(const ColorRows& sh, int degree, const st
         for (int k = 0; k < kGroup; ++k) widened[l][k] = sh_value(codes[k], steps[k]);
         at[l] = widened[l];
       }
-    } else if (sh.shN_half.empty()) {
+    } else if (encoding == BandEncoding::floats) {
       for (int l = 0; l < kWidth; ++l) at[l] = sh.shN.data + stride * rows[l] + from;
     } else {
       for (int l = 0; l < kWidth; ++l) {
@@ -87,12 +87,10 @@ GSNAV_HD void prefetch_colors(const ColorRows& sh, std::size_t size, int degree,
                               std::size_t first) noexcept {
   constexpr std::size_t kLine = 64;
   if (degree == 0) return;
-  const bool codes = sh.packed() && !sh.shN_codes.empty(), halves = !sh.shN_half.empty();
-  const void* const data = codes    ? static_cast<const void*>(sh.shN_codes.data)
-                           : halves ? static_cast<const void*>(sh.shN_half.data)
-                                    : sh.shN.data;
-  const std::size_t bytes = codes ? 1 : halves ? sizeof(std::uint16_t) : sizeof(float);
-  const std::size_t stride = bytes * sh.rest();
+  const void* data = sh.shN.data;
+  if (sh.band_encoding() == BandEncoding::codes) data = sh.shN_codes.data;
+  if (sh.band_encoding() == BandEncoding::halves) data = sh.shN_half.data;
+  const std::size_t stride = bytes_of(sh.band_encoding()) * sh.rest();
   const std::size_t begin = stride * first, room = stride * size - begin;
   const std::size_t rows = stride * static_cast<std::size_t>(kWidth),
                     end = begin + (rows < room ? rows : room);

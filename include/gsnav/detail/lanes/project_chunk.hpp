@@ -75,7 +75,8 @@ inline void project_chunk(const ViewedSet<float>& args, const ProjectOutputs<flo
     return;
   }
   const SeenRows may_be_seen = args.seen_rows(id);
-  const PackedChunk* const packed = shape.packed() ? &shape.chunks[id] : nullptr;
+  const PackedChunk* const packed =
+      shape.encoding() == ShapeEncoding::codes ? &shape.chunks[id] : nullptr;
   std::uint32_t written = 0;
   Survivors survivors;
   static_assert(kChunkPart % step == 0 && 32 % step == 0);

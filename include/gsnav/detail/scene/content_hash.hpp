@@ -92,7 +92,7 @@ inline void hash_cloud(Hasher& h, const GaussianCloud& cloud) {
   hash_shapes(h, cloud);
   h.array(cloud.sh0);
   h.array(cloud.shN);
-  if (!cloud.shN_half.empty()) h.array(cloud.shN_half);
+  if (cloud.compact()) h.array(cloud.shN_half);
   h.value(cloud.sh_degree);
   // Add the colour space only where it is not the default, so that hashes from before it existed stay
   // valid.

@@ -31,7 +31,7 @@ inline int sh_degree_in_use(const GaussianCloud& cloud) noexcept {
     }
     return found;
   };
-  return cloud.shN_half.empty() ? highest(cloud.shN) : highest(cloud.shN_half);
+  return cloud.compact() ? highest(cloud.shN_half) : highest(cloud.shN);
 }
 
 /// A guess of the up axis, and how sure it is.
@@ -207,7 +207,7 @@ inline void describe(const GaussianCloud& cloud, LoadReport& report,
   report.eps2d = cloud.eps2d;
   report.sort_order = cloud.sort_order;
   report.memory = cloud.bytes();
-  report.compact = !cloud.shN_half.empty();
+  report.compact = cloud.compact();
   const UpGuess guess = guess_up(cloud, usual_up);
   report.up = guess.up;
   report.up_seen = guess.seen;

@@ -57,10 +57,8 @@ void drop_bands(Cloud& cloud, SceneBands& needed) {
   needed.bytes_let_go +=
       limit_sh_degree(cloud, needed_sh_degree(needed.applied_to(cloud.set()).gaussians.color));
   const ColorRows v = cloud.view().color;
-  const std::size_t number = !v.shN_codes.empty()  ? 1
-                             : !v.shN_half.empty() ? sizeof(std::uint16_t)
-                                                   : sizeof(float);
-  needed.bytes_unneeded = number * (v.rest() * cloud.size() - needed.sh_numbers_read);
+  needed.bytes_unneeded =
+      bytes_of(v.band_encoding()) * (v.rest() * cloud.size() - needed.sh_numbers_read);
 }
 
 }  // namespace gsnav

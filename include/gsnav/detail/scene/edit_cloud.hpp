@@ -34,7 +34,7 @@ inline bool is_finite(const GaussianCloud& cloud) {
 /// sort again. `by.rotation` must be a unit quaternion and `by.scale` positive. The bands of a compact
 /// cloud are rounded once more.
 inline void transform(GaussianCloud& cloud, const Similarity& by) {
-  const bool compact = !cloud.shN_half.empty();
+  const bool compact = cloud.compact();
   expand_sh(cloud);
   GaussianCloud moved;
   MeanWriter writer;
@@ -147,7 +147,7 @@ inline Status transform(GaussianCloud& cloud, const Affine3<double>& by) {
   const double sign = determinant(m) < 0 ? -1 : 1;
   const Mat3d turn = polar_rotation(m * (sign / std::cbrt(std::fabs(determinant(m))))),
               stretch = transpose(turn) * m * sign;
-  const bool compact = !cloud.shN_half.empty();
+  const bool compact = cloud.compact();
   expand_sh(cloud);
   GaussianCloud moved;
   MeanWriter writer;

@@ -161,7 +161,7 @@ class LodBuilder {
     node.reach = both(node.reach, own);
   }
   static double sh_of(const GaussianCloud& c, std::size_t at) noexcept {
-    return static_cast<double>(c.shN_half.empty() ? c.shN[at] : half_to_float(c.shN_half[at]));
+    return static_cast<double>(c.compact() ? half_to_float(c.shN_half[at]) : c.shN[at]);
   }
   void put(std::size_t row, const LodGaussian& g, const Row& like) {
     GaussianCloud& m = out_.merged;

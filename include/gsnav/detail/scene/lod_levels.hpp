@@ -164,7 +164,7 @@ inline Status check_levels(const std::vector<LodLevel>& levels, std::size_t boxe
       return bad_level(l, std::to_string(level.boxes.size()) + " boxes for " +
                               std::to_string(level.cloud.size()) + " rows");
     }
-    if (!level.cloud.shN_half.empty()) return bad_level(l, "compact: expand_sh first");
+    if (level.cloud.compact()) return bad_level(l, "compact: expand_sh first");
     all += level.cloud.size();
     for (const std::uint32_t b : level.boxes) {
       if (b >= boxes) return bad_level(l, "box " + std::to_string(b) + " of " + std::to_string(boxes));
