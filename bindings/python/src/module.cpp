@@ -4,12 +4,8 @@
 
 #include "bind.hpp"
 
-NB_MODULE(_gsnav, m) {
+NB_MODULE(_gsnav_of_main, m) {
   using namespace gsnav::python;
-  if (PyInterpreterState_GetID(PyInterpreterState_Get()) != 0) {
-    throw nb::import_error(
-        "gsnav does not support subinterpreters. Use processes of the start method spawn");
-  }
   // Objects that a daemon thread or a caller's own circle holds at exit are no error of this module.
   nb::set_leak_warnings(std::getenv("GSNAV_LEAK_WARNINGS") != nullptr);
   nb::module_::import_("numpy");  // Without it, this is an ImportError.
@@ -36,4 +32,15 @@ NB_MODULE(_gsnav, m) {
   bind_batch(m);
   bind_habitat(m);
   bind_avatar_tracker(m);
+}
+
+/// What Python calls to import the module. nanobind keeps its types per process, and replaces them when
+/// it begins, so a subinterpreter is refused before.
+extern "C" NB_EXPORT PyObject* PyInit__gsnav() {
+  if (PyInterpreterState_GetID(PyInterpreterState_Get()) != 0) {
+    PyErr_SetString(PyExc_ImportError,
+                    "gsnav does not support subinterpreters. Use processes of the start method spawn");
+    return nullptr;
+  }
+  return PyInit__gsnav_of_main();
 }

@@ -144,10 +144,14 @@ def test_spawn(opened):
 
 SUBINTERPRETER = """
 import importlib.util
+import gsnav
+env = gsnav.Env(config=gsnav.SimulatorConfig(sensors=gsnav.rgbd_sensors(8, 8)))
+env.reset(seed=1)
 name = next(n for n in ("_interpreters", "_xxsubinterpreters") if importlib.util.find_spec(n))
 interpreters = importlib.import_module(name)
 code = "try:\\n    import gsnav\\nexcept ImportError as e:\\n    print('refused:', e, flush=True)"
 interpreters.run_string(interpreters.create(), code)
+env.step(1)  # the types of the main interpreter are as they were
 print("alive")
 """
 
