@@ -8,7 +8,6 @@ alone. Any number of actors, even if some of them die, therefore gives the bits 
 from __future__ import annotations
 
 import collections
-import hashlib
 import heapq
 import json
 import os
@@ -20,7 +19,7 @@ from typing import Any, cast
 import numpy as np
 import numpy.typing as npt
 
-from . import _task
+from . import _journal, _task
 from ._errors import BackendFailure, ClosedEnvironment, InvalidArgument
 from ._gsnav import EpisodeMetrics, SimulatorConfig
 from ._vector_env import Observation, VectorEnv
@@ -105,7 +104,7 @@ class Workers:
         settings: other arguments of VectorEnv, such as `config` and `device`.
         """
         self.deaths = 0  # Number of actors that died and were replaced.
-        scenes = [one if isinstance(one, str) else "" for one in (scene if isinstance(scene, list) else [scene])]
+        scenes = list(scene) if isinstance(scene, (list, tuple)) else [scene]
         self._identity = [environments, scenes, settings.get("config", SimulatorConfig())]
         self._arguments = (environments, scene, settings)
         self._local = None if actors else Player(*self._arguments)
@@ -142,18 +141,14 @@ class Workers:
                  journal: str | os.PathLike[str], *, piece: int = 64) -> list[EpisodeMetrics]:
         """Plays episodes and writes a line for each to `journal`, in order. Returns their metrics.
 
-        An existing journal of the same evaluation is continued. Use the policy that it was begun with.
+        An existing journal of the same evaluation is continued. Use the policy that it was begun with. Scenes must
+        have names, because the journal is of these scenes.
         """
-        content = hashlib.sha256(json.dumps([*self._identity, *episodes], default=_task.plain).encode()).hexdigest()
-        header = json.dumps({"journal": "gsnav.ray", "format": 1, "piece": piece, "content": content})
+        header = _journal.header(self._identity, episodes, piece)
         path, part = pathlib.Path(journal), pathlib.Path(os.fspath(journal) + ".part")
-        lines = path.read_text().split("\n")[:-1] if path.exists() else []  # Without a line that was cut off.
-        if lines and lines[0] != header:
-            raise InvalidArgument(f"{path} is of other episodes, scenes, settings or pieces: use another, or remove it")
-        whole = len(episodes) if len(lines) > len(episodes) else max(len(lines) - 1, 0) // piece * piece
-        kept = [header, *lines[1:whole + 1]]
-        read = [json.loads(line)["metrics"].items() for line in kept[1:]]
-        metrics = [EpisodeMetrics(**dict[str, Any]((n, np.inf if v is None else v) for n, v in m)) for m in read]
+        lines = _journal.lines(path, header)
+        whole = len(episodes) if len(lines) >= len(episodes) else len(lines) // piece * piece
+        kept, metrics = [header, *lines[:whole]], _journal.metrics(path, lines[:whole])
         part.write_text("\n".join([*kept, ""]))
         part.replace(path)
         with path.open("a") as f:

@@ -83,11 +83,32 @@ def test_a_journal_is_continued(episodes, alone, tmp_path):
     for wrong in (episodes[:25], [*episodes[:25], episodes[0]]):
         with pytest.raises(gsnav.InvalidArgument, match="other episodes"):
             workers.evaluate(wrong, policy_maker(), journal, piece=4)
+    whole = alone[0].decode().splitlines(keepends=True)
+    foreign = tmp_path / "notes.txt"
+    for text, words in [("my notes", "other episodes"), (whole[0] + "x\n" + "".join(whole[2:]), "line 2"),
+                        ("".join([whole[0], whole[2], whole[1], *whole[3:]]), "line 2 .* of episode 1"),
+                        ("".join([*whole[:3], *whole[4:]]), "line 4")]:
+        foreign.write_text(text)
+        with pytest.raises(gsnav.InvalidArgument, match=words):
+            workers.evaluate(episodes, policy_maker(), foreign, piece=4)
+        assert foreign.read_text() == text
     with pytest.raises(gsnav.InvalidArgument, match="piece"):
         list(workers.rollouts(episodes, policy_maker(), piece=0))
     workers.close()
     with pytest.raises(gsnav.ClosedEnvironment):
         list(workers.rollouts(episodes, policy_maker()))
+
+
+def test_a_journal_is_of_its_scenes(episodes, tmp_path):
+    scene = gsnav.open_scene("default", gsnav.OpenOptions(navmesh="auto"))
+    objects = gsnav.ray.Workers(scene, actors=0, environments=3, config=CONFIG)
+    with pytest.raises(gsnav.InvalidArgument, match="by name"):
+        objects.evaluate(episodes, policy_maker(), tmp_path / "objects.jsonl")
+    assert not (tmp_path / "objects.jsonl").exists() and len(list(objects.rollouts(episodes[:2], policy_maker()))) == 2
+    identities = [gsnav.ray.Workers(one, actors=0, environments=3, config=CONFIG)._identity
+                  for one in (tmp_path / "a.ply", str(tmp_path / "a.ply"), tmp_path / "b.ply")]
+    a, same, b = (gsnav._journal.header(one, episodes, 4) for one in identities)
+    assert a == same != b
 
 
 @pytest.mark.filterwarnings("ignore")
