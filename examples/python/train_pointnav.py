@@ -204,8 +204,9 @@ class Learner:
         last = torch.where(self.start[rows] > 0, ACTIONS, self.last[rows])
         images = self.mirror.images(self.images[rows])
         x = self.agent.features(images, self.goal[rows].reshape(-1, 3), last.reshape(-1))
+        x = Reorder.apply(x, order, inverse)  # type: ignore[no-untyped-call]
         hidden = self.first_hidden[chunk][env] * (1 - fresh)[:, None]
-        y = self.agent.gru(PackedSequence(Reorder.apply(x, order, inverse), sizes), hidden[None])[0].data
+        y = self.agent.gru(PackedSequence(x, sizes), hidden[None])[0].data
         policy_learns = self.update_count >= self.args.critic_updates
         log_p, value = self.agent.heads(y if policy_learns else y.detach())
         weight, advantage = row(self.result[2]), row(self.advantage)
@@ -215,7 +216,8 @@ class Learner:
         entropy = -(log_p.exp() * log_p).sum(-1)
         parts = torch.stack([(weight * part).mean() for part in (policy, error, entropy)])
         self.losses += parts.detach()
-        return parts[0] * policy_learns + VALUE_COEF * parts[1] - ENTROPY_COEF * parts[2] * policy_learns
+        loss: Tensor = parts[0] * policy_learns + VALUE_COEF * parts[1] - ENTROPY_COEF * parts[2] * policy_learns
+        return loss
 
     def update(self) -> None:
         """Epochs of PPO over chunks of time steps. Images are not copied, because a chunk of steps is contiguous."""
@@ -359,7 +361,8 @@ def arguments() -> argparse.Namespace:
                    "others. DD-PPO has 0.6; below 1, runs on several ranks are not reproducible")
     p.add_argument("--mirror", action="store_true", help="swap left and right in every other environment")
     p.add_argument("--success", type=float, default=2.5, help="reward for a success")
-    world_arguments(p), sensor_arguments(p)
+    world_arguments(p)
+    sensor_arguments(p)
     a = p.parse_args()
     if a.rollout % a.chunks:
         p.error(f"--rollout {a.rollout} must be a multiple of --chunks {a.chunks}")

@@ -8,7 +8,8 @@ import sys
 import pytest
 
 EXAMPLES = pathlib.Path(__file__).parents[3] / "examples" / "python"
-NEEDS = {"vector_env.py": "gymnasium", "plot.py": "matplotlib", "on_ray.py": "ray", "on_jax.py": "jax"}
+NEEDS = {"vector_env.py": "gymnasium", "plot.py": "matplotlib", "on_ray.py": "ray", "on_jax.py": "jax",
+         "on_torch.py": "torch"}
 WRITES = {"render_scan.py": "scan.npz", "plot.py": "plot.png", "on_ray.py": "journal.jsonl",
           "convert_scene.py": "scene.spz"}
 
@@ -29,10 +30,14 @@ def test_example(name, tmp_path):
         assert (tmp_path / WRITES[name]).stat().st_size > 1000
 
 
-def test_types_of_the_examples(tmp_path):
+@pytest.mark.parametrize("examples", [[p for p in SHORT if p.name != "on_torch.py"],
+                                      [*LONG, EXAMPLES / "on_torch.py"]], ids=["short", "torch"])
+def test_types_of_the_examples(tmp_path, examples):
     pytest.importorskip("mypy")
+    if LONG[0] in examples:
+        pytest.importorskip("torch")
     settings = EXAMPLES.parents[1] / "pyproject.toml"
     run = subprocess.run([sys.executable, "-m", "mypy", "--strict", "--config-file", settings, "--cache-dir", tmp_path,
-                          *SHORT], capture_output=True, text=True, cwd=tmp_path)
+                          *examples], capture_output=True, text=True, cwd=tmp_path)
     assert run.returncode == 0, run.stdout
     assert len(LONG[-1].read_text().splitlines()) <= 400
