@@ -65,6 +65,13 @@ if TYPE_CHECKING or not HAVE_GYMNASIUM:
         def __contains__(self, x: Any) -> bool:
             return self.contains(x)
 
+        def __eq__(self, other: object) -> bool:
+            return type(self) is type(other) and self._key() == other._key()
+
+        def _key(self) -> Any:
+            """What equal spaces have in common, beside their type."""
+            return self.shape, self.dtype
+
         def contains(self, x: Any) -> bool:
             """Whether x is a member."""
             raise NotImplementedError
@@ -78,6 +85,14 @@ if TYPE_CHECKING or not HAVE_GYMNASIUM:
             super().__init__(tuple(shape), dtype)
             self.low = np.broadcast_to(np.asarray(low, dtype), shape).copy()
             self.high = np.broadcast_to(np.asarray(high, dtype), shape).copy()
+
+        def _key(self) -> Any:
+            return self.shape, self.dtype, self.low.tobytes(), self.high.tobytes()
+
+        def is_bounded(self, manner: str = "both") -> bool:
+            """Whether all elements have the bounds "below", "above" or "both"."""
+            below, above = bool(np.all(np.isfinite(self.low))), bool(np.all(np.isfinite(self.high)))
+            return {"below": below, "above": above, "both": below and above}[manner]
 
         def contains(self, x: Any) -> bool:
             x = np.asarray(x)
@@ -95,7 +110,10 @@ if TYPE_CHECKING or not HAVE_GYMNASIUM:
 
         def __init__(self, n: int) -> None:
             super().__init__((), np.int64)
-            self.n = int(n)
+            self.n, self.start = int(n), 0
+
+        def _key(self) -> Any:
+            return self.n
 
         def contains(self, x: Any) -> bool:
             scalar = isinstance(x, np.ndarray) and x.shape == () and x.dtype.kind in "iu"
@@ -111,6 +129,9 @@ if TYPE_CHECKING or not HAVE_GYMNASIUM:
         def __init__(self, nvec: Any) -> None:
             self.nvec = np.array(nvec, np.int64)
             super().__init__(self.nvec.shape, np.int64)
+
+        def _key(self) -> Any:
+            return self.nvec.tobytes()
 
         def contains(self, x: Any) -> bool:
             x = np.asarray(x)
@@ -128,12 +149,29 @@ if TYPE_CHECKING or not HAVE_GYMNASIUM:
             super().__init__(None, None)
             self.spaces = dict(spaces)
 
+        def _key(self) -> Any:
+            return self.spaces
+
         def __getitem__(self, key: str) -> Any:
             return self.spaces[key]
+
+        def __iter__(self) -> Any:
+            return iter(self.spaces)
+
+        def __len__(self) -> int:
+            return len(self.spaces)
 
         def keys(self) -> Any:
             """Names of the spaces."""
             return self.spaces.keys()
+
+        def values(self) -> Any:
+            """The spaces."""
+            return self.spaces.values()
+
+        def items(self) -> Any:
+            """Names and spaces."""
+            return self.spaces.items()
 
         def seed(self, seed: int | None = None) -> Any:
             used = super().seed(seed)
@@ -170,6 +208,10 @@ if TYPE_CHECKING or not HAVE_GYMNASIUM:
                 self._np_random, self._np_random_seed = make_generator()
             return self._np_random
 
+        @np_random.setter
+        def np_random(self, value: np.random.Generator) -> None:
+            self._np_random, self._np_random_seed = value, -1  # -1: unknown, as in Gymnasium
+
         @property
         def np_random_seed(self) -> int | None:
             """Seed of the environment's generator."""
@@ -181,8 +223,22 @@ if TYPE_CHECKING or not HAVE_GYMNASIUM:
             """The environment itself."""
             return self
 
+        def has_wrapper_attr(self, name: str) -> bool:
+            """Whether the environment has this attribute."""
+            return hasattr(self, name)
+
+        def get_wrapper_attr(self, name: str) -> Any:
+            """An attribute of the environment."""
+            return getattr(self, name)
+
         def close(self) -> None:
             """Frees the environment."""
+
+        def __enter__(self) -> Any:
+            return self
+
+        def __exit__(self, *error: Any) -> None:
+            self.close()
 
     class BaseEnv(_Base):
         """Same shape as gymnasium.Env."""

@@ -21,7 +21,14 @@ for _ in range(5):
     step = envs.step(np.array([1, 2, 3]))
 assert step[3].all() and step[4]["final_obs"][0] in envs.single_observation_space
 total = float(observations["rgb"][1].sum())
+assert list(envs.observation_space) == [*envs.observation_space.keys()] and len(envs.observation_space.items()) == 3
+assert envs.action_space == gsnav.VectorEnv(3, scene, config=config).action_space
+assert envs.action_space != gsnav.VectorEnv(2, scene, config=config).action_space
+assert envs.single_observation_space["depth"].is_bounded() and envs.single_action_space.start == 0
 envs.close(), envs.close()
+with gsnav.Env(scene, config=config) as env:
+    assert env.get_wrapper_attr("render_mode") is None and env.has_wrapper_attr("step")
+    env.np_random = np.random.default_rng(1)
 env = gsnav.Env(scene, config=config)
 observation, _ = env.reset(seed=2)
 assert observation in env.observation_space and env.action_space.sample() in env.action_space
