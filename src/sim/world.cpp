@@ -99,6 +99,9 @@ Status World::reset(const PointNavEpisode& episode) {
   if (!is_finite(q.w) || !is_finite(q.x) || !is_finite(q.y) || !is_finite(q.z)) {
     return {Errc::invalid_argument, "episode \"" + episode.id + "\": start_rotation is not finite"};
   }
+  if (q.w == 0 && q.x == 0 && q.y == 0 && q.z == 0) {
+    return {Errc::invalid_argument, "episode \"" + episode.id + "\": start_rotation is zero"};
+  }
   const Result<CapsuleSet> now = bodies(episode.start_time, episode.start_time);
   if (!now) return now.status();
 

@@ -92,7 +92,7 @@ class Env(BaseEnv):
         """
         simulator = self.simulator
         action = _task.from_dlpack(action, "Env.step: action")
-        if action not in self.action_space:
+        if isinstance(action, (bool, np.bool_)) or action not in self.action_space:
             raise InvalidArgument(f"Env.step: action {action!r}: use an integer from 0 (stop) to 3 (turn right)")
         seen = simulator.step(int(action))
         info = _task.info_dict(seen.info)

@@ -121,10 +121,11 @@ class VectorEnv(BaseVectorEnv):
         simulator = self.simulator
         mask = self._mask((options or {}).get("reset_mask"))
         seeds = self._seeds(seed)
+        made = {e: make_generator(one)[0] for e, one in enumerate(seeds)
+                if one is not None and (mask is None or mask[e])}  # all, or an error that changes nothing
         super().reset(seed=seeds[0] if seed is not None else None)
-        for e, one in enumerate(seeds):
-            if one is not None and (mask is None or mask[e]):
-                self._source.generators[e] = make_generator(one)[0]
+        for e, generator in made.items():
+            self._source.generators[e] = generator
         step = simulator.reset(mask)
         infos: dict[str, Any] = {}
         self._add_step_info(infos, step.infos, self._all if mask is None else mask)

@@ -93,8 +93,8 @@ inline bool read_numbers(nb::handle source, double* out, Py_ssize_t count) noexc
     PyObject* const item = PySequence_GetItem(source.ptr(), i);
     good = item != nullptr;
     if (!good) break;
-    out[i] = PyFloat_AsDouble(item);
-    good = !PyErr_Occurred();
+    out[i] = PyComplex_Check(item) ? -1 : PyFloat_AsDouble(item);  // NumPy would drop the imaginary part
+    good = !PyErr_Occurred() && !PyComplex_Check(item);
     Py_DECREF(item);
   }
   PyErr_Clear();

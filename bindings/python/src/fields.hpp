@@ -70,15 +70,23 @@ class Struct {
   /// Binds a field.
   template <class V, class C>
   Struct& field(const char* name, V C::*member, const char* doc) {
-    class_.def_rw(name, member, doc);
-    fields_.push_back({name, TypeName<V>::get(),
-                       [member](const T& t) { return nb::cast(t.*member, nb::rv_policy::copy); },
-                       [member](T& t, nb::handle h) {
-                         V v{};
-                         if (!nb::try_cast<V>(h, v)) return false;
-                         t.*member = std::move(v);
-                         return true;
-                       }});
+    const std::string type = TypeName<V>::get();
+    const auto set = [member](T& t, nb::handle h) {
+      V v{};
+      if (!nb::try_cast<V>(h, v)) return false;
+      t.*member = std::move(v);
+      return true;
+    };
+    const std::string signature = std::string("def ") + name + "(self, value: " + type + ", /) -> None";
+    class_.def_prop_rw(
+        name, [member](T& t) -> V& { return t.*member; },
+        [set, type, of = name_, field = std::string(name)](T& t, nb::handle h) {
+          if (!set(t, h)) throw wrong_type(of, field, type, h);
+        },
+        nb::for_getter(nb::rv_policy::reference_internal), nb::for_setter(nb::sig(signature.c_str())),
+        nb::for_setter(nb::arg("value").none()), doc);
+    fields_.push_back(
+        {name, type, [member](const T& t) { return nb::cast(t.*member, nb::rv_policy::copy); }, set});
     return *this;
   }
 
@@ -143,6 +151,12 @@ class Struct {
     std::function<bool(T&, nb::handle)> set;
   };
 
+  static nb::builtin_exception wrong_type(const std::string& name, const std::string& field,
+                                          const std::string& type, nb::handle value) {
+    return nb::type_error(
+        (name + "." + field + ": expected " + type + ", got " + text_of(nb::repr(value))).c_str());
+  }
+
   static void fill(T& made, const std::string& name, const std::vector<Field>& fields,
                    const nb::dict& values) {
     for (const auto& [key, value] : values) {
@@ -157,11 +171,7 @@ class Struct {
         throw nb::type_error(
             (name + " has no field \"" + wanted + "\". Its fields are " + known).c_str());
       }
-      if (!found->set(made, value)) {
-        throw nb::type_error(
-            (name + "." + wanted + ": expected " + found->type + ", got " + text_of(nb::repr(value)))
-                .c_str());
-      }
+      if (!found->set(made, value)) throw wrong_type(name, wanted, found->type, value);
     }
   }
 

@@ -129,6 +129,14 @@ def test_wrong_actions(envs, actions, error):
     assert envs.step([1, 2, 3])[0]["rgb"].shape == (3, 16, 24, 3)
 
 
+def test_a_bool_is_no_action(env):
+    env.reset(seed=1)
+    for wrong in (True, np.bool_(True)):
+        with pytest.raises(gsnav.InvalidArgument, match="Env.step: action"):
+            env.step(wrong)
+    assert env.simulator.world.state().steps == 0
+
+
 def test_wrong_resets(envs):
     envs.reset(seed=1)
     for mask, error in [([True, False, False], TypeError), (np.ones(3), TypeError), (np.ones(2, bool), ValueError),
@@ -137,6 +145,10 @@ def test_wrong_resets(envs):
             envs.reset(options={"reset_mask": mask})
     with pytest.raises(ValueError, match="2 seeds for 3"):
         envs.reset(seed=[1, 2])
+    before = [g.bit_generator.state for g in envs._source.generators]
+    with pytest.raises((ValueError, gymnasium.error.Error), match="-3"):
+        envs.reset(seed=[1, -3, 2])
+    assert [g.bit_generator.state for g in envs._source.generators] == before
     assert envs.step([1, 1, 1])[1].shape == (3,)
 
 

@@ -213,6 +213,14 @@ def test_settings_can_be_copied_and_pickled():
         gsnav.TaskConfig(steps=3)
     with pytest.raises(TypeError, match="TaskConfig.max_steps: expected int, got 'x'"):
         gsnav.TaskConfig(max_steps="x")
+    with pytest.raises(TypeError, match="TaskConfig.max_steps: expected int, got 'x'"):
+        config.task.max_steps = "x"
+    for wrong in ([0, 0], np.zeros(3, complex), "abc", None):
+        with pytest.raises(TypeError, match="PointNavEpisode.start_position: expected"):
+            gsnav.PointNavEpisode().start_position = wrong
+    episode = gsnav.PointNavEpisode(start_position=[1, 2, 3])
+    episode.start_rotation = np.array([0, 0, 1, 0], np.float32)
+    assert episode.start_rotation.tolist() == [0, 0, 1, 0] and config.task.max_steps == 3
     device = gsnav.Device.parse("cpu:2")
     assert pickle.loads(pickle.dumps(device)) == device and device.threads == 2 and device != "cpu:2"
 
