@@ -183,7 +183,9 @@ __global__ void __launch_bounds__(kThreads, Mesh ? Policy::kResidentWithMesh : P
         const std::uint16_t* const list = s.lists[4 * warp + quarter];
         for (std::uint32_t i = 0; i < length; i += kListStep) {
           blend_listed(list + i, blend);
-          if (i % 16 == 12 && __all_sync(kAll, !is_open())) break;
+          if (i % Policy::kUntilClosed == Policy::kUntilClosed - kListStep &&
+              __all_sync(kAll, !is_open()))
+            break;
         }
         open = __ballot_sync(kAll, is_open());
       }

@@ -106,8 +106,9 @@ Status CudaBatchRenderer::supports(const RenderConfig& config, std::span<const G
 
 std::size_t CudaBatchRenderer::State::measured_capacity(std::size_t cameras) const {
   if (taken.cameras == 0) return cameras;
-  // Add an eighth, as grown() does for capacities.
-  const auto of_each = [this](std::uint64_t n) { return (n + n / 8) / taken.cameras + 1; };
+  const auto of_each = [this](std::uint64_t n) {  // grown as capacities are
+    return (n + n / cuda::policy::Capacity::kGrowth) / taken.cameras + 1;
+  };
   std::uint64_t most = kMostPlaces / of_each(std::max(taken.slots, taken.pairs));
   constexpr std::uint64_t kSlotBytes = sizeof(cuda::SplatRecord) + sizeof(cuda::SplatEntry) +
                                        sizeof(SplatDepth<float>) + sizeof(std::uint32_t);

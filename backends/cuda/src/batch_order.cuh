@@ -15,7 +15,7 @@ inline constexpr int kOrderThreads = policy::Order::kThreads, kOrderItems = poli
 inline constexpr int kOrderBinBits = policy::Order::kBinBits, kOrderBins = 1 << kOrderBinBits;
 /// Levels for the key and the rank.
 inline constexpr int kOrderLevels = 2 * ((32 + kOrderBinBits - 1) / kOrderBinBits);
-inline constexpr std::size_t kOrderLent = 12800;
+inline constexpr std::size_t kOrderLent = 12800;  ///< Bytes of shared memory that a caller lends.
 
 /// A batch is scattered into this number of buckets by key. Splats that share a bucket are ordered
 /// afterwards.

@@ -147,8 +147,9 @@ __global__ void __launch_bounds__(kThreads) order_kernel(const BatchArgs a) {
   for (std::uint32_t p = blockIdx.x * kWarps + threadIdx.x / 32; p < count; p += gridDim.x * kWarps) {
     const ListPart part = a.parts[p];
     const std::uint32_t n = part.end - part.begin, camera = part.tile / tiles;
-    const bool done =
-        n <= 128 ? order_part<4>(a, part, camera) : n <= 256 && order_part<8>(a, part, camera);
+    const bool done = n <= Policy::kOfWarp<4>
+                          ? order_part<4>(a, part, camera)
+                          : n <= Policy::kOfWarp<8> && order_part<8>(a, part, camera);
     if (!done && threadIdx.x % 32 == 0) a.long_parts[atomicAdd(&a.counters->long_parts, 1u)] = p;
   }
 }
@@ -180,10 +181,11 @@ __global__ void __launch_bounds__(kThreads) order_lists_kernel(const BatchArgs a
     const std::uint32_t begin = a.tile_begins[tile];
     const ListPart list{tile, 0, begin, begin + n};
     const bool together = n <= a.list_room;
-    const bool done = !together  ? false
-                      : n <= 64  ? order_part<2>(a, list, camera)
-                      : n <= 128 ? order_part<4>(a, list, camera)
-                                 : n <= 256 && order_part<8>(a, list, camera);
+    const bool done = !together                 ? false
+                      : n <= Policy::kOfWarp<2> ? order_part<2>(a, list, camera)
+                      : n <= Policy::kOfWarp<4>
+                          ? order_part<4>(a, list, camera)
+                          : n <= Policy::kOfWarp<8> && order_part<8>(a, list, camera);
     if (done && threadIdx.x % 32 == 0) a.tile_order[i] = tile | kListInOrder;
   }
 }

@@ -268,7 +268,7 @@ void CudaBatchRenderer::State::guess_capacities(std::uint64_t gaussians, bool fe
     // Visible Gaussians, plus the slots that the warps of all multiprocessors may leave unused in their
     // slabs.
     entry_capacity =
-        gaussians + std::uint64_t{64} * static_cast<std::uint64_t>(multiprocessors) * args.slab;
+        gaussians + Policy::kWarps * static_cast<std::uint64_t>(multiprocessors) * args.slab;
     guess(pair_capacity, Policy::kPairsPerSlot * slots);
   } else {
     guess(alt_capacity, slots);

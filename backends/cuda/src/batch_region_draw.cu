@@ -293,12 +293,12 @@ __global__ void __launch_bounds__(Policy::kOrderThreads)
     const float all =
         static_cast<float>(r.counters->pairs) * static_cast<float>(tiles) / static_cast<float>(regions);
     const float share = all / static_cast<float>(warps), mean = all / static_cast<float>(a.tiles);
-    kind = r.far_begins[camera] == kNoFarRecords       ? kInDouble
-           : length > 2.5f * Policy::kQuarters * share ? 0u
-           : length > Policy::kQuarters * share        ? 1u
-           : length > Policy::kHalves * share          ? 2u
-           : length > mean                             ? 3u
-                                                       : 4u;
+    kind = r.far_begins[camera] == kNoFarRecords                 ? kInDouble
+           : length > Policy::kFirst * Policy::kQuarters * share ? 0u
+           : length > Policy::kQuarters * share                  ? 1u
+           : length > Policy::kHalves * share                    ? 2u
+           : length > mean                                       ? 3u
+                                                                 : 4u;
   }
 #pragma unroll
   for (std::uint32_t k = 0; k < kItemKinds; ++k) {

@@ -136,8 +136,9 @@ __device__ __noinline__ inline bool order_rows(uint2* rows, std::uint32_t n) {
     v[e] = i < n ? ((v[e] - low) >> shift) << kPlaceBits | i : kLastKey;
   }
   sort_in_lane<E>(v);
+  constexpr std::uint32_t kRounds = 32 + 2;  // the 32 lanes are in order by then
 #pragma unroll 1
-  for (std::uint32_t round = 0; round < 34; ++round) {
+  for (std::uint32_t round = 0; round < kRounds; ++round) {
     const std::uint32_t last = __shfl_up_sync(kAll, v[E - 1], 1);
     if (!__any_sync(kAll, lane > 0 && last > v[0])) break;
     // Pairs of lanes (0, 1), (2, 3), ..., then (1, 2), (3, 4), ...

@@ -151,9 +151,9 @@ class TileReader {
 
   __device__ void order() {
     bool equal = false;
-    if (held_ <= 64) {
+    if (held_ <= policy::Order::kOfWarp<2>) {
       if (held_ > 1) equal = order_rows<2>(rows_, held_);
-    } else if (held_ <= 128) {
+    } else if (held_ <= policy::Order::kOfWarp<4>) {
       equal = order_rows<4>(rows_, held_);
     } else {
       equal = order_rows<8>(rows_, held_);

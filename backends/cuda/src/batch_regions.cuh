@@ -43,7 +43,7 @@ struct alignas(8) RegionRow {
   std::uint32_t word;  ///< Source << 12 | rectangle in the region, in units of two pixels.
   std::uint32_t key;
 };
-inline constexpr int kRegion = 16, kRegionTile = 8;
+inline constexpr int kRegion = policy::Regions::kRegion, kRegionTile = policy::Regions::kTile;
 
 /// Row of a list whose record may need double precision.
 struct FarRow {

@@ -8,9 +8,12 @@ namespace gsnav {
 
 namespace {
 
+using Capacity = cuda::policy::Capacity;
+
 std::uint32_t grown(unsigned long long needed) {
-  return static_cast<std::uint32_t>(std::min<unsigned long long>(
-      needed + needed / 8 + 1024, std::numeric_limits<std::uint32_t>::max() - 1));
+  return static_cast<std::uint32_t>(
+      std::min<unsigned long long>(needed + needed / Capacity::kGrowth + Capacity::kLeastGrowth,
+                                   std::numeric_limits<std::uint32_t>::max() - 1));
 }
 
 /// Words of BatchCounters, rounded up to memory lines.

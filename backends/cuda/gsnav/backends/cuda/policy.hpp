@@ -36,6 +36,10 @@ struct Capacity {
                                                   ///< of pairs.
   /// Lists get more space if more than one pair in kPairsPerBeyond did not fit in the last call.
   static constexpr std::uint32_t kPairsPerBeyond = 16;
+  /// If a capacity is too small for n, it grows to n + n / kGrowth + kLeastGrowth.
+  static constexpr std::uint64_t kGrowth = 8, kLeastGrowth = 1024;
+  /// Warps that may be on a multiprocessor at once. Each may leave slots of its slab unused.
+  static constexpr std::uint64_t kWarps = 64;
   /// Depth records are written if there are at least kHalfPixelsPerDepth / 2 pixels per slot.
   static constexpr std::size_t kHalfPixelsPerDepth = 5;
 };
@@ -70,6 +74,9 @@ struct Order {
   static constexpr int kBucketBits = 10;            ///< A batch is scattered into 2^kBucketBits buckets.
   /// A batch with a longer bucket is sorted by rank and key.
   static constexpr std::uint32_t kLongestBucket = 64;
+  /// Keys that a warp sorts in registers, with E per lane.
+  template <int E>
+  static constexpr std::uint32_t kOfWarp = 32u * E;
   static constexpr unsigned kFetched = 8;  ///< Pairs that a thread requests at a time while
                                            ///< partitioning.
   static constexpr int kTieRounds = 8;     ///< Largest number of passes that swap neighbours of equal
@@ -80,6 +87,8 @@ struct Order {
 struct Blend {
   static constexpr int kPixels = 2;             ///< Pixels per thread, one above the other.
   static constexpr std::uint32_t kChunk = 256;  ///< Splats staged at a time.
+  /// After this number of listed splats, a warp looks whether all of its pixels are closed.
+  static constexpr std::uint32_t kUntilClosed = 16;
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
   static constexpr int kResident = 4;
 #else
@@ -98,6 +107,7 @@ struct BlendSmall {
 
 /// Small images of many cameras, drawn by lists of regions.
 struct Regions {
+  static constexpr int kRegion = 16, kTile = 8;  ///< Width of a region and of a tile in pixels.
   /// Largest width and height of an image. In larger ones, too many tiles project the same row.
   static constexpr int kSide = 64;
   /// Cameras that see fewer Gaussians each, on average, are drawn by tiles: lists of regions then cost
@@ -117,6 +127,7 @@ struct Regions {
   /// A tile is drawn in quarters or halves if its list is longer than this fraction of the rows that a
   /// warp reads on average.
   static constexpr float kQuarters = 0.8f, kHalves = 0.4f;
+  static constexpr float kFirst = 2.5f;  ///< Tiles this much longer than kQuarters are drawn first.
   static constexpr unsigned kDrawWarps = 4, kDrawResident = 4;
   /// Numbers of rows: the most that a warp holds, those that it collects, and the fewest that it draws.
   static constexpr std::uint32_t kHeld = 256, kTarget = 160, kLeast = 48;
