@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "hard_cases/backends.hpp"
 #include "hard_cases/cases.hpp"
@@ -59,16 +60,17 @@ TEST_CASE("N16_near_plane_cross") {
   turned.viewmat.translation = {0.1, -0.2, 0.3};
   for (RawGaussian& g : gs) g.mean = rotate(conjugate(turn), g.mean - turned.viewmat.translation);
   const GaussianCloud cloud = cloud_of(gs);
-  std::uint64_t visible = 0;
+  std::optional<std::uint64_t> visible;  // none if only batches are drawn, which do not count
   for_each_renderer([&](auto& renderer) {
     const auto f = renderer.render({&cloud}, turned, all_outputs());
-    if (!f.stats.empty()) {
-      if (visible == 0) visible = f.stats[0].visible;
-      CHECK(f.stats[0].visible == visible);
-    }
+    if (f.stats.empty()) return;
+    if (!visible) visible = f.stats[0].visible;
+    CHECK(f.stats[0].visible == *visible);
   });
-  CHECK(visible > 1000);
-  CHECK(visible < 3000);
+  if (visible) {
+    CHECK(*visible > 1000);
+    CHECK(*visible < 3000);
+  }
 }
 
 TEST_CASE("N17_camera_inside_splat") {
