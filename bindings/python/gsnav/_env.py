@@ -21,7 +21,7 @@ from ._gsnav import (
     copy_image,
     to_bytes,
 )
-from ._spaces import BaseEnv
+from ._spaces import HAVE_GYMNASIUM, BaseEnv
 
 Observation = dict[str, npt.NDArray[np.float32]]
 
@@ -61,6 +61,10 @@ class Env(BaseEnv):
         self._episodes = _task.Episodes([self.scene], episodes, rules)
         self._simulator: Simulator | None = Simulator(device, self.scene, config)
         self._last: Observation | None = None
+        if HAVE_GYMNASIUM:
+            from ._registration import spec
+            self.spec = spec({"scene": self.scene, "device": device, "config": config, "episodes": episodes,
+                              "rules": rules, "render_mode": render_mode})
 
     @property
     def simulator(self) -> Simulator:

@@ -37,6 +37,7 @@ def test_check_env(people, small):
     env = gymnasium.make("gsnav/PointNav-v0", scene=people, config=small, render_mode="rgb_array")
     check_env(env.unwrapped)  # warnings are errors (pyproject.toml)
     env.close()
+    check_env(gsnav.Env(people, config=small))
 
 
 def test_make_vec(people, small):
