@@ -7,6 +7,7 @@
 #include <string>
 
 #include "gsnav/core/rng.hpp"
+#include "gsnav/math/functions.hpp"
 
 namespace gsnav {
 namespace {
@@ -56,7 +57,7 @@ void add_poisson(Rng& rng, std::span<float> rgb) {
   std::bitset<256> seen;
   for (float& c : rgb) {
     c = in_range(static_cast<double>(c));
-    seen.set(static_cast<std::size_t>(255.0f * c + 0.5f));
+    seen.set(to_byte(c));
   }
   double levels = 1;
   while (levels < static_cast<double>(seen.count())) levels *= 2;
