@@ -29,7 +29,7 @@ ABOUT_GROUPS = {"core": "Errors, random numbers, arrays in the memory of a backe
                 "math": "Vectors, quaternions, matrices, boxes and capsules.",
                 "backends": "Backends by their own names, for the templates that take one.",
                 "interop": "Views and copies of the types of other libraries."}
-GROUPS = (("render", "Scenes and rendering", "render", ("render", "image", "frame", "scene", "device")),
+GROUPS = (("render", "Scenes and rendering", "render", ("render", "image", "frame", "mesh", "scene", "device")),
           ("avatar", "Avatars", "avatar", ("avatar", "skin")),
           ("rigging", "Making avatars", "rigging", ("rigging",)),
           ("nav", "Navigation", "nav", ("nav", "sweep")),
@@ -42,10 +42,6 @@ GROUPS = (("render", "Scenes and rendering", "render", ("render", "image", "fram
           ("math", "Mathematics", None, ("math",)),
           ("backends", "Serial, OpenMP and CUDA", None, ("backends",)),
           ("interop", "Eigen, GLM and DLPack", None, ("interop",)))
-# Types that settings and results are made of, in headers that are not for users otherwise.
-PARTS = {"render/quality.hpp": ("Exponential", "Quality"), "render/tuning.hpp": ("Tuning",),
-         "frame/output.hpp": ("Output", "FrameImages"), "frame/projection_camera.hpp": ("SortOrder", "Response"),
-         "mesh/mesh.hpp": ("MeshAlpha", "TextureView", "MeshView", "MeshInstance", "MeshLight", "Composite")}
 # Launch sizes of the CUDA kernels. Only changes of the backend read them.
 NOT_FOR_USERS = {"policy.hpp"}
 # Folders of pages, in the order of the menu.
@@ -61,7 +57,7 @@ LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s]+)\)")
 
 def headers():
     """{header: group} of all headers for users."""
-    found = {ROOT / "include/gsnav/detail" / name: "render" for name in PARTS}
+    found = {}
     for group, _, module, _ in GROUPS:
         if module:
             text = (ROOT / f"include/gsnav/{module}.hpp").read_text(encoding="utf-8")
@@ -154,23 +150,9 @@ def page_text(name, known, missing):
 FLAGS = re.MULTILINE | re.DOTALL
 
 
-def only(text, names):
-    """A header with these types alone; the other lines are empty."""
-    kept = re.compile(rf"(?:^///.*\n|^template .*\n)*^(?:enum class|enum|struct|class) (?:{'|'.join(names)})\b"
-                      r"[^;{]*\{.*?^\};|^#pragma once|^namespace gsnav \{|^\}  // namespace gsnav", FLAGS)
-    out, at = [], 0
-    for m in kept.finditer(text):
-        out.append("\n" * text.count("\n", at, m.start()) + m.group())
-        at = m.end()
-    return "".join(out) + "\n"
-
-
 def header_text(path, name, group):
     """A header whose namespaces are members of its group. Lines behind the first namespace keep their numbers."""
     text = path.read_text(encoding="utf-8")
-    part = PARTS.get(name.removeprefix("gsnav/detail/"))
-    if part:
-        text = only(text, part)
     opens = re.compile(r"^(?:inline )?namespace gsnav(?:::(?!detail)\w+)* \{", re.MULTILINE)
     for _ in opens.findall(text):  # each takes one line more
         text = re.sub(r"\A(.*?)\n\n", r"\1\n", text, count=1, flags=re.DOTALL)

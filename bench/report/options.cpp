@@ -8,7 +8,7 @@
 #include "../../tools/common/check_values.hpp"
 #include "../../tools/common/parse_options.hpp"
 #include "../../tools/common/scene_options.hpp"
-#include "gsnav/core/printable.hpp"
+#include "gsnav/core/text.hpp"
 #include "gsnav/version.hpp"
 #include "scenes.hpp"
 

@@ -8,7 +8,7 @@
 
 #if defined(GSNAV_HAS_CUDA)
 #include "gsnav/backends/cuda.hpp"
-#include "gsnav/core/printable.hpp"
+#include "gsnav/core/text.hpp"
 #endif
 #include "gsnav/io.hpp"
 #include "gsnav/scene/lod_cut.hpp"

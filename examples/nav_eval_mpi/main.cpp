@@ -16,8 +16,8 @@
 
 #include "../../tools/common/parse_options.hpp"
 #include "../../tools/eval/run.hpp"
-#include "gsnav/core/printable.hpp"
 #include "gsnav/core/replace_file.hpp"
+#include "gsnav/core/text.hpp"
 #include "gsnav/device/simulator.hpp"
 
 namespace {

@@ -8,7 +8,7 @@
 
 #include "../../tools/common/check_values.hpp"
 #include "../../tools/common/parse_options.hpp"
-#include "gsnav/core/printable.hpp"
+#include "gsnav/core/text.hpp"
 #include "gsnav/device/simulator.hpp"
 #include "gsnav/sim/follower.hpp"
 #include "recorder.hpp"

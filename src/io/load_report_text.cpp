@@ -2,7 +2,7 @@
 #include <cstdio>
 #include <string>
 
-#include "gsnav/core/printable.hpp"
+#include "gsnav/core/text.hpp"
 #include "gsnav/io/scene_file.hpp"
 
 namespace gsnav::io {

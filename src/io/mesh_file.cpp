@@ -8,8 +8,8 @@
 #include <string_view>
 
 #include "file.hpp"
-#include "gsnav/core/lower_case.hpp"
 #include "gsnav/core/replace_file.hpp"
+#include "gsnav/core/text.hpp"
 
 namespace gsnav::io {
 namespace {

@@ -9,7 +9,7 @@
 #include "cloud_fill.hpp"
 #include "described.hpp"
 #include "file.hpp"
-#include "gsnav/core/lower_case.hpp"
+#include "gsnav/core/text.hpp"
 #include "gsnav/detail/io/gltf.hpp"
 #include "gsnav/detail/io/ksplat.hpp"
 #include "gsnav/detail/io/lod_set.hpp"

@@ -4,8 +4,8 @@
 
 #include "file.hpp"
 #include "format_range.hpp"
-#include "gsnav/core/lower_case.hpp"
 #include "gsnav/core/replace_file.hpp"
+#include "gsnav/core/text.hpp"
 #include "gsnav/detail/io/gltf.hpp"
 #include "gsnav/detail/io/ply.hpp"
 #include "gsnav/detail/io/sog.hpp"

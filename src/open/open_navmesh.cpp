@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "gsnav/core/lower_case.hpp"
+#include "gsnav/core/text.hpp"
 #include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/detail/core/pool_backend.hpp"
 #include "gsnav/detail/demo/people.hpp"

@@ -2,7 +2,7 @@
 #include <filesystem>
 #include <utility>
 
-#include "gsnav/core/lower_case.hpp"
+#include "gsnav/core/text.hpp"
 #include "gsnav/detail/io/mesh_file.hpp"
 #include "gsnav/detail/scene/placed_meshes.hpp"
 #include "parts.hpp"

@@ -4,7 +4,7 @@
 #include <system_error>
 #include <utility>
 
-#include "gsnav/core/lower_case.hpp"
+#include "gsnav/core/text.hpp"
 #include "gsnav/detail/io/gltf.hpp"
 #include "gsnav/detail/io/habitat_dataset.hpp"
 

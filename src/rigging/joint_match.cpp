@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "gsnav/core/lower_case.hpp"
+#include "gsnav/core/text.hpp"
 
 namespace gsnav {
 

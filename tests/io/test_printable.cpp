@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <string>
 
-#include "gsnav/core/printable.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/core/text.hpp"
 #include "gsnav/detail/io/read_or_build.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "support/files.hpp"

@@ -8,7 +8,7 @@
 #include "../common/check_values.hpp"
 #include "../common/device_option.hpp"
 #include "../common/parse_options.hpp"
-#include "gsnav/core/printable.hpp"
+#include "gsnav/core/text.hpp"
 
 namespace gsnav_avatar {
 namespace {

@@ -7,8 +7,8 @@
 #include <system_error>
 #include <utility>
 
-#include "gsnav/core/lower_case.hpp"
 #include "gsnav/core/replace_file.hpp"
+#include "gsnav/core/text.hpp"
 
 namespace gsnav_tools {
 namespace {

@@ -17,7 +17,7 @@
 #include <system_error>
 #include <vector>
 
-#include "gsnav/core/printable.hpp"
+#include "gsnav/core/text.hpp"
 #include "gsnav/version.hpp"
 
 namespace gsnav_tools {

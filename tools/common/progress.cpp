@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <functional>
 
-#include "gsnav/core/printable.hpp"
+#include "gsnav/core/text.hpp"
 
 namespace gsnav_tools {
 

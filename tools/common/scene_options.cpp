@@ -4,8 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
-#include "gsnav/core/lower_case.hpp"
-#include "gsnav/core/printable.hpp"
+#include "gsnav/core/text.hpp"
 #include "gsnav/scene/prepare.hpp"
 #include "progress.hpp"
 #include "voxel_options.hpp"

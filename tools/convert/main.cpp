@@ -13,7 +13,7 @@
 #include "../common/scene_options.hpp"
 #include "../common/voxel_options.hpp"
 #include "compare.hpp"
-#include "gsnav/core/lower_case.hpp"
+#include "gsnav/core/text.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/io/scene_file.hpp"
 #include "gsnav/open.hpp"

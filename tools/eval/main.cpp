@@ -8,8 +8,8 @@
 
 #include "../common/check_values.hpp"
 #include "../common/parse_options.hpp"
-#include "gsnav/core/printable.hpp"
 #include "gsnav/core/replace_file.hpp"
+#include "gsnav/core/text.hpp"
 #include "gsnav/io.hpp"
 #include "page.hpp"
 #include "pictures.hpp"

@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "gsnav/core/printable.hpp"
+#include "gsnav/core/text.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/sim.hpp"
 #include "gsnav/sim/follower.hpp"

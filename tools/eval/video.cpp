@@ -12,8 +12,8 @@
 #include <sstream>
 #include <system_error>
 
-#include "gsnav/core/lower_case.hpp"
 #include "gsnav/core/replace_file.hpp"
+#include "gsnav/core/text.hpp"
 #if defined(GSNAV_HAS_WEBPMUX)
 #include <webp/encode.h>
 #include <webp/mux.h>

@@ -14,7 +14,7 @@
 #include "../common/parse_options.hpp"
 #include "../common/progress.hpp"
 #include "../common/voxel_options.hpp"
-#include "gsnav/core/lower_case.hpp"
+#include "gsnav/core/text.hpp"
 #include "gsnav/io.hpp"
 
 namespace gsnav_navmesh {

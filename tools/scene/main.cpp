@@ -5,9 +5,8 @@
 
 #include "../common/parse_options.hpp"
 #include "../common/progress.hpp"
-#include "gsnav/core/lower_case.hpp"
-#include "gsnav/core/printable.hpp"
 #include "gsnav/core/replace_file.hpp"
+#include "gsnav/core/text.hpp"
 #include "gsnav/io.hpp"
 #include "options.hpp"
 

@@ -6,7 +6,7 @@
 
 #include "../common/check_values.hpp"
 #include "../common/parse_options.hpp"
-#include "gsnav/core/lower_case.hpp"
+#include "gsnav/core/text.hpp"
 #include "gsnav/io/scene_file.hpp"
 
 namespace gsnav_scene {

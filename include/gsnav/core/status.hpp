@@ -9,7 +9,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "gsnav/core/printable.hpp"
+#include "gsnav/core/text.hpp"
 
 namespace gsnav {
 

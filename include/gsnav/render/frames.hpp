@@ -29,7 +29,7 @@ struct RenderStats {
 };
 
 /// Images of a batch of C cameras of one size (H x W pixels), in host memory. Images that were not
-/// requested are empty. Output (detail/frame/output.hpp) defines the values.
+/// requested are empty. Output (frame/rules.hpp) defines the values.
 template <class S>
 struct Frames {
   std::size_t cameras = 0,           ///< number of cameras, C

@@ -5,10 +5,10 @@
 #include <iterator>
 #include <utility>
 
-#include "gsnav/math/functions.hpp"
+#include "gsnav/frame/rules.hpp"
 
-// The images of a frame. A new image needs:
-// - here: a bit of Output, a pointer in FrameImages and a row of kImages;
+// What images of a frame have in common. A new image needs:
+// - a bit of Output and a pointer in FrameImages (frame/rules.hpp), and a row of kImages here;
 // - its value in pixel_value (detail/frame/blend.hpp), and the state for it in BlendState
 //   (detail/frame/blend_splat.hpp);
 // - a vector in Frames, and in kVectors in the order of kImages (render/frames.hpp);
@@ -18,35 +18,6 @@
 // - for tests, its definition in the oracles (detail/eval/oracle_config.hpp, oracle_blend.hpp).
 
 namespace gsnav {
-
-/// Images that a render can produce. Combine them with |. Images that are not requested are not
-/// computed.
-enum Output : unsigned {
-  kRgb = 1u << 0,            ///< [H][W][3], not clamped, over the background
-  kAlpha = 1u << 1,          ///< [H][W], 1 - transmittance; 1 if Quality::normalize_closed applies
-  kMedianDepth = 1u << 2,    ///< [H][W] metres, where transmittance falls through 1/2; 0 if it does not
-  kExpectedDepth = 1u << 3,  ///< [H][W] metres, sum(w z) / sum(w); 0 if sum(w) = 0
-  kAccumulatedDepth = 1u << 4,  ///< [H][W] metres, sum(w z); divided as colours are
-  kFirstHitDepth = 1u << 5,     ///< [H][W] metres, where alpha first reaches first_hit_tau; 0 if it does
-                                ///< not
-};
-
-/// Depths that a compiled blend loop computes. Fewer are faster.
-enum class DepthMode { none, median, all };
-
-/// Pointers to the images of one camera. Null: the image is not requested.
-template <class S>
-struct FrameImages {
-  S* rgb = nullptr;                ///< [H][W][3].
-  S* alpha = nullptr;              ///< [H][W].
-  S* median_depth = nullptr;       ///< [H][W], metres.
-  S* expected_depth = nullptr;     ///< [H][W], metres.
-  S* accumulated_depth = nullptr;  ///< [H][W], metres.
-  S* first_hit_depth = nullptr;    ///< [H][W], metres.
-
-  GSNAV_HD DepthMode depth_mode() const noexcept;  ///< The cheapest mode that gives all these images.
-  bool operator==(const FrameImages&) const = default;
-};
 
 template <class S>
 using ImagePointer = S* FrameImages<S>::*;

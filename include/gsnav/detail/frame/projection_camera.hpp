@@ -4,27 +4,14 @@
 #include <cmath>
 #include <cstdint>
 
-#include "gsnav/frame/compat.hpp"
 #include "gsnav/frame/gaussians.hpp"
+#include "gsnav/frame/rules.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/math/functions.hpp"
 #include "gsnav/math/mat.hpp"
 #include "gsnav/math/quat.hpp"
 
 namespace gsnav {
-
-/// Measure by which Gaussians are sorted from front to back.
-enum class SortOrder : std::uint8_t {
-  z_depth,          ///< depth of the centre along the view axis (INRIA)
-  camera_distance,  ///< distance of the centre from the camera (KHR_gaussian_splatting)
-};
-
-/// Response of a 3D Gaussian along a pixel's ray.
-enum class Response : std::uint8_t {
-  ewa,            ///< linearised on the image plane at the mean (Zwicker et al. 2001); the contract
-  tangent_plane,  ///< linearised on the plane perpendicular to the mean's direction (Huang et al. 2024)
-  ray,            ///< exact: the maximum along the ray
-};
 
 /// Conversion of a float32 key to the integer that is sorted. It keeps all 32 bits, or n of them: the
 /// bits of the key minus those of the near plane, without the lowest ones. With n = 24, 20 bits of the

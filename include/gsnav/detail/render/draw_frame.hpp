@@ -10,12 +10,6 @@
 
 namespace gsnav {
 
-/// Meshes of a frame and their light.
-struct MeshFrame {
-  std::span<const MeshInstance> instances;  ///< instances; their arrays are in the backend's memory
-  MeshLight light{};
-};
-
 /// Draws the images of one camera. Without meshes it calls render_camera; otherwise meshes and Gaussians
 /// are composited (docs/reference/composition.md). `sets` may be empty.
 /// @return the errors of render_camera and draw_meshes; unsupported for Composite::hard_depth with a
