@@ -84,7 +84,7 @@ struct MeshLight {
 /// Meshes of a frame and their light.
 struct MeshFrame {
   std::span<const MeshInstance> instances;  ///< instances; their arrays are in the backend's memory
-  MeshLight light{};                         ///< light on all of them
+  MeshLight light{};                        ///< light on all of them
 };
 
 }  // namespace gsnav
