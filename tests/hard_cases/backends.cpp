@@ -115,8 +115,8 @@ class BatchCases final : public CaseImages<float> {
                                       std::vector<MeshFrame>(cameras.size(), meshes))
                                .frames;
     frames.cameras = cameras.size();
-    frames.width = cameras[0].width;
-    frames.height = cameras[0].height;
+    frames.width = static_cast<std::size_t>(cameras[0].width);
+    frames.height = static_cast<std::size_t>(cameras[0].height);
     record_hashes(frames, name());
     return frames;
   }
