@@ -15,6 +15,14 @@
 
 namespace gsnav::python {
 
+/// True for fields that Python reads as a new list. Its elements must not point into the C++ vector.
+template <class V>
+inline constexpr bool is_list = false;
+template <class V>
+inline constexpr bool is_list<std::vector<V>> = true;
+template <class V, std::size_t N>
+inline constexpr bool is_list<std::array<V, N>> = true;
+
 template <class V>
 struct TypeName {
   static std::string get() {
@@ -79,7 +87,7 @@ class Struct {
     };
     const std::string signature = std::string("def ") + name + "(self, value: " + type + ", /) -> None";
     class_.def_prop_rw(
-        name, [member](T& t) -> V& { return t.*member; },
+        name, [member](T& t) -> std::conditional_t<is_list<V>, V, V&> { return t.*member; },
         [set, type, of = name_, field = std::string(name)](T& t, nb::handle h) {
           if (!set(t, h)) throw wrong_type(of, field, type, h);
         },

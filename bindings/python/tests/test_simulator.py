@@ -221,6 +221,11 @@ def test_settings_can_be_copied_and_pickled():
     episode = gsnav.PointNavEpisode(start_position=[1, 2, 3])
     episode.start_rotation = np.array([0, 0, 1, 0], np.float32)
     assert episode.start_rotation.tolist() == [0, 0, 1, 0] and config.task.max_steps == 3
+    sensor = config.sensors[0]
+    config.sensors = gsnav.rgbd_sensors(8, 8) * 3
+    assert sensor.resolution == [4, 6] and sensor.uuid == "rgb"  # a list that was read is a copy
+    config.sensors[0].uuid = "other"
+    assert config.sensors[0].uuid == "rgb"
     device = gsnav.Device.parse("cpu:2")
     assert pickle.loads(pickle.dumps(device)) == device and device.threads == 2 and device != "cpu:2"
 
