@@ -57,6 +57,8 @@ class Env(BaseEnv):
         self.action_space = _task.action_space()
         self._rgb = _task.rgb_sensor(config, render_mode)
         self.render_mode = render_mode
+        if not self._rgb:
+            self.metadata = {**self.metadata, "render_modes": []}
         self.scene = _task.scene_of(scene, config)
         self._episodes = _task.Episodes([self.scene], episodes, rules)
         self._simulator: Simulator | None = Simulator(device, self.scene, config)

@@ -38,6 +38,7 @@ def test_check_env(people, small):
     check_env(env.unwrapped)  # warnings are errors (pyproject.toml)
     env.close()
     check_env(gsnav.Env(people, config=small))
+    check_env(gsnav.Env(people, config=gsnav.SimulatorConfig(sensors=small.sensors[1:], task=small.task)))
 
 
 def test_make_vec(people, small):
