@@ -19,14 +19,16 @@ from ._gsnav import EpisodeMetrics
 
 def header(identity: Sequence[Any], episodes: Sequence[_task.Episode], piece: int) -> str:
     """First line of the journal of an evaluation: number of environments, scenes and settings; episodes; piece."""
+    if piece < 1:
+        raise InvalidArgument(f"piece = {piece}: must be positive")
     environments, scenes, config = identity
     for scene in scenes:
         if not isinstance(scene, (str, os.PathLike)):
             raise InvalidArgument(f"Workers.evaluate: scene = {type(scene).__name__}: a journal needs scenes by name; "
                                   "pass a name or path, or use rollouts()")
     names = [os.fspath(scene) for scene in scenes]
-    content = json.dumps([environments, names, config, *episodes], default=_task.plain)
-    return json.dumps({"journal": "gsnav.ray", "format": 1, "piece": piece,
+    content = json.dumps([int(environments), names, config, *episodes], default=_task.plain)
+    return json.dumps({"journal": "gsnav.ray", "format": 1, "piece": int(piece),
                        "content": hashlib.sha256(content.encode()).hexdigest()})
 
 
@@ -50,6 +52,8 @@ def metrics(path: pathlib.Path, lines: Sequence[str]) -> list[EpisodeMetrics]:
         try:
             row = json.loads(line)
             values = dict[str, Any]((n, np.inf if v is None else v) for n, v in row["metrics"].items())
+            if values.keys() != set(_task.METRIC_FIELDS):
+                raise ValueError("its metrics are not those of an episode")
             if row["episode"] != i:
                 raise ValueError(f"it is of episode {row['episode']}")
             read.append(EpisodeMetrics(**values))

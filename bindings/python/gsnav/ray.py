@@ -8,6 +8,7 @@ alone. Any number of actors, even if some of them die, therefore gives the bits 
 from __future__ import annotations
 
 import collections
+import copy
 import heapq
 import json
 import os
@@ -104,8 +105,9 @@ class Workers:
         settings: other arguments of VectorEnv, such as `config` and `device`.
         """
         self.deaths = 0  # Number of actors that died and were replaced.
+        settings = {**settings, "config": copy.deepcopy(settings.get("config") or SimulatorConfig())}
         scenes = list(scene) if isinstance(scene, (list, tuple)) else [scene]
-        self._identity = [environments, scenes, settings.get("config", SimulatorConfig())]
+        self._identity = [environments, scenes, settings["config"]]
         self._arguments = (environments, scene, settings)
         self._local = None if actors else Player(*self._arguments)
         self._actors: list[Any] = []

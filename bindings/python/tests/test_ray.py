@@ -87,7 +87,8 @@ def test_a_journal_is_continued(episodes, alone, tmp_path):
     foreign = tmp_path / "notes.txt"
     for text, words in [("my notes", "other episodes"), (whole[0] + "x\n" + "".join(whole[2:]), "line 2"),
                         ("".join([whole[0], whole[2], whole[1], *whole[3:]]), "line 2 .* of episode 1"),
-                        ("".join([*whole[:3], *whole[4:]]), "line 4")]:
+                        ("".join([*whole[:3], *whole[4:]]), "line 4"),
+                        ("".join([*whole[:2], whole[2].replace('"spl"', '"lps"'), *whole[3:]]), "line 3 .* metrics")]:
         foreign.write_text(text)
         with pytest.raises(gsnav.InvalidArgument, match=words):
             workers.evaluate(episodes, policy_maker(), foreign, piece=4)
