@@ -51,10 +51,9 @@ class Tree(unittest.TestCase):
             if group[2]:
                 self.write(f"include/gsnav/{group[2]}.hpp", "#pragma once\n\n// A module.\n\n")
         self.write("include/gsnav/version.hpp", (ROOT / "include/gsnav/version.hpp").read_text())
-        for name, types in make_site.PARTS.items():
-            types = "".join(f"/// A type.\nstruct {t} {{\n}};\n" for t in types)
-            text = f"#pragma once\nnamespace gsnav {{\n{types}}}  // namespace gsnav\n"
-            self.write(f"include/gsnav/detail/{name}", text)
+        rule = "/// A rule.\nstruct Response {\n};\n"
+        self.write("include/gsnav/frame/rules.hpp",
+                   f"#pragma once\nnamespace gsnav {{\n{rule}}}  // namespace gsnav\n")
         self.write("include/gsnav/nav/place.hpp", HEADER)
         self.write("README.md", "![A room](docs/a.svg)\n\n# Name\n\n"
                                 "See [the\npage](docs/a.md#two-words) and [code](src).\n")
