@@ -62,6 +62,7 @@ Frames<S> CaseRenderer<S, B>::render(const std::vector<Placed>& scene,
   BasicRenderer<S, B> renderer(*backend_, config);
   renderer.set_meshes(there.instances);
   Frames<S> frames = renderer.render(there.sets, cameras).value();
+  REQUIRE(frames.stats.size() == cameras.size());  // only batches have none
   record_hashes(frames, this->name());
   return frames;
 }
@@ -72,6 +73,7 @@ Frames<S> CaseRenderer<S, B>::render_with(const GaussianCloud& cloud, const SetE
   const UploadedExtras<B> there(*backend_, cloud, extras);
   BasicRenderer<S, B> renderer(*backend_, config);
   Frames<S> frames = renderer.render(there.set, camera).value();
+  REQUIRE(frames.stats.size() == 1);
   record_hashes(frames, this->name());
   return frames;
 }

@@ -135,8 +135,8 @@ void for_each_backend(const F& f) {
 #endif
 }
 
-/// The same for functions of both precisions, and for batches on a GPU too, whose frames have no
-/// `stats`.
+/// The same for functions of both precisions. It also calls in_float for batches on a GPU. Frames of
+/// batches have no `stats`.
 void visit_renderers(const std::function<void(CaseImages<float>&)>& in_float,
                      const std::function<void(CaseImages<double>&)>& in_double);
 
