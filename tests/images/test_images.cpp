@@ -52,7 +52,7 @@ bool shows_something(const Frames<float>& f) {
 }  // namespace
 
 TEST_CASE("images: every storage and selection of rows draws the same bits on every backend") {
-  int by_regions_count = 0;
+  [[maybe_unused]] int by_regions_count = 0;
   for (const ImageScene& scene : image_scenes()) {
     CAPTURE(scene.name);
     SerialBackend serial;
@@ -94,7 +94,5 @@ TEST_CASE("images: every storage and selection of rows draws the same bits on ev
   }
 #if defined(GSNAV_HAS_CUDA)
   if (CudaBackend::device_count() > 0) CHECK(by_regions_count > 10);
-#else
-  CHECK(by_regions_count == 0);
 #endif
 }
