@@ -74,18 +74,24 @@ def scene_of(scene: Scene, config: SimulatorConfig) -> SimulatorScene:
     return scene
 
 
+def image_shape(sensor: SensorSpec) -> tuple[int, int, int]:
+    """Shape of the images of a sensor, [H][W][C]."""
+    height, width = sensor.resolution
+    return height, width, 3 if sensor.kind in (SensorKind.rgb, SensorKind.normal) else 1
+
+
 def sensor_space(sensor: SensorSpec) -> Box:
     """Space of the images of a sensor, float32 [H][W][C]."""
-    height, width = sensor.resolution
+    shape = image_shape(sensor)
     if sensor.kind == SensorKind.rgb:
-        return Box(0.0, LARGEST, (height, width, 3), np.float32)
+        return Box(0.0, LARGEST, shape, np.float32)
     if sensor.kind == SensorKind.normal:
-        return Box(-1.0, 1.0, (height, width, 3), np.float32)
+        return Box(-1.0, 1.0, shape, np.float32)
     if sensor.kind == SensorKind.depth:
         # Depth is below 0 where the camera is inside a Gaussian (docs/reference/image_contract.md).
-        return Box(-sensor.far_plane, sensor.far_plane, (height, width, 1), np.float32)
+        return Box(-sensor.far_plane, sensor.far_plane, shape, np.float32)
     high = 1.0 if sensor.kind == SensorKind.alpha else LARGEST
-    return Box(0.0, high, (height, width, 1), np.float32)
+    return Box(0.0, high, shape, np.float32)
 
 
 @contextlib.contextmanager
@@ -98,9 +104,8 @@ def memory_for_spaces(config: SimulatorConfig, environments: int) -> Iterator[No
     for sensor in config.sensors:
         sensor.validate()
     try:
-        pixels = sum(math.prod(s.resolution) * (3 if s.kind in (SensorKind.rgb, SensorKind.normal) else 1)
-                     for s in config.sensors)
-        needed, present = 8 * environments * pixels, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        numbers = environments * sum(math.prod(image_shape(s)) for s in config.sensors)
+        needed, present = 8 * numbers, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
         if needed > present > 0:  # two bounds of 4 bytes
             raise MemoryError(f"{needed / 1e9:.0f} GB of {present / 1e9:.0f}")
         yield

@@ -207,13 +207,13 @@ class VectorEnv(BaseVectorEnv):
 
     def _add_step_info(self, infos: dict[str, Any], rows: Any, mask: npt.NDArray[np.bool_]) -> None:
         """Adds the outcomes of actions, 0 where the mask is False."""
-        if mask is self._all:
-            rows = rows.copy()  # one copy of all fields, and one read-only mask
-        for name in _task.INFO_FIELDS:
-            if mask is self._all:
-                infos[name], infos["_" + name] = rows[name], mask
-            else:
+        if mask is not self._all:
+            for name in _task.INFO_FIELDS:
                 self._add(infos, name, np.where(mask, rows[name], False), mask)
+            return
+        rows = rows.copy()  # one copy of all fields, and one read-only mask
+        for name in _task.INFO_FIELDS:
+            infos[name], infos["_" + name] = rows[name], mask
 
     def _add_ends(self, infos: dict[str, Any], step: BatchStep) -> None:
         """Adds metrics and, with SAME_STEP, the last observations and infos of the episodes that ended."""
