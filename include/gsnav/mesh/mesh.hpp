@@ -6,9 +6,6 @@
 #include <span>
 
 #include "gsnav/core/view.hpp"
-#include "gsnav/detail/image/mesh_layer.hpp"
-#include "gsnav/image/camera.hpp"
-#include "gsnav/math/mat.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/math/vec.hpp"
 

@@ -12,8 +12,7 @@
 #include "gsnav/math/vec.hpp"
 #include "gsnav/mesh/mesh.hpp"
 
-// Triangle meshes in the form in which kernels read them. docs/reference/composition.md describes how
-// they are drawn.
+// Meshes of mesh/mesh.hpp in one camera's frame, and the work items of their kernels.
 
 namespace gsnav {
 
