@@ -34,8 +34,8 @@ NB_MODULE(_gsnav_of_main, m) {
   bind_avatar_tracker(m);
 }
 
-/// What Python calls to import the module. nanobind keeps its types per process, and replaces them when
-/// it begins, so a subinterpreter is refused before.
+/// Python calls this function to import the module. nanobind keeps its types per process, and replaces
+/// them at the start of an import. A subinterpreter is therefore refused here.
 extern "C" NB_EXPORT PyObject* PyInit__gsnav() {
   if (PyInterpreterState_GetID(PyInterpreterState_Get()) != 0) {
     PyErr_SetString(PyExc_ImportError,
