@@ -191,32 +191,62 @@ __device__ inline std::uint32_t rank_of_row(const BatchArgs& a, const RegionArgs
   return args.rank_of(source - args.first_rank);
 }
 
-/// Puts rows of equal keys in order of rank, among n rows in order of key.
+/// Puts n <= kHeld rows in order of key and word. Returns true if two keys are equal.
+__device__ inline bool order_rows(uint2* rows, std::uint32_t n) {
+  if (n <= policy::Order::kOfWarp<2>) return n > 1 && order_rows<2>(rows, n);
+  return n <= policy::Order::kOfWarp<4> ? order_rows<4>(rows, n) : order_rows<8>(rows, n);
+}
+
+/// Puts rows of equal keys in order of rank, among n <= kHeld rows in order of key. They are sorted once
+/// more, by the number of their key and their rank. Flat walls have many rows of one key.
 __device__ __noinline__ inline void order_equal_keys(const BatchArgs& a, const RegionArgs& r,
                                                      std::uint32_t camera, uint2* rows,
                                                      std::uint32_t n) {
-  const std::uint32_t lane = threadIdx.x % 32;
-  const auto rank = [&](const uint2& row) { return rank_of_row(a, r, camera, row); };
-  uint2 moved[kHeld / 32];
-  std::uint32_t to[kHeld / 32];
+  constexpr std::uint32_t kPerLane = kHeld / 32;
+  static_assert(kHeld == 256, "a row's place has 8 bits");
+  const std::uint32_t lane = threadIdx.x % 32, up_to_lane = ~0u >> (31 - lane);
+  uint2 row[kPerLane];
+  std::uint32_t run[kPerLane], rank[kPerLane], runs = 0, low = kLastKey, high = 0;
 #pragma unroll
-  for (std::uint32_t e = 0; e < kHeld / 32; ++e) {
+  for (std::uint32_t e = 0; e < kPerLane; ++e) {
     const std::uint32_t i = e * 32 + lane;
-    to[e] = i;
-    if (i >= n) continue;
-    const uint2 row = moved[e] = rows[i];
-    std::uint32_t begin = i, end = i + 1;
-    while (begin > 0 && rows[begin - 1].y == row.y) --begin;
-    while (end < n && rows[end].y == row.y) ++end;
-    if (end - begin == 1) continue;
-    const std::uint32_t mine = rank(row);
-    to[e] = begin;
-    for (std::uint32_t j = begin; j < end; ++j) to[e] += j != i && rank(rows[j]) < mine ? 1u : 0u;
+    row[e] = i < n ? rows[i] : uint2{0, kLastKey};
+    const bool first = i < n && (i == 0 || rows[i - 1].y != row[e].y);
+    const bool alone = first && (i + 1 == n || rows[i + 1].y != row[e].y);
+    const unsigned votes = __ballot_sync(kAll, first);
+    run[e] = runs + static_cast<std::uint32_t>(__popc(votes & up_to_lane)) - 1;
+    runs += static_cast<std::uint32_t>(__popc(votes));
+    rank[e] = kLastKey;
+    if (i >= n || alone) continue;
+    rank[e] = rank_of_row(a, r, camera, row[e]);
+    low = min(low, rank[e]);
+    high = max(high, rank[e]);
   }
+  low = warp_min(low);
+  high = warp_max(high);
+  const int rank_bits = 32 - __clz(static_cast<int>(high - low));
+  // Run, rank and place have up to 48 bits. The leading 32 become the key.
+  const int shift = max(rank_bits - 24, 0);
   __syncwarp();
 #pragma unroll
-  for (std::uint32_t e = 0; e < kHeld / 32; ++e) {
-    if (e * 32 + lane < n) rows[to[e]] = moved[e];
+  for (std::uint32_t e = 0; e < kPerLane; ++e) {
+    const std::uint32_t i = e * 32 + lane, of_run = min(rank[e], high) - low;
+    const unsigned long long number = static_cast<unsigned long long>(run[e]) << rank_bits | of_run;
+    if (i < n)
+      rows[i] = {(of_run & ((1u << shift) - 1)) << 8 | i, static_cast<std::uint32_t>(number >> shift)};
+  }
+  __syncwarp();
+  order_rows(rows, n);
+#pragma unroll
+  for (std::uint32_t e = 0; e < kPerLane; ++e) {
+    const std::uint32_t i = e * 32 + lane, from = i < n ? rows[i].x & 255u : 0u;
+    std::uint32_t word = 0;
+#pragma unroll
+    for (std::uint32_t q = 0; q < kPerLane; ++q) {
+      const std::uint32_t of_lane = __shfl_sync(kAll, row[q].x, static_cast<int>(from % 32));
+      if (from / 32 == q) word = of_lane;
+    }
+    if (i < n) rows[i] = {word, row[e].y};
   }
   __syncwarp();
 }

@@ -150,15 +150,7 @@ class TileReader {
   }
 
   __device__ void order() {
-    bool equal = false;
-    if (held_ <= policy::Order::kOfWarp<2>) {
-      if (held_ > 1) equal = order_rows<2>(rows_, held_);
-    } else if (held_ <= policy::Order::kOfWarp<4>) {
-      equal = order_rows<4>(rows_, held_);
-    } else {
-      equal = order_rows<8>(rows_, held_);
-    }
-    if (equal) order_equal_keys(a_, r_, list_.camera, rows_, held_);
+    if (order_rows(rows_, held_)) order_equal_keys(a_, r_, list_.camera, rows_, held_);
   }
 
   const BatchArgs& a_;
