@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "batch_tile_order.cuh"
+#include "batch_tiles.cuh"
 
 // Sorting for few cameras: parts of lists are sorted separately, by a warp each, or by a block if they
 // are long. For large images, short lists are sorted as a whole.
@@ -56,16 +57,15 @@ __device__ void sort_in_warp(std::uint64_t (&v)[K]) {
   }
 }
 
-/// Sorts adjacent values with equal keys by rank. Usually at most two depths are equal by chance. If
-/// there are many, it returns false and leaves the values in place.
+/// Looks up the ranks of splats whose depth another one has, and swaps neighbours of equal depth.
+/// Usually at most two depths are equal by chance. Returns false if there are many, as on flat walls.
 template <int K>
 __device__ bool order_equals(const BatchArgs& a, std::uint32_t camera, std::uint64_t (&v)[K],
-                             std::uint32_t n) {
+                             std::uint32_t (&rank)[K], std::uint32_t n) {
   constexpr int kMost = Policy::kTieRounds;
   const unsigned lane = threadIdx.x % 32;
   const auto key = [](std::uint64_t value) { return static_cast<std::uint32_t>(value >> 32); };
   std::uint64_t before = __shfl_up_sync(kAll, v[K - 1], 1), after = __shfl_down_sync(kAll, v[0], 1);
-  std::uint32_t rank[K];
   bool any = false;
 #pragma unroll
   for (int k = 0; k < K; ++k) {
@@ -109,37 +109,78 @@ __device__ bool order_equals(const BatchArgs& a, std::uint32_t camera, std::uint
   return false;
 }
 
-/// Sorts a part of at most K * 32 pairs. Returns false if it cannot.
+/// Replaces values in order of depth by numbers for another sort: the number of the depth, the rank and
+/// the value's place, from the highest bits on.
 template <int K>
-__device__ bool order_part(const BatchArgs& a, const ListPart& part, std::uint32_t camera) {
+__device__ void number_by_rank(std::uint64_t (&v)[K], const std::uint32_t (&rank)[K], std::uint32_t n) {
+  const unsigned lane = threadIdx.x % 32;
+  const std::uint64_t before = __shfl_up_sync(kAll, v[K - 1], 1);
+  bool next[K];
+  std::uint32_t runs = 0;
+#pragma unroll
+  for (int k = 0; k < K; ++k) {
+    const std::uint32_t i = K * lane + static_cast<unsigned>(k);
+    next[k] = i > 0 && (k > 0 ? v[k - 1] : before) >> 32 != v[k] >> 32;
+    runs += next[k] ? 1u : 0u;
+  }
+  std::uint32_t run = sum_to_lane(runs) - runs;
+#pragma unroll
+  for (int k = 0; k < K; ++k) {
+    const std::uint32_t i = K * lane + static_cast<unsigned>(k);
+    run += next[k] ? 1u : 0u;
+    v[k] = i < n ? std::uint64_t{run} << 40 | std::uint64_t{rank[k]} << 8 | i : ~std::uint64_t{0};
+  }
+}
+
+/// Sorts a part of at most K * 32 pairs.
+template <int K>
+__device__ void order_part(const BatchArgs& a, const ListPart& part, std::uint32_t camera) {
   static_assert(K > 1, "the first and last of a lane are two");
+  static_assert(K * 32 <= 256, "a place has 8 bits");
   const unsigned lane = threadIdx.x % 32;
   const std::uint32_t n = part.end - part.begin;
+  Pair* const pairs = a.pairs + part.begin;
   std::uint64_t v[K];
 #pragma unroll
   for (unsigned k = 0; k < K; ++k) {
     const std::uint32_t i = 32 * k + lane;
     v[k] = ~std::uint64_t{0};  // Comes last.
     if (i < n) {
-      const Pair pair = a.pairs[part.begin + i];
+      const Pair pair = pairs[i];
       v[k] = std::uint64_t{pair.key} << 32 | pair.slot;
     }
   }
-  sort_in_warp(v);
-  if (!order_equals(a, camera, v, n)) return false;
+  const auto store = [&](const auto& slot_of) {
+#pragma unroll
+    for (unsigned k = 0; k < K; ++k) {
+      if (K * lane + k < n) pairs[K * lane + k].slot = slot_of(k);
+    }
+    __syncwarp();
+  };
+  // One copy of the sort's code, which is long.
+#pragma unroll 1
+  for (bool by_rank = false;; by_rank = true) {
+    sort_in_warp(v);
+    if (by_rank) break;
+    std::uint32_t rank[K];
+    const bool done = order_equals(a, camera, v, rank, n);
+    store([&](unsigned k) { return static_cast<std::uint32_t>(v[k]); });
+    if (done) return;
+    number_by_rank(v, rank, n);
+  }
+  std::uint32_t slot[K];
 #pragma unroll
   for (unsigned k = 0; k < K; ++k) {
-    const std::uint32_t i = K * lane + k;
-    if (i < n) a.pairs[part.begin + i].slot = static_cast<std::uint32_t>(v[k]);
+    slot[k] = K * lane + k < n ? pairs[v[k] & 255u].slot : 0u;
   }
-  return true;
+  __syncwarp();
+  store([&](unsigned k) { return slot[k]; });
 }
 
 /// Returns true if all parts are complete. If not, the call will be repeated.
 __device__ bool is_whole(const BatchArgs& a) { return a.counters->pairs <= a.pair_capacity; }
 
-/// Sorts one part per warp. Parts that are too long, or have many equal keys, are left to
-/// order_long_kernel.
+/// Sorts one part per warp. Parts that are too long are left to order_long_kernel.
 __global__ void __launch_bounds__(kThreads) order_kernel(const BatchArgs a) {
   if (!is_whole(a)) return;
   const std::uint32_t count = a.counters->parts;
@@ -147,10 +188,13 @@ __global__ void __launch_bounds__(kThreads) order_kernel(const BatchArgs a) {
   for (std::uint32_t p = blockIdx.x * kWarps + threadIdx.x / 32; p < count; p += gridDim.x * kWarps) {
     const ListPart part = a.parts[p];
     const std::uint32_t n = part.end - part.begin, camera = part.tile / tiles;
-    const bool done = n <= Policy::kOfWarp<4>
-                          ? order_part<4>(a, part, camera)
-                          : n <= Policy::kOfWarp<8> && order_part<8>(a, part, camera);
-    if (!done && threadIdx.x % 32 == 0) a.long_parts[atomicAdd(&a.counters->long_parts, 1u)] = p;
+    if (n <= Policy::kOfWarp<4>) {
+      order_part<4>(a, part, camera);
+    } else if (n <= Policy::kOfWarp<8>) {
+      order_part<8>(a, part, camera);
+    } else if (threadIdx.x % 32 == 0) {
+      a.long_parts[atomicAdd(&a.counters->long_parts, 1u)] = p;
+    }
   }
 }
 
@@ -172,21 +216,22 @@ __global__ void __launch_bounds__(kThreads) order_long_kernel(const BatchArgs a)
   }
 }
 
-/// Sorts one list per warp. Lists that are too long, or have many equal keys, are sorted when they are
-/// drawn.
+/// Sorts one list per warp. Lists that are too long are sorted when they are drawn.
 __global__ void __launch_bounds__(kThreads) order_lists_kernel(const BatchArgs a) {
   const std::uint32_t tiles = static_cast<std::uint32_t>(a.grid.count());
   for (std::uint32_t i = blockIdx.x * kWarps + threadIdx.x / 32; i < a.tiles; i += gridDim.x * kWarps) {
     const std::uint32_t tile = a.tile_order[i], camera = tile / tiles, n = a.tile_counts[tile];
     const std::uint32_t begin = a.tile_begins[tile];
     const ListPart list{tile, 0, begin, begin + n};
-    const bool together = n <= a.list_room;
-    const bool done = !together                 ? false
-                      : n <= Policy::kOfWarp<2> ? order_part<2>(a, list, camera)
-                      : n <= Policy::kOfWarp<4>
-                          ? order_part<4>(a, list, camera)
-                          : n <= Policy::kOfWarp<8> && order_part<8>(a, list, camera);
-    if (done && threadIdx.x % 32 == 0) a.tile_order[i] = tile | kListInOrder;
+    if (n > a.list_room || n > Policy::kOfWarp<8>) continue;
+    if (n <= Policy::kOfWarp<2>) {
+      order_part<2>(a, list, camera);
+    } else if (n <= Policy::kOfWarp<4>) {
+      order_part<4>(a, list, camera);
+    } else {
+      order_part<8>(a, list, camera);
+    }
+    if (threadIdx.x % 32 == 0) a.tile_order[i] = tile | kListInOrder;
   }
 }
 

@@ -79,7 +79,7 @@ struct Order {
   static constexpr std::uint32_t kOfWarp = 32u * E;
   static constexpr unsigned kFetched = 8;  ///< Pairs that a thread requests at a time while
                                            ///< partitioning.
-  static constexpr int kTieRounds = 8;     ///< Largest number of passes that swap neighbours of equal
+  static constexpr int kTieRounds = 12;    ///< Largest number of passes that swap neighbours of equal
                                            ///< depth.
   static constexpr unsigned kPartBlocks = 8, kLongBlocks = 6, kListBlocks = 16;
 };
