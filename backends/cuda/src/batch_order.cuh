@@ -35,7 +35,9 @@ struct OrderShared {
       };
     };
     std::uint32_t keys[kOrderBatch];
+    std::uint32_t ranks[kOrderBatch];  ///< Valid where keys are equal.
   };
+  static_assert(sizeof(Sorting) <= kOrderLent);
   union {
     Sorting sorting;
     unsigned char lent[kOrderLent];  ///< Memory for the caller between calls.
@@ -47,7 +49,8 @@ struct OrderShared {
   std::uint32_t next_bin[kOrderLevels];
   std::uint32_t cursors[kOrderBins];
   std::uint32_t low, high;
-  int long_run;
+  int long_run, shift;        ///< Whether the batch has a long bucket; a bucket has 2^shift keys.
+  std::uint32_t largest_key;  ///< The batch's largest key minus its smallest.
 };
 inline constexpr int kByRank = -1;
 
@@ -79,15 +82,24 @@ __device__ __noinline__ inline void sort_by_rank(OrderShared& s, const BatchArgs
                                                  std::uint32_t camera, std::uint32_t n) {
   constexpr int kItems = kOrderItems;
   std::uint32_t rank[kItems], index[kItems], key[kItems], slot[kItems];
+  std::uint32_t lowest = 0xffffffffu, highest = 0;
   for (int j = 0; j < kItems; ++j) {
     index[j] = threadIdx.x * kItems + static_cast<std::uint32_t>(j);
-    rank[j] = index[j] < n ? rank_of(a, camera, s.slots[index[j]]) : 0xffffffffu;
+    rank[j] = 0xffffffffu;
+    if (index[j] >= n) continue;
+    rank[j] = rank_of(a, camera, s.slots[index[j]]);
+    lowest = min(lowest, rank[j]);
+    highest = max(highest, rank[j]);
   }
-  OrderSort(s.sorting.sort).Sort(rank, index, 0, 32);
-  // Entries beyond the pairs come last. Both sorts are stable.
+  block_range(s, lowest, highest);
+  lowest = s.low;
+  const std::uint32_t ranks = s.high - lowest;
+  // Entries beyond the pairs come last. Both sorts are stable, and read only the bits that differ.
+  for (int j = 0; j < kItems; ++j) rank[j] = index[j] < n ? rank[j] - lowest : 0xffffffffu;
+  OrderSort(s.sorting.sort).Sort(rank, index, 0, min(bits_for(ranks) + 1, 32));
   for (int j = 0; j < kItems; ++j) key[j] = index[j] < n ? s.sorting.keys[index[j]] : 0xffffffffu;
   __syncthreads();
-  OrderSort(s.sorting.sort).Sort(key, index, 0, 32);
+  OrderSort(s.sorting.sort).Sort(key, index, 0, min(bits_for(s.largest_key) + 1, 32));
   for (int j = 0; j < kItems; ++j) slot[j] = s.slots[index[j]];
   __syncthreads();
   for (int j = 0; j < kItems; ++j)
@@ -95,21 +107,51 @@ __device__ __noinline__ inline void sort_by_rank(OrderShared& s, const BatchArgs
   __syncthreads();
 }
 
-/// Position of the splat at `at` among those of its bucket [begin, end), by (key, rank).
-__device__ inline std::uint32_t place_in_bucket(const OrderShared& s, const BatchArgs& a,
-                                                std::uint32_t camera, std::uint32_t begin,
-                                                std::uint32_t end, std::uint32_t at) {
-  const std::uint32_t key = s.sorting.keys[at];
-  std::uint32_t before = 0;
+/// Place of the first splat with this key in the bucket [begin, end). Sets `tied` if it has several.
+__device__ inline std::uint32_t place_of_key(const OrderShared& s, std::uint32_t begin,
+                                             std::uint32_t end, std::uint32_t key, bool& tied) {
+  std::uint32_t place = begin, equal = 0;
+#pragma unroll 1
   for (std::uint32_t i = begin; i < end; ++i) {
     const std::uint32_t other = s.sorting.keys[i];
-    if (other < key) {
-      ++before;
-    } else if (other == key && i != at) {
-      before += rank_of(a, camera, s.slots[i]) < rank_of(a, camera, s.slots[at]) ? 1u : 0u;
-    }
+    place += other < key ? 1u : 0u;
+    equal += other == key ? 1u : 0u;
   }
-  return begin + before;
+  tied = tied || equal > 1;
+  return place;
+}
+
+/// Sorts a batch that lies in buckets by (key, rank). Each rank is looked up once.
+__device__ __noinline__ inline void sort_buckets(OrderShared& s, const BatchArgs& a,
+                                                 std::uint32_t camera, std::uint32_t n) {
+  const int shift = s.shift;
+  std::uint32_t place[kOrderItems], slot[kOrderItems];
+  const auto for_pairs = [&](const auto& f) {
+    for (unsigned j = 0; j < kOrderItems; ++j) {
+      const std::uint32_t at = threadIdx.x + j * kOrderThreads;
+      if (at >= n) continue;
+      const std::uint32_t key = s.sorting.keys[at], bucket = key >> shift;
+      f(j, at, key, s.sorting.buckets[bucket], s.sorting.buckets[bucket + 1]);
+    }
+    __syncthreads();
+  };
+  for_pairs(
+      [&](unsigned j, std::uint32_t at, std::uint32_t key, std::uint32_t begin, std::uint32_t end) {
+        bool tied = false;
+        place[j] = place_of_key(s, begin, end, key, tied);
+        slot[j] = s.slots[at];
+        s.sorting.ranks[at] = tied ? rank_of(a, camera, slot[j]) : 0;
+      });
+  for_pairs(
+      [&](unsigned j, std::uint32_t at, std::uint32_t key, std::uint32_t begin, std::uint32_t end) {
+        const std::uint32_t rank = s.sorting.ranks[at];
+#pragma unroll 1
+        for (std::uint32_t i = begin; i < end; ++i)
+          place[j] += s.sorting.keys[i] == key && s.sorting.ranks[i] < rank ? 1u : 0u;
+      });
+  for_pairs([&](unsigned j, std::uint32_t, std::uint32_t, std::uint32_t, std::uint32_t) {
+    s.slots[place[j]] = slot[j];
+  });
 }
 
 /// Array of pairs with offset indices: `shift` is added to indices below `rest`, `rest_shift` to the
@@ -122,11 +164,14 @@ struct PairsAt {
   }
 };
 
-/// Sorts n pairs, from `begin_pair` on, into s.slots. All keys lie in [low, high]. low > high means that
-/// the range is unknown.
-__device__ __noinline__ inline void sort_batch(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
-                                               const PairsAt pairs, std::uint32_t begin_pair,
-                                               std::uint32_t n, std::uint32_t low, std::uint32_t high) {
+/// Equal keys that sort_by_key has found.
+enum class Ties { none, few, many };
+
+/// Sorts n pairs, from `begin_pair` on, into s.slots by key. All keys lie in [low, high]. low > high
+/// means that the range is unknown. If there are ties, the pairs lie in buckets of 2^shift keys.
+__device__ __noinline__ inline Ties sort_by_key(OrderShared& s, const PairsAt pairs,
+                                                std::uint32_t begin_pair, std::uint32_t n,
+                                                std::uint32_t low, std::uint32_t high) {
   Pair pair[kOrderItems];
   std::uint32_t place[kOrderItems];
   for (unsigned j = 0; j < kOrderItems; ++j) {
@@ -146,7 +191,11 @@ __device__ __noinline__ inline void sort_batch(OrderShared& s, const BatchArgs& 
   const int shift = max(0, bits_for(high - low) - kBucketBits);
   auto* const mine = reinterpret_cast<uint4*>(s.sorting.buckets + threadIdx.x * kThreadBuckets);
   for (int k = 0; k < kThreadBuckets / 4; ++k) mine[k] = {0, 0, 0, 0};
-  if (threadIdx.x == 0) s.long_run = 0;
+  if (threadIdx.x == 0) {
+    s.long_run = 0;
+    s.shift = shift;
+    s.largest_key = high - low;
+  }
   __syncthreads();
   for (unsigned j = 0; j < kOrderItems; ++j) {
     if (threadIdx.x + j * kOrderThreads >= n) continue;
@@ -181,18 +230,29 @@ __device__ __noinline__ inline void sort_batch(OrderShared& s, const BatchArgs& 
     s.slots[place[j]] = pair[j].slot;
   }
   __syncthreads();
-  if (s.long_run != 0) return sort_by_rank(s, a, camera, n);
+  if (s.long_run != 0) return Ties::many;
+  bool tied = false;
   for (unsigned j = 0; j < kOrderItems; ++j) {
     if (threadIdx.x + j * kOrderThreads >= n) continue;
     const std::uint32_t bucket = pair[j].key >> shift;
     const std::uint32_t first = s.sorting.buckets[bucket], last = s.sorting.buckets[bucket + 1];
-    if (last - first > 1) place[j] = place_in_bucket(s, a, camera, first, last, place[j]);
+    if (last - first > 1) place[j] = place_of_key(s, first, last, pair[j].key, tied);
   }
-  __syncthreads();
+  if (__syncthreads_or(tied ? 1 : 0) != 0) return Ties::few;
   for (unsigned j = 0; j < kOrderItems; ++j) {
     if (threadIdx.x + j * kOrderThreads < n) s.slots[place[j]] = pair[j].slot;
   }
   __syncthreads();
+  return Ties::none;
+}
+
+/// Sorts n pairs, from `begin_pair` on, into s.slots by (key, rank). For low and high see sort_by_key.
+__device__ inline void sort_batch(OrderShared& s, const BatchArgs& a, std::uint32_t camera,
+                                  const PairsAt pairs, std::uint32_t begin_pair, std::uint32_t n,
+                                  std::uint32_t low, std::uint32_t high) {
+  const Ties ties = sort_by_key(s, pairs, begin_pair, n, low, high);
+  if (ties == Ties::few) sort_buckets(s, a, camera, n);
+  if (ties == Ties::many) sort_by_rank(s, a, camera, n);
 }
 
 /// Calls f(pair) for each pair in [begin, end). Several pairs are fetched at a time, because one block
