@@ -47,74 +47,94 @@ Result<FreeSensors> FreeSensors::create(std::vector<SensorSpec> sensors) {
     if (!pinhole && cube == nullptr) cube = std::make_shared<const CubeMap>(s);
     out.cubes_.push_back(std::move(cube));
   }
-  out.images_.resize(sensors.size());
   out.frames_.resize(sensors.size());
+  out.drawn_.resize(sensors.size());
   out.sensors_ = std::move(sensors);
   return out;
 }
 
-Status FreeSensors::render(std::span<const SensorPose> poses, const Render& render) {
-  if (poses.size() != sensors_.size()) {
+Status FreeSensors::render(std::span<const SensorPose> poses, const Render& render, std::size_t places) {
+  const std::size_t n = sensors_.size();
+  if (places == 0 || poses.size() != n * places) {
     return {Errc::invalid_argument, "FreeSensors: " + std::to_string(poses.size()) + " poses for " +
-                                        std::to_string(sensors_.size()) + " sensors"};
+                                        std::to_string(n) + " sensors at " + std::to_string(places) +
+                                        " places"};
   }
   for (std::size_t i = 0; i < poses.size(); ++i) {
     if (!is_finite(poses[i].position) || !finite_unit(poses[i].rotation)) {
       return {Errc::invalid_argument,
-              "SensorPose of \"" + sensors_[i].uuid +
+              "SensorPose of \"" + sensors_[i % n].uuid +
                   "\": the position must be finite and the rotation have unit length"};
     }
   }
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    std::size_t drawn = 0;
-    while (drawn < i && !(same_camera(sensors_[drawn], sensors_[i]) && equal(poses[drawn], poses[i])))
-      ++drawn;
-    if (drawn == i) {
-      if (Status s = shoot(i, poses[i], render); !s) return s;
+  const auto same = [&](std::size_t a, std::size_t b) {
+    if (!same_camera(sensors_[a], sensors_[b])) return false;
+    for (std::size_t at = 0; at < poses.size(); at += n) {
+      if (!equal(poses[at + a], poses[at + b])) return false;
     }
-    fill(i, drawn);
+    return true;
+  };
+  for (std::size_t i = 0; i < n; ++i) {
+    std::size_t drawn = 0;
+    while (drawn < i && !same(drawn, i)) ++drawn;
+    drawn_[i] = drawn;
+    if (drawn == i) {
+      if (Status s = shoot(i, poses, render); !s) return s;
+    }
   }
   return {};
 }
 
-Status FreeSensors::shoot(std::size_t sensor, const SensorPose& pose, const Render& render) {
-  const Camera camera = sensor_camera(sensors_[sensor], pose.position, pose.rotation);
+Status FreeSensors::shoot(std::size_t sensor, std::span<const SensorPose> poses, const Render& render) {
   ++render_count_;
-  if (cubes_[sensor] == nullptr) return render(std::span(&camera, 1), frames_[sensor]);
-  std::vector<Camera> faces;
-  for (const std::size_t face : cubes_[sensor]->faces())
-    faces.push_back(cubes_[sensor]->face_camera(camera, face));
-  return render(faces, frames_[sensor]);
+  std::vector<Camera> cameras;
+  for (std::size_t at = sensor; at < poses.size(); at += sensors_.size()) {
+    const Camera camera = sensor_camera(sensors_[sensor], poses[at].position, poses[at].rotation);
+    const CubeMap* const cube = cubes_[sensor].get();
+    if (cube == nullptr) {
+      cameras.push_back(camera);
+    } else {
+      for (const std::size_t face : cube->faces()) cameras.push_back(cube->face_camera(camera, face));
+    }
+  }
+  return render(cameras, frames_[sensor]);
 }
 
-void FreeSensors::fill(std::size_t sensor, std::size_t drawn) {
+std::vector<float> FreeSensors::image(std::size_t sensor, std::size_t place) const {
   const SensorSpec& spec = sensors_[sensor];
-  const Frames<float>& frames = frames_[drawn];
+  const Frames<float>& frames = frames_[drawn_[sensor]];
   const bool depth = spec.kind == SensorKind::depth;
   const std::vector<float>& from = depth                          ? frames.median_depth
                                    : spec.kind == SensorKind::rgb ? frames.rgb
                                                                   : frames.alpha;
-  std::vector<float>& out = images_[sensor];
   const auto channels = static_cast<std::size_t>(channels_of(spec.kind));
-  out.resize(static_cast<std::size_t>(spec.resolution[0]) *
-             static_cast<std::size_t>(spec.resolution[1]) * channels);
+  const std::size_t size = static_cast<std::size_t>(spec.resolution[0]) *
+                           static_cast<std::size_t>(spec.resolution[1]) * channels;
+  std::vector<float> out;
   if (const CubeMap* const cube = cubes_[sensor].get()) {
     const std::size_t face_size =
         static_cast<std::size_t>(cube->side()) * static_cast<std::size_t>(cube->side()) * channels;
     std::array<const float*, CubeMap::kFaces> faces{};
-    std::size_t next = 0;
-    for (const std::size_t face : cube->faces()) faces[face] = from.data() + face_size * next++;
+    const float* next = from.data() + place * cube->faces().size() * face_size;
+    for (const std::size_t face : cube->faces()) {
+      faces[face] = next;
+      next += face_size;
+    }
+    out.resize(size);
     if (depth) {
       cube->sample_depth(faces, out);
     } else {
       cube->sample_color(faces, channels, out);
     }
   } else {
-    std::copy(from.begin(), from.end(), out.begin());
+    const float* const first = from.data() + place * size;
+    out.assign(first, first + size);
   }
-  if (!depth) return;
-  const CutDepth cut(out.data(), spec.far_plane);
-  for (std::size_t i = 0; i < out.size(); ++i) cut(i);
+  if (depth) {
+    const CutDepth cut(out.data(), spec.far_plane);
+    for (std::size_t i = 0; i < out.size(); ++i) cut(i);
+  }
+  return out;
 }
 
 }  // namespace gsnav

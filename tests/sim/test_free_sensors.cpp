@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "gsnav/backends/serial.hpp"
@@ -69,7 +70,8 @@ TEST_CASE("free sensors: at the poses of an agent's sensors they have the simula
     const std::vector<SensorPose> poses(config.sensors.size(), pose);
     free.render(poses, by(sim)).throw_if_error();
     for (std::size_t i = 0; i < config.sensors.size(); ++i) {
-      const auto want = seen.images[i].data, got = free.image(i);
+      const auto want = seen.images[i].data;
+      const std::vector<float> got = free.image(i);
       REQUIRE(got.size() == want.size());
       CHECK(std::equal(got.begin(), got.end(), want.begin()));
     }
@@ -89,10 +91,50 @@ TEST_CASE("free sensors: sensors with other poses do not share a render") {
   const SensorPose ahead{{4.6, 1.5, 3.6}, {1, 0, 0, 0}}, back{{4.6, 1.5, 3.6}, {0, 0, 1, 0}};
   free.render(std::vector{ahead, back}, by(sim)).throw_if_error();
   CHECK(free.render_count() == 2);
-  CHECK_FALSE(std::equal(free.image(0).begin(), free.image(0).end(), free.image(1).begin()));
+  CHECK(free.image(0) != free.image(1));
   free.render(std::vector{back, back}, by(sim)).throw_if_error();
   CHECK(free.render_count() == 3);
-  CHECK(std::equal(free.image(0).begin(), free.image(0).end(), free.image(1).begin()));
+  CHECK(free.image(0) == free.image(1));
+}
+
+TEST_CASE("free sensors: many places are drawn in one call per camera, with the bits of single ones") {
+  SerialBackend backend;
+  SimulatorConfig config;
+  config.rendering = false;
+  auto sim = make_simulator(backend, flat_scene(), config).value();
+  sim.reset(to_kitchen()).value();
+  auto together = FreeSensors::create(all_kinds()).value();
+  auto alone = FreeSensors::create(all_kinds()).value();
+  const std::size_t n = together.sensors().size();
+  std::vector<SensorPose> poses;
+  for (const double yaw : {0.0, 0.7, 2.1}) {
+    const Quatd turned{std::cos(yaw / 2), 0, std::sin(yaw / 2), 0};
+    for (std::size_t i = 0; i < n; ++i) poses.push_back({{4.6 - yaw / 10, 1.5, 3.6}, turned});
+  }
+  std::size_t most = 0;
+  const FreeSensors::Render render = by(sim);
+  const auto counted = [&](std::span<const Camera> cameras, Frames<float>& out) {
+    most = std::max(most, cameras.size());
+    return render(cameras, out);
+  };
+  together.render(poses, counted, 3).throw_if_error();
+  CHECK(together.render_count() == 3);
+  CHECK(most >= 3 * 5);  // Cubes of five or six faces.
+  for (std::size_t place = 0; place < 3; ++place) {
+    alone.render(std::span(poses).subspan(place * n, n), render).throw_if_error();
+    for (std::size_t i = 0; i < n; ++i) CHECK(together.image(i, place) == alone.image(i));
+  }
+  CHECK(together.image(0, 0) != together.image(0, 2));
+
+  // Two sensors that agree at one place only have renders of their own.
+  auto pair = FreeSensors::create({sensor("a", SensorKind::rgb, SensorModel::pinhole, 8, 8),
+                                   sensor("b", SensorKind::rgb, SensorModel::pinhole, 8, 8)})
+                  .value();
+  const SensorPose ahead = poses.front(), aside = poses.back();
+  pair.render(std::vector{ahead, ahead, ahead, aside}, render, 2).throw_if_error();
+  CHECK(pair.render_count() == 2);
+  CHECK(pair.image(0, 0) == pair.image(1, 0));
+  CHECK(pair.image(0, 1) != pair.image(1, 1));
 }
 
 TEST_CASE("free sensors: errors name the sensor") {
@@ -108,6 +150,7 @@ TEST_CASE("free sensors: errors name the sensor") {
     return {Errc::backend_failure, "rendered"};
   };
   CHECK(free.render({}, never).code() == Errc::invalid_argument);
+  CHECK(free.render({}, never, 0).code() == Errc::invalid_argument);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const SensorPose& bad : {SensorPose{{nan, 0, 0}, {1, 0, 0, 0}}, SensorPose{{}, {2, 0, 0, 0}},
                                 SensorPose{{}, {nan, 0, 0, 0}}}) {
@@ -117,4 +160,5 @@ TEST_CASE("free sensors: errors name the sensor") {
   }
   const SensorPose good{{}, {1, 0, 0, 0}};
   CHECK(free.render(std::span(&good, 1), never).code() == Errc::backend_failure);
+  CHECK(free.render(std::span(&good, 1), never, 2).code() == Errc::invalid_argument);
 }

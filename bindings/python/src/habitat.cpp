@@ -4,7 +4,13 @@
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 
+#include <algorithm>
+#include <atomic>
+#include <future>
 #include <memory>
+#include <span>
+#include <string>
+#include <vector>
 
 #include "arrays.hpp"
 #include "bind.hpp"
@@ -33,18 +39,28 @@ void make(PythonGreedy* self, std::shared_ptr<const NavMesh> mesh, const Vec3d& 
 struct PythonFreeSensors {
   FreeSensors sensors;
   Renderer renderer;
+  RenderConfig config;
   Busy busy;
 };
+
+/// Images that sensors show, a bitmask.
+unsigned outputs_of(const FreeSensors& sensors) {
+  unsigned out = sensors.sensors().empty() ? kRgb : 0;
+  for (const SensorSpec& s : sensors.sensors()) {
+    out |= s.kind == SensorKind::rgb ? kRgb : s.kind == SensorKind::depth ? kMedianDepth : kAlpha;
+  }
+  return out;
+}
 
 void make_sensors(PythonFreeSensors* self, const DeviceArg& device, const SceneArg& scene,
                   std::vector<SensorSpec> specs, RenderOptions options) {
   const Device chosen = device.value();
   check_fork(chosen, "FreeSensors");
   const ReleaseGil release;
-  options.render.outputs = kRgb | kAlpha | kMedianDepth;
   FreeSensors sensors = FreeSensors::create(std::move(specs)).value();
+  options.render.outputs = outputs_of(sensors);
   Renderer renderer = Renderer::create(chosen, scene.scene, options).value();
-  new (self) PythonFreeSensors{std::move(sensors), std::move(renderer), {}};
+  new (self) PythonFreeSensors{std::move(sensors), std::move(renderer), options.render, {}};
 }
 
 /// An image for Python, made without the GIL.
@@ -53,11 +69,11 @@ struct Seen {
   std::vector<float> numbers;        ///< Images of other kinds.
 };
 
-Seen seen_by(const FreeSensors& sensors, std::size_t i) {
-  const std::span<const float> image = sensors.image(i);
+Seen seen_by(const FreeSensors& sensors, std::size_t i, std::size_t place) {
+  std::vector<float> image = sensors.image(i, place);
   Seen out;
   if (sensors.sensors()[i].kind != SensorKind::rgb) {
-    out.numbers.assign(image.begin(), image.end());
+    out.numbers = std::move(image);
     return out;
   }
   out.colors.assign(image.size() / 3 * 4, 255);
@@ -70,26 +86,46 @@ Seen seen_by(const FreeSensors& sensors, std::size_t i) {
 void set_sensors(PythonFreeSensors& self, std::vector<SensorSpec> specs) {
   const Busy::Hold hold(self.busy, "FreeSensors.set_sensors");
   const ReleaseGil release;
-  self.sensors = FreeSensors::create(std::move(specs)).value();
+  FreeSensors sensors = FreeSensors::create(std::move(specs)).value();
+  self.config.outputs = outputs_of(sensors);
+  self.renderer.set_config(self.config).throw_if_error();
+  self.sensors = std::move(sensors);
 }
 
-nb::dict draw(PythonFreeSensors& self, const std::vector<std::pair<Vec3d, Quatd>>& poses, double time) {
-  const Busy::Hold hold(self.busy, "FreeSensors.render");
-  check_fork(self.renderer.device(), "FreeSensors.render");
-  std::vector<SensorPose> places;
-  for (const auto& [position, rotation] : poses) places.push_back({position, rotation});
-  std::vector<Seen> seen;
-  {
-    const ReleaseGil release;
-    self.sensors
-        .render(places, [&](std::span<const Camera> cameras,
-                            Frames<float>& out) { return self.renderer.render(cameras, out, time); })
-        .throw_if_error();
-    for (std::size_t i = 0; i < places.size(); ++i) seen.push_back(seen_by(self.sensors, i));
+using PosePairs = std::vector<std::pair<Vec3d, Quatd>>;
+
+/// Images of all sensors at all places, those of a place together. Without the GIL.
+std::vector<Seen> draw(PythonFreeSensors& self, const std::vector<SensorPose>& poses, std::size_t places,
+                       double time, std::size_t threads) {
+  self.sensors
+      .render(
+          poses,
+          [&](std::span<const Camera> cameras, Frames<float>& out) {
+            return self.renderer.render(cameras, out, time);
+          },
+          places)
+      .throw_if_error();
+  std::vector<Seen> seen(poses.size());
+  const std::size_t sensors = self.sensors.sensors().size();
+  std::atomic<std::size_t> next{0};
+  const auto work = [&] {
+    for (std::size_t i = next++; i < seen.size(); i = next++) {
+      seen[i] = seen_by(self.sensors, i % sensors, i / sensors);
+    }
+  };
+  std::vector<std::future<void>> others;  // A future passes errors on, and waits when it is destroyed.
+  for (std::size_t t = 1; t < std::min(threads, seen.size()); ++t) {
+    others.push_back(std::async(std::launch::async, work));
   }
+  work();
+  for (std::future<void>& other : others) other.get();
+  return seen;
+}
+
+nb::dict named(const FreeSensors& sensors, std::span<Seen> seen) {
   nb::dict out;
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const SensorSpec& spec = self.sensors.sensors()[i];
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    const SensorSpec& spec = sensors.sensors()[i];
     const auto rows = static_cast<std::size_t>(spec.resolution[0]);
     const auto columns = static_cast<std::size_t>(spec.resolution[1]);
     out[nb::str(spec.uuid.c_str())] = spec.kind == SensorKind::rgb
@@ -97,6 +133,35 @@ nb::dict draw(PythonFreeSensors& self, const std::vector<std::pair<Vec3d, Quatd>
                                           : array_from(std::move(seen[i].numbers), {rows, columns});
   }
   return out;
+}
+
+nb::list draw_places(PythonFreeSensors& self, const std::vector<PosePairs>& places, double time,
+                     std::size_t threads) {
+  const Busy::Hold hold(self.busy, "FreeSensors.render_places");
+  check_fork(self.renderer.device(), "FreeSensors.render_places");
+  const std::size_t sensors = self.sensors.sensors().size();
+  std::vector<SensorPose> poses;
+  for (const PosePairs& place : places) {
+    if (place.size() != sensors) {
+      throw Error(Errc::invalid_argument, "FreeSensors: " + std::to_string(place.size()) +
+                                              " poses for " + std::to_string(sensors) + " sensors");
+    }
+    for (const auto& [position, rotation] : place) poses.push_back({position, rotation});
+  }
+  std::vector<Seen> seen;
+  if (!places.empty()) {
+    const ReleaseGil release;
+    seen = draw(self, poses, places.size(), time, threads);
+  }
+  nb::list out;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    out.append(named(self.sensors, std::span(seen).subspan(i * sensors, sensors)));
+  }
+  return out;
+}
+
+nb::object draw_place(PythonFreeSensors& self, const PosePairs& poses, double time) {
+  return draw_places(self, {poses}, time, 1)[0];
 }
 
 void bind_free_sensors(nb::module_& m) {
@@ -109,7 +174,7 @@ void bind_free_sensors(nb::module_& m) {
       .def("set_sensors", set_sensors, nb::arg("sensors"),
            "Replaces the sensors and keeps the renderer. Raises what the constructor raises.")
       .def(
-          "render", draw, nb::arg("poses"), nb::arg("time") = 0.0,
+          "render", draw_place, nb::arg("poses"), nb::arg("time") = 0.0,
           nb::sig(
               "def render(self, poses: collections.abc.Sequence[tuple[collections.abc.Sequence[float], "
               "collections.abc.Sequence[float]]], time: float = 0.0) -> "
@@ -121,7 +186,18 @@ void bind_free_sensors(nb::module_& m) {
           "[H][W] "
           "in metres with 0 for no return, alpha float32 [H][W]. Raises InvalidArgument for a pose that "
           "is not "
-          "finite or not of unit length.");
+          "finite or not of unit length.")
+      .def(
+          "render_places", draw_places, nb::arg("places"), nb::arg("time") = 0.0, nb::arg("threads") = 1,
+          nb::sig("def render_places(self, places: collections.abc.Sequence[collections.abc.Sequence["
+                  "tuple[collections.abc.Sequence[float], collections.abc.Sequence[float]]]], "
+                  "time: float = 0.0, threads: int = 1) -> "
+                  "list[dict[str, numpy.typing.NDArray[typing.Any]]]"),
+          "Renders all sensors at many places, with the images of `render` at each.\n\n"
+          "A sensor's cameras of all places are drawn in one call, which is faster on a GPU. `places` "
+          "has "
+          "the `poses` of each. Images become arrays on up to `threads` threads of the CPU. Raises what "
+          "`render` raises.");
 }
 
 }  // namespace

@@ -35,27 +35,30 @@ class FreeSensors {
 
   /// The sensors.
   const std::vector<SensorSpec>& sensors() const noexcept { return sensors_; }
-  /// Renders all sensors. Those with equal cameras and equal poses share a render.
-  /// @param poses One per sensor.
+  /// Renders all sensors at one or more places. Sensors with equal cameras and equal poses share a
+  /// render, and a sensor's cameras of all places are rendered in one call.
+  /// @param poses One per sensor for the first place, then those of the next place.
   /// @param render Makes the frames.
+  /// @param places Number of places, at least 1.
   /// @return invalid_argument for a wrong number of poses, or one that is not finite or not of unit
   /// length; an error of rendering.
-  Status render(std::span<const SensorPose> poses, const Render& render);
-  /// Image of a sensor, shape [height][width][channels]. Empty before the first render, valid until the
-  /// next.
-  std::span<const float> image(std::size_t sensor) const noexcept { return images_[sensor]; }
-  /// Number of renders so far; a cube counts as one.
+  Status render(std::span<const SensorPose> poses, const Render& render, std::size_t places = 1);
+  /// Image of a sensor at a place of the last render, shape [height][width][channels]. Several threads
+  /// may call it at a time.
+  /// @pre A render has succeeded, and none failed after it.
+  std::vector<float> image(std::size_t sensor, std::size_t place = 0) const;
+  /// Number of calls that rendered so far; a cube counts as one.
   std::size_t render_count() const noexcept { return render_count_; }
 
  private:
   FreeSensors() = default;
-  Status shoot(std::size_t sensor, const SensorPose& pose, const Render& render);
-  void fill(std::size_t sensor, std::size_t drawn);
+  /// `poses` are those of all sensors and places.
+  Status shoot(std::size_t sensor, std::span<const SensorPose> poses, const Render& render);
 
   std::vector<SensorSpec> sensors_;
   std::vector<std::shared_ptr<const CubeMap>> cubes_;  // Null for a pinhole.
-  std::vector<std::vector<float>> images_;
   std::vector<Frames<float>> frames_;  // One per sensor; that of a shared render is at its first sensor.
+  std::vector<std::size_t> drawn_;     // For each sensor, the one whose frames show it.
   std::size_t render_count_ = 0;
 };
 

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""gsnav.FreeSensors at many places in one call."""
+
+import gsnav
+import numpy as np
+import pytest
+
+SENSORS = [
+    gsnav.SensorSpec(uuid="rgb", kind=gsnav.SensorKind.rgb, resolution=[12, 16]),
+    gsnav.SensorSpec(uuid="depth", kind=gsnav.SensorKind.depth, resolution=[12, 16]),
+    gsnav.SensorSpec(uuid="alpha", kind=gsnav.SensorKind.alpha, resolution=[8, 8]),
+]
+POSITION = [4.6, 1.5, 3.6]
+
+
+def place(x, yaw):
+    pose = [POSITION[0] - x, *POSITION[1:]], [np.cos(yaw / 2), 0, np.sin(yaw / 2), 0]
+    return [pose] * len(SENSORS)
+
+
+def equal(a, b):
+    return a.keys() == b.keys() and all(np.array_equal(a[k], b[k]) for k in a)
+
+
+@pytest.mark.parametrize("threads", [1, 3, 50])
+def test_many_places_have_the_images_of_each(opened, threads):
+    sensors = gsnav.FreeSensors("cpu:2", opened, SENSORS)
+    places = [place(0.3 * i, 0.4 * i) for i in range(5)]
+    together = sensors.render_places(places, threads=threads)
+    alone = [sensors.render(p) for p in places]
+    assert len(together) == 5 and all(map(equal, together, alone))
+    assert not np.array_equal(together[0]["rgb"], together[4]["rgb"])
+    for name, shape, kind in (("rgb", (12, 16, 4), np.uint8), ("depth", (12, 16), np.float32), ("alpha", (8, 8), np.float32)):
+        assert together[1][name].shape == shape and together[1][name].dtype == kind
+    assert sensors.render_places([]) == []
+
+
+def test_wrong_places_name_the_sensor(opened):
+    sensors = gsnav.FreeSensors("serial", opened, SENSORS)
+    with pytest.raises(gsnav.InvalidArgument, match="2 poses for 3 sensors"):
+        sensors.render_places([place(0, 0), place(0, 0)[:2]])
+    wrong = place(0, 0)
+    wrong[1] = [float("nan"), 0, 0], wrong[1][1]
+    with pytest.raises(gsnav.InvalidArgument, match="depth"):
+        sensors.render_places([place(0, 0), wrong])
+    assert len(sensors.render_places([place(0, 0)])) == 1
+
+
+def test_images_do_not_depend_on_the_other_sensors(opened):
+    every = gsnav.FreeSensors("cpu:1", opened, SENSORS).render(place(0, 0.5))
+    one = gsnav.FreeSensors("cpu:1", opened, SENSORS[:1])
+    for sensor in SENSORS:  # Only the images that sensors show are drawn.
+        one.set_sensors([sensor])
+        assert np.array_equal(one.render(place(0, 0.5)[:1])[sensor.uuid], every[sensor.uuid])
