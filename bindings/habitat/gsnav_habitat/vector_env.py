@@ -33,14 +33,16 @@ class _Worker:
         """Takes a command. It is carried out when it or one of another worker is awaited."""
         self._asked.append(command)
         if command[0] == _theirs.CLOSE_COMMAND:
-            self._wake.put(None)
+            self._turns.expect(1)
+            self.begin()
 
-    def begin(self) -> bool:
-        """Lets the thread carry out the commands so far. Returns whether there are any."""
-        if not self._asked:
-            return False
+    def is_asked(self) -> bool:
+        """Whether there are commands to carry out."""
+        return bool(self._asked)
+
+    def begin(self) -> None:
+        """Lets the thread carry out the commands so far, in a turn that was announced."""
         self._wake.put(None)
-        return True
 
     def wait(self) -> None:
         """Waits until the commands are carried out, after `begin`."""
@@ -105,14 +107,15 @@ class BatchVectorEnv(_theirs.VectorEnv):
     """habitat.VectorEnv without processes.
 
     The first read carries out the commands of all environments: one runs Python at a time, and meanwhile others draw
-    their images on the cores of the CPU.
+    their images on the cores of the CPU, or many together on a GPU.
     """
 
     def _spawn_workers(
         self, env_fn_args: Any, make_env_fn: Any, workers_ignore_signals: bool = False
     ) -> tuple[list[Any], list[Any]]:
         cores, count = _engine.threads(), len(env_fn_args)
-        self._turns = Turns(drawers=min(cores, count), share=max(1, cores // count))
+        # On a GPU a quarter is drawn in one call, while the others run Python.
+        self._turns = Turns(min(cores, count), share=max(1, cores // count), together=-(-count // 4))
         self._everyone = [_Worker(self._turns, self._auto_reset_done) for _ in range(count)]
         self._workers = list(self._everyone)
         reads = [_theirs._ReadWrapper(self._reader(worker), rank) for rank, worker in enumerate(self._everyone)]
@@ -137,7 +140,10 @@ class BatchVectorEnv(_theirs.VectorEnv):
         return read
 
     def _run(self) -> None:
-        begun = collections.deque([w for w in self._everyone if w.begin()])
+        begun = collections.deque([w for w in self._everyone if w.is_asked()])
+        self._turns.expect(len(begun))
+        for worker in begun:
+            worker.begin()
         try:
             while begun:
                 begun[0].wait()

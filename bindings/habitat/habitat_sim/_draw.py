@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Draws the images of sensors with gsnav.FreeSensors."""
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ _MODELS = {
     SensorSubType.EQUIRECTANGULAR: ("equirectangular", EquirectangularSensorSpec),
     SensorSubType.FISHEYE: ("fisheye", FisheyeSensorDoubleSphereSpec),
 }
+_CONVERTERS = 8  # Threads of the CPU that turn images from a GPU into arrays.
 
 
 def check(spec: Any) -> None:
@@ -81,6 +83,7 @@ class Painter:
 
     def __init__(self, stage: Any, device: Any) -> None:
         self._stage, self._device = stage, device
+        self._together = _together(device)
         self._sensors: list[Any] = []
         self._natives: list[Any] = []  # Their specifications.
         self._key = ""
@@ -106,9 +109,24 @@ class Painter:
             if self._sensors != drawn:
                 self._sensors, self._natives = drawn, [_native(s.specification()) for s in drawn]
                 self._key = repr(self._natives)
-            with _turns.drawing(), self._stage.drawer(self._device, self._key, self._natives) as drawer:
-                images.update(drawer.render(poses, seconds))
+            if self._together:
+                # Time matters among people only.
+                key = self._stage, self._key, self._device.index, seconds if self._stage.scene.avatar_count else 0.0
+                images.update(_turns.draw_together(key, poses, functools.partial(self._draw_places, seconds)))
+            else:
+                with _turns.drawing(), self._stage.drawer(self._device, self._key, self._natives) as drawer:
+                    images.update(drawer.render(poses, seconds))
         return {s.uuid: _noisy(images[s.uuid], s.specification()) for s in sensors}
+
+    def _draw_places(self, seconds: float, places: list[Any]) -> list[dict[str, np.ndarray]]:
+        """Images at the poses of each environment, drawn in one call."""
+        with self._stage.drawer(self._device, self._key, self._natives) as drawer:
+            return drawer.render_places(places, seconds, min(_engine.threads(), _CONVERTERS))
+
+
+def _together(device: Any) -> bool:
+    """Whether images of several environments are drawn in one call."""
+    return bool(device.kind == _engine.library().DeviceKind.cuda)
 
 
 def _pose(sensor: Any) -> Any:

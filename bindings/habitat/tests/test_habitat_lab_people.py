@@ -17,6 +17,22 @@ SMALL = [
     for s in ("rgb", "depth")
     for k in ("width", "height")
 ]
+# As on a GPU, but drawn on the CPU. Only the process of the trainer runs this.
+TOGETHER = """
+import runpy, sys
+from habitat_sim import _draw
+
+if __name__ == "__main__":
+    usual, sizes = _draw.Painter._draw_places, []
+    def counted(self, seconds, places):
+        sizes.append(len(places))
+        return usual(self, seconds, places)
+    _draw._together, _draw.Painter._draw_places = lambda device: True, counted
+    sys.argv = sys.argv[1:]
+    runpy.run_path(sys.argv[0], run_name="__main__")
+    assert max(sizes) == 2  # A quarter of five, rounded up.
+    print("calls for many:", sizes.count(2))
+"""
 
 
 def need_baselines():
@@ -62,3 +78,15 @@ def test_one_process_gives_the_bits_of_forkserver_workers(pack, tmp_path):
     script = str(pathlib.Path(__file__).parent / "compare_vector_envs.py")
     text = run_module([script, "40", *overrides_of(pack), "habitat_baselines.num_environments=2", *SMALL], tmp_path)
     assert "episodes agree" in text and "bits agree" in text
+
+
+def test_images_of_environments_in_one_call_have_the_bits_of_forkserver_workers(pack, tmp_path):
+    need_baselines()
+    script = str(pathlib.Path(__file__).parent / "compare_vector_envs.py")
+    (tmp_path / "together.py").write_text(TOGETHER)
+    text = run_module(
+        ["together.py", script, "30", *overrides_of(pack), "habitat_baselines.num_environments=5", *SMALL], tmp_path
+    )
+    assert "episodes agree" in text and "bits agree" in text
+    calls = int(text.split("calls for many: ")[1].split()[0])
+    assert calls >= 30
