@@ -83,23 +83,26 @@ def walker(mesh: Any, capsules: list[list[float]]) -> Any:
     return made
 
 
-def stage(name: str, settings: Any) -> Stage:
+def stage(name: str, settings: Any, required: bool = False) -> Stage:
     """The scene of a name: a path, a name that gsnav.open_scene knows, or NONE for nothing.
 
-    The NavMesh is the file beside the scene, or else one that is built with a gsnav.NavMeshSettings. Raises
-    FileNotFoundError naming the scene, and the errors of gsnav.open_scene.
+    The NavMesh is the file beside the scene, or else one that is built with a gsnav.NavMeshSettings. One is also built
+    if the file has other settings and these are `required`. Raises FileNotFoundError naming the scene, InvalidArgument
+    naming a required setting out of range, and the errors of gsnav.open_scene.
     """
     if name in ("NONE", ""):
         return Stage(None)
     gsnav = library()
+    if required:
+        settings.validate()
     stem, extension = os.path.splitext(name)
     beside = next((p for p in (stem + ".navmesh", name + ".navmesh") if extension and os.path.isfile(p)), None)
     key = (os.path.abspath(name), _stamp(name), beside, beside and _stamp(beside),
-           None if beside else repr(settings), _people())  # fmt: skip
+           repr(settings) if required or not beside else None, _people())  # fmt: skip
     with _lock:
         found = _stages.get(key)
         if found is None:
-            found = _stages[key] = Stage(_open(gsnav, name, beside, settings))
+            found = _stages[key] = Stage(_open(gsnav, name, beside, settings, required))
         return found
 
 
@@ -111,15 +114,44 @@ def _people() -> int:
     return int(text)
 
 
-def _open(gsnav: Any, name: str, beside: str | None, settings: Any) -> Any:
-    if beside is not None:
-        return gsnav.open_scene(name, gsnav.OpenOptions(navmesh=beside, people=_people()))
+# Fields of NavMeshSettings that Habitat-Sim compares.
+_COMPARED = (
+    "cell_size", "cell_height", "agent_height", "agent_radius", "agent_max_climb", "agent_max_slope",
+    "filter_low_hanging_obstacles", "filter_ledge_spans", "filter_walkable_low_height_spans", "region_min_size",
+    "edge_max_len", "edge_max_error", "verts_per_poly", "detail_sample_dist", "detail_sample_max_error",
+)  # fmt: skip
+
+
+def _differing(had: Any, wanted: Any, gaussians: bool) -> list[str]:
+    """Names of the settings in which a NavMesh differs from one that would be built."""
+    found = [name for name in _COMPARED if abs(float(getattr(had, name)) - float(getattr(wanted, name))) >= 1e-5]
+    lowered = min(wanted.cell_height, max(0.05, wanted.cell_size))  # gsnav's voxels among Gaussians.
+    if gaussians and abs(had.cell_height - lowered) < 1e-5:
+        found = [name for name in found if name != "cell_height"]
+    return found
+
+
+def _open(gsnav: Any, name: str, beside: str | None, settings: Any, required: bool) -> Any:
+    def opened(how: str) -> Any:
+        return gsnav.open_scene(name, gsnav.OpenOptions(navmesh=how, navmesh_settings=settings, people=_people()))
+
     try:
-        options = gsnav.OpenOptions(navmesh="auto", navmesh_settings=settings, people=_people())
-        return gsnav.open_scene(name, options)
+        found = opened(beside or "auto")
     except (gsnav.NothingNavigable, gsnav.InvalidArgument) as error:
+        if beside is not None:
+            raise
         logger.warning("%s: no NavMesh: %s", name, error)
         return gsnav.open_scene(name, gsnav.OpenOptions(navmesh="none"))
+    mesh = found.scene.navmesh
+    differing = _differing(mesh.settings, settings, found.gaussian_count > 0) if required and mesh is not None else []
+    if not differing:
+        return found
+    logger.info("%s: NavMesh built, because %s differs, %s", name, ", ".join(differing), found.navmesh_source)
+    try:
+        return opened("build")
+    except (gsnav.NothingNavigable, gsnav.InvalidArgument) as error:
+        logger.warning("%s: NavMesh of other settings, %s: %s", name, found.navmesh_source, error)
+        return found
 
 
 def device(gpu_device_id: int) -> Any:

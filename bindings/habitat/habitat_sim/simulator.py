@@ -103,7 +103,8 @@ class Simulator(PeoplePart):
         if settings is None:
             settings = NavMeshSettings()
             settings.agent_radius, settings.agent_height = navigator.radius, navigator.height
-        stage = _engine.stage(str(sim_cfg.scene_id), settings._native())
+        required = sim_cfg.navmesh_settings is not None
+        stage = _engine.stage(str(sim_cfg.scene_id), settings._native(), required)
         device = _engine.device(int(sim_cfg.gpu_device_id))
         if stage is not self._stage:
             self.pathfinder._mesh = stage.navmesh

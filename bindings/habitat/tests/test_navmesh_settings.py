@@ -112,3 +112,42 @@ def test_values_out_of_range_are_named(sim):
         sim.recompute_navmesh(sim.pathfinder, settings)
     with habitat_sim.Simulator(make_cfg({"scene": "NONE", "width": 8, "height": 8})) as empty:
         assert not empty.recompute_navmesh(empty.pathfinder, habitat_sim.NavMeshSettings())
+
+
+def opened(path, **values):
+    """The PathFinder of a simulator that asks for settings, or for none."""
+    config = make_cfg({"scene": str(path), "width": 8, "height": 8, "color_sensor": False})
+    if values:
+        config.sim_cfg.navmesh_settings = habitat_sim.NavMeshSettings()
+        for name, value in values.items():
+            setattr(config.sim_cfg.navmesh_settings, name, value)
+    with habitat_sim.Simulator(config) as made:
+        return made.pathfinder
+
+
+def test_a_simulator_builds_the_mesh_if_the_file_has_other_settings(sim, caplog):
+    path = sim.config.sim_cfg.scene_id
+    small = opened(path).navigable_area
+    assert small < 4.5  # That of the file.
+    # Equal settings, and those that Habitat-Sim does not compare.
+    assert opened(path, agent_radius=0.1 + 2e-6).navigable_area == small
+    assert opened(path, region_merge_size=9.0, include_static_objects=True).navigable_area == small
+    for values in ({"agent_radius": 0.3}, {"agent_max_slope": 20.0}, {"filter_ledge_spans": False}):
+        finder, want = opened(path, **values), rebuilt(sim, cell_height=0.2, **values)
+        assert finder.nav_mesh_settings == want.nav_mesh_settings
+        assert finder.navigable_area == want.navigable_area > 40
+    # Nothing can be built for this agent: the file is kept, and a warning says so.
+    assert opened(path, agent_radius=5.0).navigable_area == small and "NavMesh of other settings" in caplog.text
+    assert opened(path).navigable_area == small
+    with pytest.raises(ValueError, match="agent_max_slope"):
+        opened(path, agent_max_slope=-5.0)
+
+
+def test_lower_voxels_among_gaussians_are_no_other_setting(tmp_path):
+    scan = tmp_path / "flat.ply"
+    gsnav.io.save_scene(scan, gsnav.open_scene("default", gsnav.OpenOptions(navmesh="none")).scene.assets[0].cloud)
+    built = gsnav.open_scene(scan, gsnav.OpenOptions(navmesh="build")).scene.navmesh
+    part = gsnav.NavMesh.build(built.settings, *(np.array(x) for x in flat(0, 0, 2, 2, 0.0)))
+    gsnav.save_navmesh(part, scan.with_suffix(".navmesh"))  # To be told from one that is built.
+    assert opened(scan, agent_radius=0.1).navigable_area < 4.5
+    assert opened(scan, cell_height=0.03).navigable_area > 20 and opened(scan, agent_radius=0.2).navigable_area > 20
