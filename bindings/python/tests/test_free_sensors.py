@@ -30,8 +30,8 @@ def test_many_places_have_the_images_of_each(opened, threads):
     alone = [sensors.render(p) for p in places]
     assert len(together) == 5 and all(map(equal, together, alone))
     assert not np.array_equal(together[0]["rgb"], together[4]["rgb"])
-    for name, shape, kind in (("rgb", (12, 16, 4), np.uint8), ("depth", (12, 16), np.float32), ("alpha", (8, 8), np.float32)):
-        assert together[1][name].shape == shape and together[1][name].dtype == kind
+    kinds = {name: (image.shape, image.dtype) for name, image in together[1].items()}
+    assert kinds == {"rgb": ((12, 16, 4), np.uint8), "depth": ((12, 16), np.float32), "alpha": ((8, 8), np.float32)}
     assert sensors.render_places([]) == []
 
 
