@@ -2,11 +2,8 @@
 """Turns of threads: one runs Python at a time, with random numbers of its own, and images are drawn outside turns."""
 
 import contextlib
-import random
 import threading
 from typing import Any, Callable, Iterator
-
-import numpy as np
 
 _here = threading.local()
 
@@ -32,12 +29,15 @@ class Turns:
         self.share, self._together = share, together
         from queue import SimpleQueue  # Imported here because habitat_sim, which imports this file, must be light.
 
-        self._queue = SimpleQueue
+        from ._numbers import State
+
+        self._queue, self._state_type = SimpleQueue, State
         self._lock = threading.Lock()
         self._permits: SimpleQueue[None] = SimpleQueue()  # Faster than a semaphore.
         for _ in range(drawers):
             self._permits.put(None)
         self._states: dict[Any, Any] = {}
+        self._put: Any = None  # The state that was put in place last.
         self._last: Any = None  # The participant whose random numbers are in place; None: those of all others.
         self._guard = threading.Lock()  # For the two below.
         self._coming = 0  # Turns that were announced and neither ended nor wait for a drawing.
@@ -62,11 +62,10 @@ class Turns:
     def _swap(self, who: Any) -> None:
         if who == self._last:
             return
-        now = random.getstate(), np.random.get_state()
+        now = self._state_type(self._put)
         self._states[self._last], self._last = now, who
-        new = self._states.pop(who, None) or self._states[None]
-        random.setstate(new[0])
-        np.random.set_state(new[1])
+        self._put = self._states.pop(who, None) or self._states[None]
+        self._put.put(now)
 
     @contextlib.contextmanager
     def turn(self, who: Any) -> Iterator[None]:
