@@ -79,16 +79,19 @@ class Env(BaseEnv):
               options: dict[str, Any] | None = None) -> tuple[Observation, dict[str, Any]]:
         """Starts the next episode, or `options["episode"]`.
 
-        The same seed gives the same sequence of episodes.
+        The same seed gives the same sequence of episodes. A reset that raises an exception changes nothing.
         """
-        simulator = self.simulator
-        super().reset(seed=seed)
-        episode = (options or {}).get("episode")
-        if episode is None:
-            episode = self._episodes.draw(self.np_random).episode
-        elif not isinstance(episode, PointNavEpisode):
+        simulator, episode = self.simulator, _task.option(options, "episode")
+        if episode is not None and not isinstance(episode, PointNavEpisode):
             raise TypeError(f"options[\"episode\"]: expected a PointNavEpisode, got {type(episode).__name__}")
-        seen = simulator.reset(episode)
+        seed, before = _task.checked_seed(seed), simulator.state()
+        with _task.undone_if_it_fails(self, []):
+            super().reset(seed=seed)
+            try:
+                seen = simulator.reset(self._episodes.draw(self.np_random).episode if episode is None else episode)
+            except BaseException:
+                simulator.set_state(before)
+                raise
         return self._observation(seen), _task.info_dict(seen.info)
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:

@@ -7,7 +7,7 @@ import contextlib
 import enum
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -56,6 +56,41 @@ def from_dlpack(value: Any, what: str) -> Any:
         return np.from_dlpack(value)
     except (BufferError, RuntimeError, TypeError, ValueError) as e:
         raise InvalidArgument(f"{what}: an array that numpy cannot read; pass one in host memory: {e}") from e
+
+
+def checked_seed(seed: Any, what: str = "seed") -> int | None:
+    """A seed as an integer, or None. A bool is no seed."""
+    if seed is None:
+        return None
+    if isinstance(seed, (bool, np.bool_)) or not isinstance(seed, (int, np.integer)):
+        raise TypeError(f"{what}: expected an integer or None, got {seed!r}")
+    if seed < 0:
+        raise InvalidArgument(f"{what} = {seed}: must be >= 0")
+    return int(seed)
+
+
+def option(options: Any, name: str) -> Any:
+    """The option of a reset, or None."""
+    if options is None:
+        return None
+    if not isinstance(options, Mapping):
+        raise TypeError(f"options: expected a dict or None, got {options!r}")
+    return options.get(name)
+
+
+@contextlib.contextmanager
+def undone_if_it_fails(env: Any, generators: list[np.random.Generator]) -> Iterator[None]:
+    """Gives an environment its own generator, and `generators`, back as they were if the body raises."""
+    own, seed, others = env._np_random, env._np_random_seed, list(generators)
+    known = others if own is None else [*others, own]
+    states = [g.bit_generator.state for g in known]
+    try:
+        yield
+    except BaseException:
+        env._np_random, env._np_random_seed, generators[:] = own, seed, others
+        for generator, state in zip(known, states):
+            generator.bit_generator.state = state
+        raise
 
 
 def scene_of(scene: Scene, config: SimulatorConfig) -> SimulatorScene:

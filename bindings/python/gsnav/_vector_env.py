@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -117,16 +117,19 @@ class VectorEnv(BaseVectorEnv):
         """Starts the next episode in all environments, or in those of `options["reset_mask"]`, bool [N].
 
         seed: environment e gets seed + e, or seed[e]. The same seeds give the same episodes.
+
+        Wrong arguments raise an exception and change nothing. If the next episode of an environment raises one, the
+        generators are as before, and all environments need a reset.
         """
         simulator = self.simulator
-        mask = self._mask((options or {}).get("reset_mask"))
-        seeds = self._seeds(seed)
-        made = {e: make_generator(one)[0] for e, one in enumerate(seeds)
-                if one is not None and (mask is None or mask[e])}  # all, or an error that changes nothing
-        super().reset(seed=seeds[0] if seed is not None else None)
-        for e, generator in made.items():
-            self._source.generators[e] = generator
-        step = simulator.reset(mask)
+        mask = self._mask(_task.option(options, "reset_mask"))
+        seeds, generators = self._seeds(seed), self._source.generators
+        with _task.undone_if_it_fails(self, generators):
+            super().reset(seed=seeds[0])
+            for e, one in enumerate(seeds):
+                if one is not None and (mask is None or mask[e]):
+                    generators[e] = make_generator(one)[0]
+            step = simulator.reset(mask)
         infos: dict[str, Any] = {}
         self._add_step_info(infos, step.infos, self._all if mask is None else mask)
         return self._observation(step), infos
@@ -161,13 +164,13 @@ class VectorEnv(BaseVectorEnv):
         self._last = None
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, (int, np.integer)):
-            return [int(seed) + e for e in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise InvalidArgument(f"seed: {len(seed)} seeds for {self.num_envs} environments")
-        return list(seed)
+        if isinstance(seed, (str, bytes)) or not (hasattr(seed, "__len__") and hasattr(seed, "__iter__")):
+            first = _task.checked_seed(seed)
+            return [None if first is None else first + e for e in range(self.num_envs)]
+        seeds = list(cast(Sequence[Any], seed))
+        if len(seeds) != self.num_envs:
+            raise InvalidArgument(f"seed: {len(seeds)} seeds for {self.num_envs} environments")
+        return [_task.checked_seed(one, f"seed[{e}]") for e, one in enumerate(seeds)]
 
     def _mask(self, mask: Any) -> npt.NDArray[np.bool_] | None:
         if mask is None:

@@ -154,6 +154,65 @@ def test_wrong_resets(envs):
     assert envs.step([1, 1, 1])[1].shape == (3,)
 
 
+def off_the_mesh(episode):
+    """The episode with a start that is on no NavMesh."""
+    return gsnav.PointNavEpisode(**{**episode.__getstate__(), "start_position": (1000.0, 0.0, 0.0)})
+
+
+@pytest.mark.parametrize("arguments, error", [
+    ({"seed": 5, "options": {"episode": 3}}, TypeError), ({"seed": 5, "options": {"episode": "lost"}}, ValueError),
+    ({"seed": 5, "options": 5}, TypeError), ({"seed": -1}, ValueError), ({"seed": True}, TypeError),
+    ({"seed": 1.5}, TypeError), ({"seed": "1"}, TypeError),
+])
+def test_a_refused_reset_changes_nothing(env, arguments, error):
+    if arguments.get("options") == {"episode": "lost"}:
+        arguments = {**arguments, "options": {"episode": off_the_mesh(gsnav.PointNavEpisode())}}
+    with pytest.raises(error):
+        env.reset(**arguments)
+    env.reset(seed=3)
+    env.step(1)
+    kept, place = env.np_random.bit_generator.state, env.simulator.agent
+    with pytest.raises(error, match="seed|option|episode"):
+        env.reset(**arguments)
+    assert env.np_random.bit_generator.state == kept and env.np_random_seed == 3
+    assert repr(env.simulator.agent) == repr(place) and not env.simulator.done
+    assert env.step(1)[0] in env.observation_space  # the episode goes on
+    own = gsnav.Env(env.scene, config=env.simulator.config)
+    own.reset(seed=3)
+    assert same(env.reset()[0], own.reset()[0])  # the next episode is that of seed 3
+
+
+def test_a_reset_whose_episode_fails_can_be_repeated(people, small):
+    episodes = gsnav.generate_episodes(people.navmesh, 3, 7)
+    env = gsnav.Env(people, config=small, episodes=[*episodes, off_the_mesh(episodes[0])])
+    envs = gsnav.VectorEnv(3, people, config=small, episodes=[*episodes, off_the_mesh(episodes[0])])
+    wrong = next(s for s in range(1, 100) if gsnav._spaces.make_generator(s)[0].integers(4) == 3)
+    env.reset(seed=wrong - 1)
+    generators = [env.np_random, *envs._source.generators]
+    kept = [g.bit_generator.state for g in generators]
+    for call in (lambda: env.reset(seed=wrong), lambda: envs.reset(seed=[0, wrong, wrong])):
+        with pytest.raises(gsnav.NothingNavigable, match="start_position"):
+            call()
+    assert [g.bit_generator.state for g in generators] == kept and env.np_random_seed == wrong - 1
+    assert [env.np_random, *envs._source.generators] == generators
+    assert envs.np_random_seed not in (0, wrong)
+
+
+def test_a_refused_reset_of_a_mask_changes_nothing(envs):
+    envs.reset(seed=3)
+    mask = np.array([True, False, False])
+    for seed, words in [([1, 2, -3], r"seed\[2\] = -3"), ([1, True, 2], r"seed\[1\]"), ([-1, 2, 3], r"seed\[0\]"),
+                        (True, "seed: expected"), (1.5, "seed: expected"), ("abc", "seed: expected"), (-2, "= -2")]:
+        kept = [g.bit_generator.state for g in envs._source.generators]
+        with pytest.raises((TypeError, ValueError), match=words):
+            envs.reset(seed=seed, options={"reset_mask": mask})
+        assert [g.bit_generator.state for g in envs._source.generators] == kept and envs.np_random_seed == 3
+    with pytest.raises(TypeError, match="options: expected a dict"):
+        envs.reset(seed=1, options=[mask])
+    a, b = envs.reset(seed=np.int64(7)), envs.reset(seed=np.arange(7, 10))
+    assert same(a[0], b[0])
+
+
 def test_closed_environments(env, envs):
     observations, _ = envs.reset(seed=1)
     env.reset(seed=1)
