@@ -62,7 +62,7 @@ class Env(BaseEnv):
         self.scene = _task.scene_of(scene, config)
         self._episodes = _task.Episodes([self.scene], episodes, rules)
         self._simulator: Simulator | None = Simulator(device, self.scene, config)
-        self._last: Observation | None = None
+        self._last: npt.NDArray[np.float32] | None = None  # what `render` shows
         if HAVE_GYMNASIUM:
             from ._registration import spec
             self.spec = spec({"scene": self.scene, "device": device, "config": config, "episodes": episodes,
@@ -119,7 +119,7 @@ class Env(BaseEnv):
             return None
         if self._last is None:
             raise InvalidArgument("Env.render: call reset() first")
-        return to_bytes(self._last[self._rgb])
+        return to_bytes(self._last)
 
     def close(self) -> None:
         """Frees the simulator. Observations stay valid. Closing twice is allowed."""
@@ -130,5 +130,6 @@ class Env(BaseEnv):
         made = {name: copy_image(image) for name, image in seen.images.items()}
         goal = seen.point_goal
         made[_task.POINT_GOAL] = np.array([goal.distance, goal.angle], np.float32)
-        self._last = made
-        return dict(made)
+        if self.render_mode is not None:
+            self._last = copy_image(seen.images[self._rgb])  # The caller may change the one that it gets.
+        return made

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import enum
 import math
 import os
@@ -202,7 +203,7 @@ class Episodes:
     def __init__(self, scenes: Sequence[SimulatorScene], episodes: Sequence[Episode] | None,
                  rules: EpisodeRules | None) -> None:
         self._scenes = scenes
-        self._rules = rules or EpisodeRules()
+        self._rules = copy.copy(rules) if rules else EpisodeRules()  # The caller may change its own.
         self._episodes: list[BatchEpisode] | None = None
         if episodes is not None:
             self._episodes = [self._checked(e, i) for i, e in enumerate(episodes)]
@@ -217,7 +218,7 @@ class Episodes:
                             f"got {type(episode).__name__}")
         if episode.scene >= len(self._scenes):
             raise InvalidArgument(f"episodes[{index}].scene = {episode.scene}: there are {len(self._scenes)} scenes")
-        return episode
+        return BatchEpisode(scene=episode.scene, episode=episode.episode)
 
     def draw(self, generator: np.random.Generator) -> BatchEpisode:
         """The next episode: a random one of the list, or a sampled one in a random scene."""

@@ -99,7 +99,8 @@ class VectorEnv(BaseVectorEnv):
         drawn = episodes if callable(episodes) else _task.Episodes(self.scenes, episodes, rules)
         self._source = Source(drawn, self.num_envs)
         self._same_step = mode == AutoresetMode.SAME_STEP
-        self._last: Observation | None = None
+        self._last: Any = None  # What `render` shows.
+        self._copy = copy
         self._all = np.ones(self.num_envs, np.bool_)
         self._all.flags.writeable = False
         self._simulator: BatchSimulator | None = BatchSimulator(
@@ -154,9 +155,9 @@ class VectorEnv(BaseVectorEnv):
             return None
         if self._last is None:
             raise InvalidArgument("VectorEnv.render: call reset() first")
-        if isinstance(self._last[self._rgb], DeviceArray):
+        if isinstance(self._last, DeviceArray):
             raise InvalidArgument("VectorEnv.render: images are on the GPU; use images=ImageMemory.host to see them")
-        return tuple(to_bytes(self._last[self._rgb]))
+        return tuple(to_bytes(self._last))
 
     def close_extras(self, **kwargs: Any) -> None:
         """Frees the simulator. Observations stay valid."""
@@ -200,9 +201,18 @@ class VectorEnv(BaseVectorEnv):
     def _observation(self, step: BatchStep) -> Observation:
         made: Observation = {**step.images, **step.on_backend}
         made[_task.POINT_GOAL] = step.point_goals.astype(np.float32)
-        # Images that are not needed would keep the simulator from using their memory again.
-        self._last = dict(made) if self.render_mode is not None else {}
+        if self.render_mode is not None:
+            self._show(made[self._rgb])
         return made
+
+    def _show(self, image: Any) -> None:
+        """Keeps the image that `render` shows. The caller may change an array of its own."""
+        if not self._copy or isinstance(image, DeviceArray):
+            self._last = image  # A view of the simulator's memory.
+            return
+        if self._last is None:
+            self._last = np.empty_like(image)
+        np.copyto(self._last, image)
 
     @staticmethod
     def _add(infos: dict[str, Any], key: str, values: Any, mask: npt.NDArray[np.bool_]) -> None:

@@ -118,6 +118,36 @@ def test_render(env, envs):
     assert len(envs.render()) == 3 and np.array_equal(envs.render()[0], image)
 
 
+@pytest.mark.parametrize("copy, mode", [(True, "NextStep"), (True, "Disabled"), (False, "NextStep")])
+def test_render_shows_what_was_drawn(people, small, env, copy, mode):
+    """Callers own what they are given. Changing it does not change what `render` shows."""
+    envs = gsnav.VectorEnv(2, people, config=small, render_mode="rgb_array", copy=copy, autoreset_mode=mode)
+    for one, action in ((env, 2), (envs, [2, 2])):
+        for observation in (one.reset(seed=1)[0], one.step(action)[0]):
+            shown = np.array(one.render())
+            assert shown.any()
+            for image in observation.values():
+                if image.flags.writeable:
+                    image[...] = 0
+            observation.clear()
+            assert np.array_equal(one.render(), shown)
+            one.render()[0][...] = 0
+            assert np.array_equal(one.render(), shown)
+
+
+def test_environments_do_not_share_what_the_caller_may_change(people, small):
+    episode = gsnav.BatchEpisode(episode=gsnav.generate_episodes(people.navmesh, 1, 7)[0])
+    rules = gsnav.EpisodeRules(min_distance=2.0)
+    config = gsnav.SimulatorConfig(**small.__getstate__())
+    env = gsnav.Env(people, config=config, episodes=[episode])
+    sampled = gsnav.Env(people, config=config, rules=rules)
+    own = gsnav.Env(people, config=small, rules=gsnav.EpisodeRules(min_distance=2.0))
+    episode.episode.id, rules.min_distance, config.task.max_steps = "mine", 4.0, 1
+    env.reset(seed=1)
+    assert env.simulator.world.episode.id == "0" and not env.step(1)[3]
+    assert same(sampled.reset(seed=1)[0], own.reset(seed=1)[0])
+
+
 @pytest.mark.parametrize("actions, error", [
     ([1, 2], ValueError), ([[1], [2], [3]], ValueError), ([1.0, 2.0, 3.0], TypeError), ([1, 4, 1], ValueError),
     ([1, -1, 1], ValueError), (["a", "b", "c"], TypeError), (None, TypeError), ([True] * 3, TypeError),
