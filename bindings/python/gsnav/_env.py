@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Any
 
@@ -62,11 +63,13 @@ class Env(BaseEnv):
         self.scene = _task.scene_of(scene, config)
         self._episodes = _task.Episodes([self.scene], episodes, rules)
         self._simulator: Simulator | None = Simulator(device, self.scene, config)
-        self._last: npt.NDArray[np.float32] | None = None  # what `render` shows
+        self._last: npt.NDArray[np.float32] | None = None  # for `render`
         if HAVE_GYMNASIUM:
             from ._registration import spec
-            self.spec = spec({"scene": self.scene, "device": device, "config": config, "episodes": episodes,
-                              "rules": rules, "render_mode": render_mode})
+            # The scene as it was given: a name can be pickled. The others are copies.
+            self.spec = spec({"scene": scene, "device": device, "config": copy.copy(config),
+                              "episodes": self._episodes.given, "rules": copy.copy(rules),
+                              "render_mode": render_mode})
 
     @property
     def simulator(self) -> Simulator:

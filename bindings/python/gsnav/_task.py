@@ -204,10 +204,10 @@ class Episodes:
                  rules: EpisodeRules | None) -> None:
         self._scenes = scenes
         self._rules = copy.copy(rules) if rules else EpisodeRules()  # The caller may change its own.
-        self._episodes: list[BatchEpisode] | None = None
+        self.given: list[BatchEpisode] | None = None  # Copies of the episodes.
         if episodes is not None:
-            self._episodes = [self._checked(e, i) for i, e in enumerate(episodes)]
-            if not self._episodes:
+            self.given = [self._checked(e, i) for i, e in enumerate(episodes)]
+            if not self.given:
                 raise InvalidArgument("episodes: the list is empty; use None to sample episodes")
 
     def _checked(self, episode: Episode, index: int) -> BatchEpisode:
@@ -222,8 +222,8 @@ class Episodes:
 
     def draw(self, generator: np.random.Generator) -> BatchEpisode:
         """The next episode: a random one of the list, or a sampled one in a random scene."""
-        if self._episodes is not None:
-            return self._episodes[int(generator.integers(len(self._episodes)))]
+        if self.given is not None:
+            return self.given[int(generator.integers(len(self.given)))]
         index = int(generator.integers(len(self._scenes))) if len(self._scenes) > 1 else 0
         navmesh = self._scenes[index].navmesh
         assert navmesh is not None  # scene_of has checked it

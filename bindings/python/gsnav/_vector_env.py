@@ -99,7 +99,7 @@ class VectorEnv(BaseVectorEnv):
         drawn = episodes if callable(episodes) else _task.Episodes(self.scenes, episodes, rules)
         self._source = Source(drawn, self.num_envs)
         self._same_step = mode == AutoresetMode.SAME_STEP
-        self._last: Any = None  # What `render` shows.
+        self._last: Any = None  # for `render`
         self._copy = copy
         self._all = np.ones(self.num_envs, np.bool_)
         self._all.flags.writeable = False

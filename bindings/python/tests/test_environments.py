@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
+import copy
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -286,6 +288,22 @@ def test_sizes_that_no_sensor_can_have(people, sides):
 def test_spaces_without_memory_name_the_sensors(people, small):
     with pytest.raises(gsnav.OutOfMemory, match=r"2147483648 environments \('rgb': resolution = \[16, 24\]"):
         gsnav.VectorEnv(2**31, people, config=small)
+
+
+def test_the_spec_makes_the_environment_again(people, small):
+    config = gsnav.SimulatorConfig(**small.__getstate__())
+    episodes = gsnav.generate_episodes(people.navmesh, 3, 7)
+    named = gsnav.Env("default", config=config, episodes=episodes, device=gsnav.Device.parse("serial"))
+    for env, spec in [(named, pickle.loads(pickle.dumps(named.spec))), (named, copy.deepcopy(named.spec))]:
+        again = gymnasium.make(spec).unwrapped
+        assert same(env.reset(seed=3)[0], again.reset(seed=3)[0]) and again.simulator.device.name == "serial"
+        assert again.simulator.world.episode.id == env.simulator.world.episode.id
+    objects = gsnav.Env(people, config=config, rules=gsnav.EpisodeRules(min_distance=3.0))
+    again = gymnasium.make(objects.spec).unwrapped
+    assert again.scene is people and same(objects.reset(seed=3)[0], again.reset(seed=3)[0])
+    config.task.max_steps, config.sensors = 1, []
+    assert named.spec.kwargs["config"].task.max_steps == small.task.max_steps
+    assert len(objects.spec.kwargs["config"].sensors) == 2
 
 
 def test_given_episodes_and_several_scenes(people, opened, small):
