@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "arrays.hpp"
 #include "bind.hpp"
@@ -30,7 +31,7 @@ Shared sorted(Cloud&& edited, const char* function) {
   return std::make_shared<const Cloud>(std::move(edited));
 }
 
-Shared cropped(const Cloud& cloud, const Aabb<double>& box) {
+Shared cropped(const Cloud& cloud, Aabb<double> box) {
   Cloud made = cloud;
   crop(made, box);
   return sorted(std::move(made), "crop");
@@ -43,7 +44,9 @@ Shared filtered(const Cloud& cloud, nb::handle keep) {
           "filter_rows: keep must be a bool array of shape [" + std::to_string(cloud.size()) + "]");
   const ReleaseGil release;
   Cloud made = cloud;
-  filter_rows(made, [v = rows.view()](std::size_t i) { return v(i); });
+  std::vector<std::uint8_t> kept(cloud.size());  // Other threads may change the array.
+  for (std::size_t i = 0; i < kept.size(); ++i) kept[i] = rows.view()(i) ? 1 : 0;
+  filter_rows(made, [&kept](std::size_t i) { return kept[i] != 0; });
   return sorted(std::move(made), "filter_rows");
 }
 
@@ -55,7 +58,7 @@ Shared limited(const Cloud& cloud, int degree) {
   return std::make_shared<const Cloud>(std::move(made));
 }
 
-Shared transformed(const Cloud& cloud, const Similarity& by) {
+Shared transformed(const Cloud& cloud, Similarity by) {
   require(is_valid(by), "transform: by must have a unit quaternion, a positive scale and be finite");
   Cloud made = cloud;
   transform(made, by);

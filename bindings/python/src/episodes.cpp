@@ -84,7 +84,7 @@ void bind_generation(nb::module_& m) {
       .done();
   m.def(
       "generate_episode",
-      [](const NavMesh& mesh, Rng& rng, const EpisodeRules& rules) {
+      [](const NavMesh& mesh, Rng& rng, EpisodeRules rules) {
         Rng own = rng;  // Other threads may use `rng` while the GIL is released.
         PointNavEpisode episode;
         {
@@ -98,7 +98,7 @@ void bind_generation(nb::module_& m) {
       "Samples one episode. Raises NothingNavigable if no pair of points satisfied the rules.");
   m.def(
       "generate_episodes",
-      [](const NavMesh& mesh, std::size_t count, std::uint64_t seed, const EpisodeRules& rules) {
+      [](const NavMesh& mesh, std::size_t count, std::uint64_t seed, EpisodeRules rules) {
         return generate_episodes(mesh, count, seed, rules).value();
       },
       nb::arg("navmesh"), nb::arg("count"), nb::arg("seed"), nb::arg("rules") = EpisodeRules{},
@@ -153,7 +153,7 @@ void bind_episodes(nb::module_& m) {
   bind_files(m);
   m.def(
       "default_simulator_scene",
-      [](std::size_t people, std::uint64_t seed, double density, const TaskConfig& task) {
+      [](std::size_t people, std::uint64_t seed, double density, TaskConfig task) {
         return std::make_shared<SimulatorScene>(
             default_simulator_scene(people, seed, density, task).value());
       },

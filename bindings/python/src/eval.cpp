@@ -86,7 +86,7 @@ eval::ImageError image_error(nb::handle reference, nb::handle test, nb::handle e
 }
 
 eval::DepthError depth_error(nb::handle reference, nb::handle test, nb::handle alpha,
-                             nb::handle excluded, const eval::DepthErrorOptions& options) {
+                             nb::handle excluded, eval::DepthErrorOptions options) {
   const Image want = image_from(reference, "depth_error: reference");
   const Image got = image_from(test, "depth_error: test");
   const Image covered = image_from(alpha, "depth_error: reference_alpha");
@@ -150,7 +150,7 @@ std::vector<GaussianSet> sets_of(const SimulatorScene& scene) {
   return sets;
 }
 
-PythonOracle draw_oracle(const DeviceArg& device, const SceneArg& scene, const Camera& camera, int k,
+PythonOracle draw_oracle(const DeviceArg& device, const SceneArg& scene, Camera camera, int k,
                          eval::OracleConfig config) {
   const Device chosen = device.value();
   check_fork(chosen, k == 0 ? "oracle_render" : "oracle_photo");

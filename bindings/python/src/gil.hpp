@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <exception>
+#include <type_traits>
 
 namespace gsnav::python {
 
@@ -47,6 +48,16 @@ class ReleaseGil {
  private:
   PyThreadState* state_;
 };
+
+/// A function that calls `f`, a member function of C, without the GIL. Its arguments are copies, because
+/// other threads may change the objects of the caller during the call.
+template <class R, class C, class... A>
+auto without_gil(R (C::*f)(A...) const) {
+  return [f](const C& self, std::remove_cvref_t<A>... args) -> R {
+    const ReleaseGil release;
+    return (self.*f)(args...);
+  };
+}
 
 /// Holds the GIL while it lives.
 class HoldGil {

@@ -26,13 +26,14 @@ namespace {
 struct PythonGreedy {
   std::shared_ptr<const NavMesh> mesh;
   GreedyGeodesicFollower follower;
+  Busy busy;
 };
 
-void make(PythonGreedy* self, std::shared_ptr<const NavMesh> mesh, const Vec3d& goal,
-          const TaskConfig& task, double goal_radius) {
+void make(PythonGreedy* self, std::shared_ptr<const NavMesh> mesh, const Vec3d& goal, TaskConfig task,
+          double goal_radius) {
   const ReleaseGil release;
   auto follower = GreedyGeodesicFollower::make(*mesh, goal, task, {goal_radius}).value();
-  new (self) PythonGreedy{std::move(mesh), std::move(follower)};
+  new (self) PythonGreedy{std::move(mesh), std::move(follower), {}};
 }
 
 /// Sensors at any poses, with the renderer that draws them.
@@ -205,8 +206,9 @@ void bind_free_sensors(nb::module_& m) {
 void bind_habitat(nb::module_& m) {
   m.def(
       "try_step",
-      [](const NavMesh& mesh, const Vec3d& start, const Vec3d& end, bool slide,
-         const SnapOptions& options) { return gsnav::try_step(mesh, start, end, slide, options); },
+      [](const NavMesh& mesh, const Vec3d& start, const Vec3d& end, bool slide, SnapOptions options) {
+        return gsnav::try_step(mesh, start, end, slide, options);
+      },
       nb::arg("mesh"), nb::arg("start"), nb::arg("end"), nb::arg("slide"),
       nb::arg("options") = SnapOptions{}, nb::call_guard<ReleaseGil>(),
       "Moves from any point towards another along the surface. The start is snapped first. Returns None "
@@ -224,6 +226,7 @@ void bind_habitat(nb::module_& m) {
       .def(
           "next",
           [](PythonGreedy& g, const Vec3d& position, double yaw) {
+            const Busy::Hold hold(g.busy, "GreedyGeodesicFollower.next");
             AgentPose pose;
             pose.position = position;
             pose.yaw = yaw;
@@ -234,7 +237,12 @@ void bind_habitat(nb::module_& m) {
           "goal "
           "radius. Raises NothingNavigable if the agent is off the mesh or on another island.")
       .def(
-          "reset", [](PythonGreedy& g) { g.follower.reset(); }, "Forgets the previous actions.");
+          "reset",
+          [](PythonGreedy& g) {
+            const Busy::Hold hold(g.busy, "GreedyGeodesicFollower.reset");
+            g.follower.reset();
+          },
+          "Forgets the previous actions.");
   bind_free_sensors(m);
 }
 

@@ -31,7 +31,7 @@ std::shared_ptr<LodTree> make_lod(const DeviceArg& device, const Cloud& cloud, L
 
 std::shared_ptr<VisibleSets> make_visible_sets(const DeviceArg& device, const Cloud& cloud,
                                                const std::vector<Vec3d>& viewpoints,
-                                               VisibleSettings settings, const Similarity& placed,
+                                               VisibleSettings settings, Similarity placed,
                                                const nb::object& progress) {
   const Device chosen = device.value();
   check_fork(chosen, "build_visible_sets");
@@ -181,12 +181,12 @@ void bind_levels(nb::module_& m) {
   m.def(
       "save_lod",
       [](const std::filesystem::path& path, const LodTree& tree, const Cloud& cloud,
-         const LodSettings& settings) { io::save_lod(path, tree, cloud, settings).throw_if_error(); },
+         LodSettings settings) { io::save_lod(path, tree, cloud, settings).throw_if_error(); },
       nb::arg("path"), nb::arg("tree"), nb::arg("cloud"), nb::arg("settings") = LodSettings{}, Release(),
       "Writes a tree with a hash of the cloud and settings that it was built from.");
   m.def(
       "load_lod",
-      [](const std::filesystem::path& path, const Cloud& cloud, const LodSettings& settings) {
+      [](const std::filesystem::path& path, const Cloud& cloud, LodSettings settings) {
         return std::make_shared<LodTree>(io::load_lod(path, cloud, settings).value());
       },
       nb::arg("path"), nb::arg("cloud"), nb::arg("settings") = LodSettings{}, Release(),

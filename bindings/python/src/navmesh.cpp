@@ -142,8 +142,8 @@ std::optional<NavPoint> random_point_near(const NavMesh& mesh, Rng& rng, const V
 }
 
 void bind_points(nb::class_<NavMesh>& c) {
-  c.def("snap_point", &NavMesh::snap_point, nb::arg("point"), nb::arg("options") = SnapOptions{},
-        Release(),
+  c.def("snap_point", without_gil(&NavMesh::snap_point), nb::arg("point"),
+        nb::arg("options") = SnapOptions{},
         "Nearest point of the surface within `options.half_extents` of `point`. Returns None if no "
         "surface is "
         "within reach or a coordinate is not finite.")
@@ -159,12 +159,12 @@ void bind_points(nb::class_<NavMesh>& c) {
       .def("random_point_near", random_point_near, nb::arg("rng"), nb::arg("point"), nb::arg("radius"),
            nb::arg("island") = nb::none(),
            "Random point, uniform over the surface within `radius` metres. None if that part is empty.")
-      .def("distance_to_closest_obstacle", &NavMesh::distance_to_closest_obstacle, nb::arg("point"),
-           nb::arg("max_radius") = 2.0, nb::arg("options") = SnapOptions{}, Release(),
+      .def("distance_to_closest_obstacle", without_gil(&NavMesh::distance_to_closest_obstacle),
+           nb::arg("point"), nb::arg("max_radius") = 2.0, nb::arg("options") = SnapOptions{},
            "Ground-plane distance to the nearest boundary edge, metres. `max_radius` if none is nearer, "
            "infinity if the point cannot be snapped.")
-      .def("closest_obstacle", &NavMesh::closest_obstacle, nb::arg("point"), nb::arg("max_radius") = 2.0,
-           nb::arg("options") = SnapOptions{}, Release(),
+      .def("closest_obstacle", without_gil(&NavMesh::closest_obstacle), nb::arg("point"),
+           nb::arg("max_radius") = 2.0, nb::arg("options") = SnapOptions{},
            "Nearest boundary edge within `max_radius` metres, or None.")
       .def(
           "top_down_map",
@@ -177,12 +177,12 @@ void bind_points(nb::class_<NavMesh>& c) {
 }
 
 void bind_paths(nb::class_<NavMesh>& c) {
-  c.def("path_status", &NavMesh::path_status, nb::arg("start"), nb::arg("goal"),
-        nb::arg("options") = SnapOptions{}, Release(),
+  c.def("path_status", without_gil(&NavMesh::path_status), nb::arg("start"), nb::arg("goal"),
+        nb::arg("options") = SnapOptions{},
         "Tells whether find_path finds a path, without searching for it.")
       .def(
           "find_path",
-          [](const NavMesh& n, const Vec3d& a, const Vec3d& b, const SnapOptions& o) {
+          [](const NavMesh& n, const Vec3d& a, const Vec3d& b, SnapOptions o) {
             return n.find_path(a, b, o).value();
           },
           nb::arg("start"), nb::arg("goal"), nb::arg("options") = SnapOptions{}, Release(),
@@ -191,36 +191,34 @@ void bind_paths(nb::class_<NavMesh>& c) {
           "none.")
       .def(
           "find_path_to_any",
-          [](const NavMesh& n, const Vec3d& a, const std::vector<Vec3d>& goals, const SnapOptions& o) {
+          [](const NavMesh& n, const Vec3d& a, const std::vector<Vec3d>& goals, SnapOptions o) {
             return n.find_path_to_any(a, goals, o).value();
           },
           nb::arg("start"), nb::arg("goals"), nb::arg("options") = SnapOptions{}, Release(),
           "Shortest of the paths to several goals. Raises NothingNavigable if no goal can be reached.")
       .def("geodesic_distance",
-           nb::overload_cast<const Vec3d&, const Vec3d&, const SnapOptions&>(&NavMesh::geodesic_distance,
-                                                                             nb::const_),
-           nb::arg("start"), nb::arg("goal"), nb::arg("options") = SnapOptions{}, Release(),
+           without_gil(nb::overload_cast<const Vec3d&, const Vec3d&, const SnapOptions&>(
+               &NavMesh::geodesic_distance, nb::const_)),
+           nb::arg("start"), nb::arg("goal"), nb::arg("options") = SnapOptions{},
            "Length of the path that find_path returns, metres. Infinity if there is none.")
       .def(
           "geodesic_distance",
-          [](const NavMesh& n, const Vec3d& a, const std::vector<Vec3d>& goals, const SnapOptions& o) {
+          [](const NavMesh& n, const Vec3d& a, const std::vector<Vec3d>& goals, SnapOptions o) {
             return n.geodesic_distance(a, std::span<const Vec3d>(goals), o);
           },
           nb::arg("start"), nb::arg("goals"), nb::arg("options") = SnapOptions{}, Release(),
           "Distance along the surface to the nearest of several goals, metres.")
       .def(
           "path_between",
-          [](const NavMesh& n, const NavPoint& a, const NavPoint& b) {
-            return n.path_between(a, b).value();
-          },
+          [](const NavMesh& n, NavPoint a, NavPoint b) { return n.path_between(a, b).value(); },
           nb::arg("start"), nb::arg("goal"), Release(),
           "Shortest path between two points whose polygons are known. Raises InvalidArgument for a "
           "polygon "
           "of another mesh, NothingNavigable if there is no path.")
       .def("distance_between",
-           nb::overload_cast<const NavPoint&, const NavPoint&>(&NavMesh::distance_between, nb::const_),
-           nb::arg("start"), nb::arg("goal"), Release(),
-           "Length of the path that path_between returns.");
+           without_gil(nb::overload_cast<const NavPoint&, const NavPoint&>(&NavMesh::distance_between,
+                                                                           nb::const_)),
+           nb::arg("start"), nb::arg("goal"), "Length of the path that path_between returns.");
 }
 
 void bind_mesh(nb::class_<NavMesh>& c) {

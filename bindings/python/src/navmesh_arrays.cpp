@@ -41,7 +41,7 @@ nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu> rows_of_three(n
 
 }  // namespace
 
-std::shared_ptr<NavMesh> build_navmesh(const NavMeshSettings& settings, nb::handle vertices,
+std::shared_ptr<NavMesh> build_navmesh(NavMeshSettings settings, nb::handle vertices,
                                        nb::handle triangles, int threads) {
   const auto v = rows_of_three<double>(vertices, "vertices", "f", "float64");
   const auto t = rows_of_three<std::uint32_t>(triangles, "triangles", "iu", "uint32");

@@ -10,7 +10,7 @@
 namespace gsnav::python {
 
 /// NavMesh::build from arrays of vertices [V][3] and triangles [T][3].
-std::shared_ptr<NavMesh> build_navmesh(const NavMeshSettings& settings, nb::handle vertices,
+std::shared_ptr<NavMesh> build_navmesh(NavMeshSettings settings, nb::handle vertices,
                                        nb::handle triangles, int threads);
 /// NavMesh::surface as a pair of arrays.
 nb::tuple navmesh_surface(const NavMesh& mesh, std::optional<std::size_t> island);

@@ -35,7 +35,7 @@ Status check(const NoiseModel& model, bool depth) {
                                         : "with_noise: redwood_depth needs a depth image of float32"};
 }
 
-nb::object noisy_colors(const NoiseModel& model, std::uint64_t seed, const Array<std::uint8_t>& image) {
+nb::object noisy_colors(NoiseModel model, std::uint64_t seed, const Array<std::uint8_t>& image) {
   check(model, false).throw_if_error();
   const auto channels = image.ndim() == 3 ? image.shape(2) : 0;
   const auto shape =
@@ -55,7 +55,7 @@ nb::object noisy_colors(const NoiseModel& model, std::uint64_t seed, const Array
   return array_from(std::move(out), shape);
 }
 
-nb::object noisy_depth(const NoiseModel& model, std::uint64_t seed, const Array<float>& image) {
+nb::object noisy_depth(NoiseModel model, std::uint64_t seed, const Array<float>& image) {
   check(model, true).throw_if_error();
   const std::size_t sides = image.ndim();
   const auto shape = shape_of(image, "[H][W] or [H][W][1], contiguous and aligned",
@@ -64,8 +64,8 @@ nb::object noisy_depth(const NoiseModel& model, std::uint64_t seed, const Array<
   std::vector<float> out(image.data(), image.data() + image.size());
   if (model.kind != NoiseKind::none) {
     const ReleaseGil release;
-    redwood_depth(model, seed, static_cast<int>(shape[0]), static_cast<int>(shape[1]),
-                  {image.data(), image.size()}, out);
+    const std::vector<float> given(out);  // Other threads may change the image.
+    redwood_depth(model, seed, static_cast<int>(shape[0]), static_cast<int>(shape[1]), given, out);
   }
   return array_from(std::move(out), shape);
 }

@@ -17,7 +17,7 @@ void bind_planned_scene(nb::module_& m) {
       .done();
   m.def(
       "planned_simulator_scene",
-      [](const O& plan, std::size_t people, std::uint64_t seed, double density, const TaskConfig& task) {
+      [](O plan, std::size_t people, std::uint64_t seed, double density, TaskConfig task) {
         return std::make_shared<SimulatorScene>(
             planned_simulator_scene(plan, people, seed, density, task).value());
       },

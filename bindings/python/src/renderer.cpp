@@ -17,8 +17,7 @@ struct PythonRenderer {
   Busy busy;
 };
 
-void make(PythonRenderer* self, const DeviceArg& device, const SceneArg& scene,
-          const RenderOptions& options) {
+void make(PythonRenderer* self, const DeviceArg& device, const SceneArg& scene, RenderOptions options) {
   const Device chosen = device.value();
   check_fork(chosen, "Renderer");
   const ReleaseGil release;

@@ -54,14 +54,14 @@ PythonObservations observe(nb::handle self, const char* what, const F& f) {
 }
 
 void make(PythonSimulator* self, const DeviceArg& device, const SceneArg& scene,
-          const SimulatorConfig& config) {
+          SimulatorConfig config) {
   const Device chosen = device.value();
   check_fork(chosen, "Simulator");
   const ReleaseGil release;
-  new (self) PythonSimulator{Simulator::create(chosen, scene.scene, config).value(), {}};
+  new (self) PythonSimulator{Simulator::create(chosen, scene.scene, std::move(config)).value(), {}};
 }
 
-PythonFrames render(PythonSimulator& s, const Camera& camera, unsigned outputs) {
+PythonFrames render(PythonSimulator& s, Camera camera, unsigned outputs) {
   const Busy::Hold hold(s.busy, "Simulator.render");
   check_fork(s.sim.device(), "Simulator.render");
   const Frames<float>* frames = nullptr;
@@ -103,7 +103,7 @@ void bind_observations(nb::module_& m) {
 void bind_episode_calls(nb::class_<PythonSimulator>& c) {
   c.def(
        "reset",
-       [](nb::handle self, const PointNavEpisode& episode) {
+       [](nb::handle self, PointNavEpisode episode) {
          return observe(self, "Simulator.reset", [&](Simulator& s) { return s.reset(episode); });
        },
        nb::arg("episode"), nb::sig("def reset(self, episode: PointNavEpisode) -> Observations"),

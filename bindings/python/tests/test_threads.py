@@ -74,6 +74,67 @@ def test_rendering_releases_the_interpreter(opened):
     assert ticks > 5  # with the lock held, the loop could not run before the end
 
 
+CHANGES = """
+import sys, threading
+import gsnav
+sys.setswitchinterval(1e-6)
+scene = gsnav.default_simulator_scene(people=0, density=0.05)
+simulator = gsnav.Simulator("serial", scene, gsnav.SimulatorConfig(sensors=[]))
+episode = gsnav.generate_episodes(scene.navmesh, 1, 1)[0]
+start = episode.start_position
+names, places = ("a" * 40, "b" * 4000), (start, start + (0, 50, 0))
+options = gsnav.SnapOptions()
+extents = ((2.0, 4.0, 2.0), (1e-9, 1e-9, 1e-9))
+camera = gsnav.Camera.look_at((5, 1.5, 4), (5, 1, 3), (0, 1, 0), 64, 64, 90)
+running = True
+def change():
+    while running:
+        for i in range(2):
+            episode.id, episode.start_position, camera.height = names[i], places[i], (64, 512)[i]
+            options.half_extents = extents[i]
+thread = threading.Thread(target=change)
+thread.start()
+try:
+    for _ in range(ROUNDS):
+        try:
+            simulator.reset(episode)
+            assert simulator.world.episode.id in names
+        except gsnav.NothingNavigable as e:
+            assert any(name in str(e) for name in names)
+        assert simulator.render(camera).rgb.shape in ((64, 64, 3), (512, 64, 3))
+        scene.navmesh.geodesic_distance(start, start + (1, 0, 0), options)
+finally:
+    running = False
+    thread.join()
+"""
+
+
+def test_settings_may_change_during_a_call():
+    """C++ reads copies of episodes, cameras and settings while other threads run."""
+    program = CHANGES.replace("ROUNDS", "300")
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=200)
+    assert run.returncode == 0, run.stderr
+
+
+def test_a_follower_in_two_threads(people):
+    episode = gsnav.generate_episodes(people.navmesh, 1, 1)[0]
+    follower, refused = gsnav.GreedyGeodesicFollower(people.navmesh, episode.goal_position), []
+
+    end = time.monotonic() + 60
+
+    def run():
+        while not refused and time.monotonic() < end:  # mostly a few milliseconds
+            try:
+                follower.next(episode.start_position, 0.0)
+            except gsnav.InvalidArgument as e:
+                refused.append(str(e))
+
+    threads = [threading.Thread(target=run) for _ in range(3)]
+    [t.start() for t in threads]
+    [t.join() for t in threads]
+    assert refused and all("GreedyGeodesicFollower.next: another call" in text for text in refused)
+
+
 def test_progress_is_called_and_its_errors_do_not_stop_the_work(capfd):
     calls = []
     gsnav.open_scene("default", gsnav.OpenOptions(navmesh="gaussians", density=0.05),
