@@ -30,9 +30,12 @@ void set_viewmat(Camera& c, nb::handle value) {
   good = good && m[3][0] == 0 && m[3][1] == 0 && m[3][2] == 0 && m[3][3] == 1;
   if (!good) {
     PyErr_Clear();
-    throw nb::value_error(
-        "Camera.viewmat: expected numbers of shape (4, 4) with the last row 0 0 0 1, "
-        "or of shape (3, 4)");
+    const std::string text =
+        "Camera.viewmat: expected numbers of shape (4, 4) with the last row 0 0 0 1, or of shape (3, "
+        "4), "
+        "got " +
+        text_of(nb::repr(value));
+    throw nb::value_error(text.c_str());
   }
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) c.viewmat.linear(i, j) = m[i][j];

@@ -103,23 +103,27 @@ void bind_placement(nb::module_& m) {
 void bind_assets(nb::module_& m) {
   using A = SceneAsset;
   const auto itself = [](const A& a) { return A(a); };
-  const auto optional = nb::for_setter(nb::arg("value").none());
-  nb::class_<A>(m, "SceneAsset",
-                "Static Gaussians of a scene, with their placement, levels of detail and visible sets.")
-      .def(
-          "__init__",
-          [](A* self, std::shared_ptr<const Cloud> cloud, const Similarity& placed,
-             std::shared_ptr<const LodTree> lod, std::shared_ptr<const VisibleSets> visible) {
-            new (self) A{std::move(cloud), placed, std::move(lod), std::move(visible), {}, {}};
-          },
-          nb::arg("cloud"), nb::arg("world_from_asset") = Similarity{}, nb::arg("lod") = nb::none(),
-          nb::arg("visible") = nb::none(), "Shares its parts with other assets.")
-      .def_ro("cloud", &A::cloud, "The Gaussians, or None if they are packed (CloudStorage.packed).")
-      .def_rw("world_from_asset", &A::world_from_asset, "Placement in the world.")
-      .def_rw("lod", &A::lod, optional, "Levels of detail of `cloud` (build_lod), or None.")
-      .def_rw("visible", &A::visible, optional, "Visible sets of `cloud` (build_visible_sets), or None.")
-      .def("__copy__", itself, nb::sig("def __copy__(self) -> SceneAsset"),
-           "An asset that shares the parts of this one.")
+  nb::class_<A> c(
+      m, "SceneAsset",
+      "Static Gaussians of a scene, with their placement, levels of detail and visible sets.");
+  c.def(
+       "__init__",
+       [](A* self, std::shared_ptr<const Cloud> cloud, const Similarity& placed,
+          std::shared_ptr<const LodTree> lod, std::shared_ptr<const VisibleSets> visible) {
+         new (self) A{std::move(cloud), placed, std::move(lod), std::move(visible), {}, {}};
+       },
+       nb::arg("cloud"), nb::arg("world_from_asset") = Similarity{}, nb::arg("lod") = nb::none(),
+       nb::arg("visible") = nb::none(), "Shares its parts with other assets.")
+      .def_ro("cloud", &A::cloud, nb::for_getter(nb::sig("def cloud(self) -> GaussianCloud | None")),
+              "The Gaussians, or None if they are packed (CloudStorage.packed).");
+  bind_member(c, "SceneAsset", "world_from_asset", "Similarity", &A::world_from_asset,
+              "Placement in the world.");
+  bind_member(c, "SceneAsset", "lod", "LodTree | None", &A::lod,
+              "Levels of detail of `cloud` (build_lod), or None.");
+  bind_member(c, "SceneAsset", "visible", "VisibleSets | None", &A::visible,
+              "Visible sets of `cloud` (build_visible_sets), or None.");
+  c.def("__copy__", itself, nb::sig("def __copy__(self) -> SceneAsset"),
+        "An asset that shares the parts of this one.")
       .def(
           "__deepcopy__", [itself](const A& a, nb::handle) { return itself(a); }, nb::arg("memo"),
           nb::sig("def __deepcopy__(self, memo: dict[int, object]) -> SceneAsset"),

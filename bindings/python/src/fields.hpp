@@ -68,6 +68,31 @@ inline std::string type_of(nb::handle object) {
   return nb::cast<std::string>(object.type().attr("__name__"));
 }
 
+/// The exception for a field that was given a value of another type.
+inline nb::builtin_exception wrong_type(const std::string& name, const std::string& field,
+                                        const std::string& type, nb::handle value) {
+  return nb::type_error(
+      (name + "." + field + ": expected " + type + ", got " + text_of(nb::repr(value))).c_str());
+}
+
+/// Adds a property for a member of type V. `type` names what it takes in `name`.`field`.
+template <class V, class C>
+void bind_member(nb::class_<C>& c, const char* name, const char* field, const char* type, V C::*member,
+                 const char* doc) {
+  const std::string getter = std::string("def ") + field + "(self) -> " + type;
+  const std::string setter = std::string("def ") + field + "(self, value: " + type + ", /) -> None";
+  c.def_prop_rw(
+      field, [member](C& object) -> V& { return object.*member; },
+      [member, of = std::string(name), field = std::string(field), type = std::string(type)](
+          C& object, nb::handle value) {
+        V made{};
+        if (!nb::try_cast<V>(value, made)) throw wrong_type(of, field, type, value);
+        object.*member = std::move(made);
+      },
+      nb::for_getter(nb::rv_policy::reference_internal), nb::for_getter(nb::sig(getter.c_str())),
+      nb::for_setter(nb::sig(setter.c_str())), nb::for_setter(nb::arg("value").none()), doc);
+}
+
 /// Binds a C++ struct of settings or results as a Python class. Fields are attributes and keywords of
 /// the constructor. Objects can be printed, copied and pickled.
 template <class T, class... Base>
@@ -158,12 +183,6 @@ class Struct {
     std::function<nb::object(const T&)> get;
     std::function<bool(T&, nb::handle)> set;
   };
-
-  static nb::builtin_exception wrong_type(const std::string& name, const std::string& field,
-                                          const std::string& type, nb::handle value) {
-    return nb::type_error(
-        (name + "." + field + ": expected " + type + ", got " + text_of(nb::repr(value))).c_str());
-  }
 
   static void fill(T& made, const std::string& name, const std::vector<Field>& fields,
                    const nb::dict& values) {

@@ -90,3 +90,26 @@ def test_paths_are_names(tmp_path):
     for wrong in (b"x.ply", 7, None):
         with pytest.raises(TypeError, match="name must be a str or an os.PathLike"):
             gsnav.open_scene(wrong)
+
+
+def test_a_wrong_value_names_class_and_field(opened):
+    asset, camera = opened.scene.assets[0], gsnav.Camera()
+    for thing, field, wrong, words in [
+            (asset, "lod", 7, r"SceneAsset.lod: expected LodTree \| None, got 7"),
+            (asset, "visible", "all", r"SceneAsset.visible: expected VisibleSets \| None, got 'all'"),
+            (asset, "world_from_asset", None, "SceneAsset.world_from_asset: expected Similarity, got None"),
+            (asset, "world_from_asset", [1], r"SceneAsset.world_from_asset: expected Similarity, got \[1\]"),
+            (camera, "viewmat", "abcd", r"Camera.viewmat: expected numbers of shape \(4, 4\).*, got 'abcd'"),
+            (camera, "viewmat", None, "Camera.viewmat: expected numbers .* got None"),
+            (camera, "viewmat", 3.5, "Camera.viewmat: expected numbers .* got 3.5"),
+            (camera, "fx", "wide", "Camera.fx: expected float, got 'wide'")]:
+        before = repr(getattr(thing, field))
+        with pytest.raises(ValueError if field == "viewmat" else TypeError, match=words):
+            setattr(thing, field, wrong)
+        if field not in ("lod", "visible"):
+            assert repr(getattr(thing, field)) == before
+    asset.lod = asset.visible = None
+    asset.world_from_asset.scale = 2.0
+    assert asset.lod is None and asset.visible is None and asset.world_from_asset.scale == 2.0
+    asset.world_from_asset = gsnav.Similarity(scale=3.0)
+    assert asset.world_from_asset.scale == 3.0
