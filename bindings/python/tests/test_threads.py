@@ -227,3 +227,37 @@ def test_without_numpy_the_import_is_an_error():
     code = "import sys; sys.modules['numpy'] = None; import gsnav._gsnav"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert run.returncode == 1 and "ImportError" in run.stderr or "ModuleNotFoundError" in run.stderr
+
+
+TWICE = """
+import importlib
+import sys
+import gsnav
+scene = gsnav.default_simulator_scene(people=0, density=0.05)
+kept = {name: sys.modules.pop(name) for name in list(sys.modules) if name.split(".")[0] == "gsnav"}
+for _ in range(2):
+    try:
+        import gsnav
+    except ImportError as e:
+        print("refused:", e)
+    for name in list(sys.modules):
+        if name.split(".")[0] == "gsnav":
+            del sys.modules[name]
+sys.modules["gsnav._gsnav"] = kept["gsnav._gsnav"]
+import gsnav
+env = gsnav.Env(scene, config=gsnav.SimulatorConfig(sensors=gsnav.rgbd_sensors(8, 8)))
+env.reset(seed=1)
+importlib.reload(gsnav)
+print("alive", env.step(1)[1])
+"""
+
+
+def test_a_second_import_is_an_error():
+    run = subprocess.run([sys.executable, "-c", TWICE], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.count("refused: gsnav cannot be loaded twice") == 2 and "alive" in run.stdout
+    # After an import that failed, another one works.
+    code = "import sys, numpy; sys.modules['numpy'] = None\ntry:\n    import gsnav._gsnav\nexcept ImportError:"
+    again = code + "\n    pass\nsys.modules['numpy'] = numpy\nimport gsnav; print(gsnav.Rng(1).next())"
+    run = subprocess.run([sys.executable, "-c", again], capture_output=True, text=True)
+    assert run.returncode == 0 and run.stdout.strip() == str(gsnav.Rng(1).next()), run.stderr
