@@ -23,6 +23,12 @@ inline constexpr bool is_list<std::vector<V>> = true;
 template <class V, std::size_t N>
 inline constexpr bool is_list<std::array<V, N>> = true;
 
+/// True for fields that may be None.
+template <class V>
+inline constexpr bool is_optional = false;
+template <class V>
+inline constexpr bool is_optional<std::optional<V>> = true;
+
 template <class V>
 struct TypeName {
   static std::string get() {
@@ -103,10 +109,16 @@ class Struct {
   /// Binds a field.
   template <class V, class C>
   Struct& field(const char* name, V C::*member, const char* doc) {
+    // Python may hold the value of a field that has become None. It lies in its owner, which it keeps
+    // alive, so it must not own other memory.
+    static_assert(!is_optional<V> || std::is_trivially_destructible_v<V>);
     const std::string type = TypeName<V>::get();
     const auto set = [member](T& t, nb::handle h) {
       V v{};
       if (!nb::try_cast<V>(h, v)) return false;
+      if constexpr (is_optional<V>) {
+        if (!v) return (t.*member).reset(), true;  // Leaves the numbers that Python may hold.
+      }
       t.*member = std::move(v);
       return true;
     };

@@ -63,6 +63,32 @@ def test_circles_without_the_simulator_are_freed(people, what):
         assert kept.any()
 
 
+@pytest.mark.parametrize("owner, field, make, change", [
+    (gsnav.SimulatorConfig, "lod", gsnav.LodChoice, {"pixels": 3.0}),
+    (gsnav.BatchConfig, "lod", gsnav.LodChoice, {"pixels": 3.0}),
+    (gsnav.DetailChoice, "lod", gsnav.LodChoice, {"pixels": 3.0}),
+    (gsnav.OpenOptions, "navmesh_settings", gsnav.NavMeshSettings, {"cell_size": 3.0}),
+    (gsnav.OpenOptions, "crop", gsnav.Aabb, {"low": (3.0, 3.0, 3.0)}),
+])
+def test_a_value_of_a_field_outlives_the_field(owner, field, make, change):
+    """The value belongs to its owner, keeps it alive, and can be changed there. None leaves it as it was."""
+    made = owner(**{field: make()})
+    (name, number), = change.items()
+    value = getattr(made, field)
+    setattr(value, name, number)
+    assert np.array_equal(getattr(getattr(made, field), name), number)
+    setattr(made, field, None)
+    gc.collect()
+    others = [owner(**{field: make()}) for _ in range(100)]  # They would take the memory.
+    assert np.array_equal(getattr(value, name), number) and getattr(made, field) is None
+    setattr(value, name, getattr(getattr(others[0], field), name))
+    assert getattr(made, field) is None
+    del made, others
+    gc.collect()
+    [owner(**{field: make(**change)}) for _ in range(100)]
+    assert repr(value) == repr(make())
+
+
 AT_EXIT = """
 import threading
 import gsnav
