@@ -28,6 +28,7 @@ from ._spaces import AutoresetMode, BaseVectorEnv, batch_space, make_generator
 # An array per sensor: float32 of numpy, or a DeviceArray.
 Observation = dict[str, Any]
 
+BOOLS = {bool, np.bool_}
 AUTO_RESETS = {"NextStep": AutoReset.next_step, "SameStep": AutoReset.same_step, "Disabled": AutoReset.disabled}
 
 
@@ -186,6 +187,8 @@ class VectorEnv(BaseVectorEnv):
         return mask
 
     def _checked(self, actions: Any) -> npt.NDArray[np.integer[Any]]:
+        if isinstance(actions, (list, tuple)) and not BOOLS.isdisjoint(map(type, actions)):
+            raise TypeError(f"VectorEnv.step: actions = {actions!r}: a bool is no action; use integers")
         array = np.asarray(_task.from_dlpack(to_host(actions), "VectorEnv.step: actions"))
         if array.dtype.kind not in "iu":
             raise TypeError(f"VectorEnv.step: actions have dtype {array.dtype}: use integers")

@@ -71,8 +71,13 @@ nb::object integer_of(nb::handle value) {
 
 Action action_from(nb::handle value, const char* what) {
   const std::string where = what;
-  const nb::object index =
-      PyIndex_Check(value.ptr()) ? nb::steal(PyNumber_Index(value.ptr())) : integer_of(value);
+  nb::object index;
+  if (PyBool_Check(value.ptr())) {  // An integer to Python, and a mistake here.
+  } else if (PyIndex_Check(value.ptr())) {
+    index = nb::steal(PyNumber_Index(value.ptr()));
+  } else {
+    index = integer_of(value);
+  }
   if (!index.is_valid()) {
     PyErr_Clear();
     throw nb::type_error((where + ": expected an Action or an integer, got " + type_of(value)).c_str());

@@ -82,6 +82,30 @@ inline bool read_array(nb::handle source, double* out, Py_ssize_t count) noexcep
   return true;
 }
 
+/// Whether an object is a complex number or array. Python would drop its imaginary part with a warning.
+inline bool is_complex(nb::handle source) noexcept {
+  if (PyFloat_Check(source.ptr()) || PyLong_Check(source.ptr())) return false;
+  if (PyComplex_Check(source.ptr())) return true;
+  PyObject* const type = PyObject_GetAttrString(source.ptr(), "dtype");
+  PyObject* const kind = type == nullptr ? nullptr : PyObject_GetAttrString(type, "kind");
+  const bool found =
+      kind != nullptr && PyUnicode_Check(kind) && PyUnicode_CompareWithASCIIString(kind, "c") == 0;
+  Py_XDECREF(kind);
+  Py_XDECREF(type);
+  PyErr_Clear();
+  return found;
+}
+
+/// Reads a real number. `convert`: also from objects that Python can convert to float.
+inline bool read_real(nb::handle source, bool convert, double& out) noexcept {
+  if (!convert && !PyFloat_CheckExact(source.ptr())) return false;
+  if (is_complex(source)) return false;
+  out = PyFloat_AsDouble(source.ptr());
+  if (!PyErr_Occurred()) return true;
+  PyErr_Clear();
+  return false;
+}
+
 /// Reads `count` numbers from a sequence or array. Returns false if it is anything else.
 inline bool read_numbers(nb::handle source, double* out, Py_ssize_t count) noexcept {
   if (!PyList_Check(source.ptr()) && !PyTuple_Check(source.ptr()) && read_array(source, out, count))
@@ -93,8 +117,7 @@ inline bool read_numbers(nb::handle source, double* out, Py_ssize_t count) noexc
     PyObject* const item = PySequence_GetItem(source.ptr(), i);
     good = item != nullptr;
     if (!good) break;
-    out[i] = PyComplex_Check(item) ? -1 : PyFloat_AsDouble(item);  // NumPy would drop the imaginary part
-    good = !PyErr_Occurred() && !PyComplex_Check(item);
+    good = read_real(item, true, out[i]);
     Py_DECREF(item);
   }
   PyErr_Clear();
@@ -152,6 +175,34 @@ struct type_caster<gsnav::python::AnyArray<A>> {
     if (!gsnav::python::has_strides(source) || !array.from_python(source, flags, cleanup)) return false;
     static_cast<A&>(value) = std::move(array.value);
     return true;
+  }
+};
+
+/// nanobind's own caster takes complex numbers of numpy.
+template <>
+struct type_caster<double> {
+  NB_TYPE_CASTER(double, const_name("float"))
+  bool from_python(handle source, std::uint32_t flags, cleanup_list*) noexcept {
+    return gsnav::python::read_real(
+        source, (flags & static_cast<std::uint32_t>(cast_flags::convert)) != 0, value);
+  }
+  static handle from_cpp(double number, rv_policy, cleanup_list*) noexcept {
+    return PyFloat_FromDouble(number);
+  }
+};
+
+template <>
+struct type_caster<float> {
+  NB_TYPE_CASTER(float, const_name("float"))
+  bool from_python(handle source, std::uint32_t flags, cleanup_list*) noexcept {
+    const bool convert = (flags & static_cast<std::uint32_t>(cast_flags::convert)) != 0;
+    double number = 0;
+    if (!gsnav::python::read_real(source, convert, number)) return false;
+    value = static_cast<float>(number);
+    return convert || static_cast<double>(value) == number || number != number;
+  }
+  static handle from_cpp(float number, rv_policy, cleanup_list*) noexcept {
+    return PyFloat_FromDouble(static_cast<double>(number));
   }
 };
 

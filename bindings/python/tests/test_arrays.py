@@ -294,3 +294,28 @@ def test_dates_of_numpy_are_refused(people, small, envs, date):
     for call in calls:
         with pytest.raises((TypeError, ValueError)):
             call()
+
+
+COMPLEX = [1 + 2j, np.complex64(1 + 2j), np.complex128(1 + 2j), np.array(1 + 2j, np.complex64), np.array([1 + 2j])]
+
+
+@pytest.mark.parametrize("number", COMPLEX, ids=lambda x: f"{type(x).__name__}-{getattr(x, 'dtype', '')}")
+def test_complex_numbers_are_no_floats(people, square, number):
+    """numpy would drop the imaginary part, with a warning that most programs do not show."""
+    camera, task, quality = gsnav.Camera(), gsnav.TaskConfig(), gsnav.Quality()
+    for call in (lambda: setattr(camera, "fx", number), lambda: setattr(task, "max_steps", number),
+                 lambda: gsnav.TaskConfig(agent_radius=number), lambda: setattr(quality, "alpha_min", number),
+                 lambda: gsnav.Aabb(low=[0, number, 0]), lambda: gsnav.SnapOptions(half_extents=(1, 1, number)),
+                 lambda: gsnav.FisheyeLens(focal_length=[number, 1]), lambda: gsnav.SensorSpec(hfov=number),
+                 lambda: square.find_path([0, 0, number], [1, 0, 1]), lambda: gsnav.rgbd_sensors(8, 8, number),
+                 lambda: gsnav.navmesh_viewpoints(square, [number], 1.0),
+                 lambda: gsnav.default_simulator_scene(density=number)):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with pytest.raises(TypeError):
+                call()
+    with pytest.raises(TypeError, match=r"Camera.fx: expected float, got .*2"):
+        camera.fx = number
+    camera.fx = np.float32(0.5)
+    task.agent_radius, camera.fy = np.array(0.25), np.int16(7)
+    assert (camera.fx, camera.fy, task.agent_radius) == (0.5, 7.0, 0.25)

@@ -153,6 +153,7 @@ def test_environments_do_not_share_what_the_caller_may_change(people, small):
 @pytest.mark.parametrize("actions, error", [
     ([1, 2], ValueError), ([[1], [2], [3]], ValueError), ([1.0, 2.0, 3.0], TypeError), ([1, 4, 1], ValueError),
     ([1, -1, 1], ValueError), (["a", "b", "c"], TypeError), (None, TypeError), ([True] * 3, TypeError),
+    ([1, 1, True], TypeError), ((1, np.True_, 2), TypeError), (np.array([1, 2, 3], np.complex64), TypeError),
     ([math.nan] * 3, TypeError),
 ])
 def test_wrong_actions(envs, actions, error):
@@ -169,6 +170,15 @@ def test_a_bool_is_no_action(env):
         with pytest.raises(gsnav.InvalidArgument, match="Env.step: action"):
             env.step(wrong)
     assert env.simulator.world.state().steps == 0
+
+
+def test_a_bool_is_no_action_of_a_simulator(env, envs):
+    env.reset(seed=1), envs.reset(seed=1)
+    for wrong in (True, np.True_, np.array(True)):
+        for call in (lambda: env.simulator.step(wrong), lambda: envs.simulator.step([1, 1, wrong])):
+            with pytest.raises(TypeError, match="expected an Action or an integer, got "):
+                call()
+    assert env.simulator.world.state().steps == envs.simulator.world(0).state().steps == 0
 
 
 def test_wrong_resets(envs):
