@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import pathlib
 from collections.abc import Sequence
@@ -15,6 +16,20 @@ import numpy as np
 from . import _task
 from ._errors import InvalidArgument
 from ._gsnav import EpisodeMetrics
+
+
+DATASET = ".scene_dataset_config.json"
+START = '{"journal": "gsnav.ray", '
+
+
+def resolved(scene: Any) -> Any:
+    """The absolute path of a scene without symbolic links. "default" and objects are returned as they are."""
+    if not isinstance(scene, (str, os.PathLike)) or scene == "default":
+        return scene
+    file, dataset, inside = str(os.fspath(scene)).partition(DATASET + "#")
+    if not dataset:
+        return os.path.realpath(file)
+    return os.path.realpath(file + DATASET) + "#" + inside
 
 
 def header(identity: Sequence[Any], episodes: Sequence[_task.Episode], piece: int) -> str:
@@ -37,7 +52,7 @@ def lines(path: pathlib.Path, header: str) -> list[str]:
     if not path.exists():
         return []
     try:
-        text = path.read_text()
+        text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as e:
         raise InvalidArgument(f"{path} is not a journal: {e}") from e
     if not text.startswith(header + "\n") and not (header + "\n").startswith(text):
@@ -45,18 +60,38 @@ def lines(path: pathlib.Path, header: str) -> list[str]:
     return text.split("\n")[1:-1]
 
 
-def metrics(path: pathlib.Path, lines: Sequence[str]) -> list[EpisodeMetrics]:
+def begin(path: pathlib.Path, kept: Sequence[str]) -> None:
+    """Writes a journal with these lines. A failure leaves the one that was there."""
+    part = path.with_name(path.name + ".part")
+    if part.is_symlink() or part.exists():  # a process was killed, or it is another file
+        text = part.read_text(encoding="utf-8", errors="replace") if part.is_file() and not part.is_symlink() else "?"
+        if not text.startswith(START) and not START.startswith(text):
+            raise InvalidArgument(f"{part} is in the way and is no journal: move it away")
+    part.write_text("\n".join([*kept, ""]), encoding="utf-8")
+    part.replace(path)
+
+
+def _is_finite(values: Sequence[Any]) -> bool:
+    return all(v is None or math.isfinite(v) for v in values)
+
+
+def metrics(path: pathlib.Path, lines: Sequence[str], episodes: Sequence[_task.Episode]) -> list[EpisodeMetrics]:
     """Metrics of the episodes 0, 1, ... of a journal."""
     read = []
     for i, line in enumerate(lines):
+        episode: Any = getattr(episodes[i], "episode", episodes[i])
         try:
             row = json.loads(line)
-            values = dict[str, Any]((n, np.inf if v is None else v) for n, v in row["metrics"].items())
-            if values.keys() != set(_task.METRIC_FIELDS):
+            if row["metrics"].keys() != set(_task.METRIC_FIELDS):
                 raise ValueError("its metrics are not those of an episode")
             if row["episode"] != i:
                 raise ValueError(f"it is of episode {row['episode']}")
+            if row["id"] != episode.id:
+                raise ValueError(f"its id is {row['id']!r}, not {episode.id!r}")
+            if not _is_finite([row["reward"], *row["metrics"].values()]):
+                raise ValueError("it has a number that is not finite; infinity is null")
+            values = dict[str, Any]((n, np.inf if v is None else v) for n, v in row["metrics"].items())
             read.append(EpisodeMetrics(**values))
-        except (ValueError, KeyError, TypeError, AttributeError) as e:
+        except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as e:
             raise InvalidArgument(f"{path}: line {i + 2} is not that of episode {i}: {e}") from e
     return read

@@ -43,7 +43,8 @@ class Rollout:
     def line(self) -> str:
         """The episode's line in a journal, with the fields of a journal of gsnav-eval. Infinity is null."""
         metrics = {n: v if np.isfinite(v) else None for n, v in _task.metrics_dict(self.metrics).items()}
-        return json.dumps({"episode": self.episode, "id": self.id, "reward": sum(self.rewards.tolist()),
+        reward = sum(self.rewards.tolist())
+        return json.dumps({"episode": self.episode, "id": self.id, "reward": reward if np.isfinite(reward) else None,
                            "metrics": metrics, "actions": "".join(map(str, self.actions.tolist()))})
 
 
@@ -107,9 +108,9 @@ class Workers:
         self.deaths = 0  # Number of actors that died and were replaced.
         settings = {**settings, "config": copy.deepcopy(settings.get("config") or SimulatorConfig())}
         scenes = list(scene) if isinstance(scene, (list, tuple)) else [scene]
-        self._identity = [environments, scenes, settings["config"]]
+        self._identity = [environments, [_journal.resolved(one) for one in scenes], settings["config"]]
         self._arguments = (environments, scene, settings)
-        self._local = None if actors else Player(*self._arguments)
+        self._local = None if actors else Player(environments, self._identity[1], settings)
         self._actors: list[Any] = []
         if actors:
             import ray
@@ -144,15 +145,14 @@ class Workers:
         """Plays episodes and writes a line for each to `journal`, in order. Returns their metrics.
 
         An existing journal of the same evaluation is continued. Use the policy that it was begun with. Scenes must
-        have names, because the journal is of these scenes.
+        have names, because the journal is of these scenes: of the absolute paths of their files.
         """
         header = _journal.header(self._identity, episodes, piece)
-        path, part = pathlib.Path(journal), pathlib.Path(os.fspath(journal) + ".part")
+        path = pathlib.Path(os.path.realpath(journal))  # A link stays a link.
         lines = _journal.lines(path, header)
         whole = len(episodes) if len(lines) >= len(episodes) else len(lines) // piece * piece
-        kept, metrics = [header, *lines[:whole]], _journal.metrics(path, lines[:whole])
-        part.write_text("\n".join([*kept, ""]))
-        part.replace(path)
+        kept, metrics = [header, *lines[:whole]], _journal.metrics(path, lines[:whole], episodes)
+        _journal.begin(path, kept)
         with path.open("a") as f:
             for one in self.rollouts(episodes, make_policy, piece=piece, first=whole):
                 print(one.line(), file=f, flush=True)

@@ -72,6 +72,41 @@ def test_a_single_process_plays_every_episode(episodes, alone):
             assert getattr(world.metrics(), name) == (np.inf if value is None else value), name
 
 
+def wrong_numbers(whole):
+    """Journals whose line 3 is wrong, and words of the error."""
+    row = json.loads(whole[2])
+    metrics = row["metrics"]
+    for change, words in [({"id": "other"}, "line 3 .* its id is 'other', not '1'"),
+                          ({"reward": float("nan")}, "line 3 .* not finite"),
+                          ({"metrics": {**metrics, "spl": float("nan")}}, "line 3 .* not finite"),
+                          ({"metrics": {**metrics, "spl": float("inf")}}, "line 3 .* not finite"),
+                          ({"metrics": {**metrics, "spl": "high"}}, "line 3"), ({"reward": 10**400}, "line 3"),
+                          ({"metrics": {**metrics, "success": None}}, "line 3 .* EpisodeMetrics.success"),
+                          ({"metrics": []}, "line 3"), ({"episode": None}, "line 3")]:
+        yield "".join([*whole[:2], json.dumps({**row, **change}) + "\n", *whole[3:]]), words
+    yield "".join([*whole[:2], "[1]\n", *whole[3:]]), "line 3"
+
+
+def test_a_journal_behind_a_link_and_a_file_that_was_left(episodes, alone, tmp_path):
+    workers = gsnav.ray.Workers(actors=0, environments=3, config=CONFIG)
+    (tmp_path / "disk").mkdir()
+    journal, link, other = tmp_path / "disk" / "journal.jsonl", tmp_path / "link.jsonl", tmp_path / "mine"
+    link.symlink_to(journal)
+    journal.with_name("journal.jsonl.part").write_bytes(alone[0][:2000])  # of a process that was killed
+    for _ in range(2):
+        workers.evaluate(episodes, policy_maker(), link, piece=4)
+        assert link.is_symlink() and journal.read_bytes() == alone[0]
+        assert sorted(p.name for p in journal.parent.iterdir()) == ["journal.jsonl"]
+    part = journal.with_name("journal.jsonl.part")
+    for block in (lambda: part.write_text("my notes"), lambda: part.symlink_to(other), part.mkdir):
+        block()
+        other.write_text("mine")
+        with pytest.raises(gsnav.InvalidArgument, match="journal.jsonl.part is in the way"):
+            workers.evaluate(episodes, policy_maker(), journal, piece=4)
+        assert journal.read_bytes() == alone[0] and other.read_text() == "mine"
+        part.rmdir() if part.is_dir() else part.unlink()
+
+
 def test_a_journal_is_continued(episodes, alone, tmp_path):
     workers = gsnav.ray.Workers(actors=0, environments=3, config=CONFIG)
     journal = tmp_path / "journal.jsonl"
@@ -88,7 +123,8 @@ def test_a_journal_is_continued(episodes, alone, tmp_path):
     for text, words in [("my notes", "other episodes"), (whole[0] + "x\n" + "".join(whole[2:]), "line 2"),
                         ("".join([whole[0], whole[2], whole[1], *whole[3:]]), "line 2 .* of episode 1"),
                         ("".join([*whole[:3], *whole[4:]]), "line 4"),
-                        ("".join([*whole[:2], whole[2].replace('"spl"', '"lps"'), *whole[3:]]), "line 3 .* metrics")]:
+                        ("".join([*whole[:2], whole[2].replace('"spl"', '"lps"'), *whole[3:]]), "line 3 .* metrics"),
+                        *wrong_numbers(whole)]:
         foreign.write_text(text)
         with pytest.raises(gsnav.InvalidArgument, match=words):
             workers.evaluate(episodes, policy_maker(), foreign, piece=4)
@@ -110,6 +146,24 @@ def test_a_journal_is_of_its_scenes(episodes, tmp_path):
                   for one in (tmp_path / "a.ply", str(tmp_path / "a.ply"), tmp_path / "b.ply")]
     a, same, b = (gsnav._journal.header(one, episodes, 4) for one in identities)
     assert a == same != b
+
+
+def test_a_relative_name_is_of_its_folder(episodes, tmp_path, monkeypatch):
+    headers = []
+    for folder in ("one", "two"):
+        (tmp_path / folder).mkdir()
+        monkeypatch.chdir(tmp_path / folder)
+        workers = gsnav.ray.Workers("a.ply", actors=0, environments=3, config=CONFIG)
+        monkeypatch.chdir(tmp_path)
+        headers.append(gsnav._journal.header(workers._identity, episodes, 4))
+    (tmp_path / "link").symlink_to("two")
+    for name in (tmp_path / "two" / "a.ply", "two/a.ply", "two/../one/../two/a.ply", "link/a.ply"):
+        workers = gsnav.ray.Workers(name, actors=0, environments=3, config=CONFIG)
+        headers.append(gsnav._journal.header(workers._identity, episodes, 4))
+    assert len(set(headers)) == 2 and len(set(headers[1:])) == 1
+    resolved = gsnav._journal.resolved
+    assert resolved("default") == "default" and resolved(workers) is workers
+    assert resolved("link/b.scene_dataset_config.json#c/d") == f"{tmp_path}/two/b.scene_dataset_config.json#c/d"
 
 
 @pytest.mark.filterwarnings("ignore")
