@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from . import _memory
 from ._errors import InvalidArgument, OutOfMemory
 from ._gsnav import (
     BatchEpisode,
@@ -35,6 +36,8 @@ from ._spaces import Box, Dict, Discrete
 # Discrete actions of PointNav: stop, move_forward, turn_left, turn_right.
 ACTIONS = 4
 POINT_GOAL = "point_goal"
+# Memory of an environment without sensors: its generator and its world.
+ENVIRONMENT_BYTES = 2000
 # Bound of values without one. Gymnasium warns of infinite bounds.
 LARGEST = float(np.finfo(np.float32).max)
 # Fields of StepInfo that environments report at each step. The reward is returned on its own.
@@ -135,18 +138,18 @@ def memory_for_spaces(config: SimulatorConfig, environments: int) -> Iterator[No
     """Checks the sensors, and names them if there is no memory for the spaces of their images.
 
     Linux may promise more memory than there is, and then kills the process that uses it. So the size is compared
-    with that of the machine.
+    with that of the machine, or with the limit of a container.
     """
     for sensor in config.sensors:
         sensor.validate()
     try:
-        numbers = environments * sum(math.prod(image_shape(s)) for s in config.sensors)
-        needed, present = 8 * numbers, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-        if needed > present > 0:  # two bounds of 4 bytes
-            raise MemoryError(f"{needed / 1e9:.0f} GB of {present / 1e9:.0f}")
+        numbers = sum(math.prod(image_shape(s)) for s in config.sensors)
+        needed, present = environments * (8 * numbers + ENVIRONMENT_BYTES), _memory.limit()  # two bounds of 4 bytes
+        if needed > present > 0:
+            raise MemoryError(f"{needed / 1e9:.3g} GB of {present / 1e9:.3g}")
         yield
     except MemoryError as e:
-        sizes = ", ".join(f"{s.uuid!r}: resolution = {list(s.resolution)}" for s in config.sensors)
+        sizes = ", ".join(f"{s.uuid!r}: resolution = {list(s.resolution)}" for s in config.sensors) or "no sensors"
         raise OutOfMemory(f"config.sensors: no memory for the spaces of {environments} environments ({sizes}): "
                           f"{e}") from e
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import copy
 import math
+import os
 import pickle
 
 import numpy as np
@@ -298,6 +299,35 @@ def test_sizes_that_no_sensor_can_have(people, sides):
 def test_spaces_without_memory_name_the_sensors(people, small):
     with pytest.raises(gsnav.OutOfMemory, match=r"2147483648 environments \('rgb': resolution = \[16, 24\]"):
         gsnav.VectorEnv(2**31, people, config=small)
+    with pytest.raises(gsnav.OutOfMemory, match=r"1099511627776 environments \(no sensors\): "):
+        gsnav.VectorEnv(2**40, people, config=gsnav.SimulatorConfig(sensors=[]))
+
+
+@pytest.mark.parametrize("group, limits, expected", [
+    ("0::/a/b", {"a/b/memory.max": "max", "a/memory.max": "5000000", "memory.max": "7000000"}, 5_000_000),
+    ("0::/a/b", {"a/b/memory.max": "3000000", "a/memory.max": "5000000"}, 3_000_000),
+    ("0::/of/the/host", {"memory.max": "4000000"}, 4_000_000),
+    ("0::/../..", {"memory.max": "4000000"}, 4_000_000),
+    ("5:cpu,memory:/docker/x\n0::/", {"memory/docker/x/memory.limit_in_bytes": "6000000"}, 6_000_000),
+    ("5:memory:/docker/x", {"memory/memory.limit_in_bytes": "2000000", "memory.max": "1"}, 2_000_000),
+    ("5:memory:/", {"memory/memory.limit_in_bytes": "9223372036854771712"}, None),
+    ("4:cpu:/a", {"a/memory.max": "7"}, None), ("", {"memory.max": "7"}, None), ("no group", {}, None),
+])
+def test_limits_of_containers(people, small, tmp_path, monkeypatch, group, limits, expected):
+    for name, text in limits.items():
+        (tmp_path / "sys/fs/cgroup" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "sys/fs/cgroup" / name).write_text(text + "\n")
+    assert gsnav._memory.limit(str(tmp_path)) == gsnav._memory.limit(str(tmp_path / "nowhere"))
+    (tmp_path / "proc/self").mkdir(parents=True)
+    (tmp_path / "proc/self/cgroup").write_text(group + "\n")
+    machine = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    assert gsnav._memory.limit(str(tmp_path)) == (machine if expected is None else expected)
+    if expected is not None:
+        limit = gsnav._memory.limit
+        monkeypatch.setattr(gsnav._memory, "limit", lambda: limit(str(tmp_path)))
+        for config in (small, gsnav.SimulatorConfig(sensors=[])):
+            with pytest.raises(gsnav.OutOfMemory, match=f"5000 environments .* GB of {expected / 1e9:.3g}$"):
+                gsnav.VectorEnv(5000, people, config=config)
 
 
 def test_the_spec_makes_the_environment_again(people, small):
