@@ -32,6 +32,10 @@ Status validate(const OpenOptions& o) {
     return bad("agent_radius", o.agent_radius, "0 or more, metres");
   if (!(o.agent_height > 0 && std::isfinite(o.agent_height)))
     return bad("agent_height", o.agent_height, "positive, metres");
+  for (int k = 0; o.crop && k < 3; ++k) {
+    if (std::isnan(o.crop->low[k])) return bad("crop.low", o.crop->low[k], "a number");
+    if (std::isnan(o.crop->high[k])) return bad("crop.high", o.crop->high[k], "a number");
+  }
   if (!(o.density >= 0.05 && o.density <= 20)) return bad("density", o.density, "in [0.05, 20]");
   if (o.up != "auto" && o.up != "keep") {
     if (const auto turned = upright(o.up); !turned)

@@ -328,6 +328,8 @@ TEST_CASE("open: names and options that cannot be are said, and nothing crashes"
   refused("agent_radius", [&](OpenOptions& o) { o.agent_radius = -1; });
   refused("agent_height", [&](OpenOptions& o) { o.agent_height = 0; });
   refused("unseen_color", [&](OpenOptions& o) { o.unseen_color = -1; });
+  refused("crop.low", [&](OpenOptions& o) { o.crop = Aabb<double>{{0, nan, 0}, {1, 1, 1}}; });
+  refused("crop.high", [&](OpenOptions& o) { o.crop = Aabb<double>{{0, 0, 0}, {nan, 1, 1}}; });
   refused("level", [](OpenOptions& o) { o.level = -1; });
   refused("people", [&](OpenOptions& o) { o.density = 0.05, o.people = 1; });
 }

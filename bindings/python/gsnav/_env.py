@@ -52,7 +52,8 @@ class Env(BaseEnv):
         episodes: episodes to draw from. Default: they are sampled by `rules`.
         render_mode: None, or "rgb_array" for the image of the first RGB sensor in 8 bit.
         """
-        config = SimulatorConfig() if config is None else config
+        config = _task.settings(config)
+        _task.checked(device, (Device, str), "device")
         with _task.memory_for_spaces(config, 1):
             self.observation_space = _task.observation_space(config)
         self.action_space = _task.action_space()

@@ -8,7 +8,7 @@ import copy
 import enum
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -97,6 +97,19 @@ def undone_if_it_fails(env: Any, generators: list[np.random.Generator]) -> Itera
         raise
 
 
+def checked(value: Any, kinds: type | tuple[type, ...], what: str) -> None:
+    """Raises TypeError, with the name of the argument, if a value that is not None has another type."""
+    kinds = kinds if isinstance(kinds, tuple) else (kinds,)
+    if value is not None and not isinstance(value, kinds):
+        raise TypeError(f"{what}: expected {' or '.join(kind.__name__ for kind in kinds)}, got {value!r}")
+
+
+def settings(config: Any) -> SimulatorConfig:
+    """The settings of environments; the defaults for None."""
+    checked(config, SimulatorConfig, "config")
+    return SimulatorConfig() if config is None else config
+
+
 def scene_of(scene: Scene, config: SimulatorConfig) -> SimulatorScene:
     """The scene with a NavMesh. A name is opened, and a NavMesh is built for the agent if none is there."""
     if isinstance(scene, (str, os.PathLike)):
@@ -128,7 +141,8 @@ def sensor_space(sensor: SensorSpec) -> Box:
         return Box(-1.0, 1.0, shape, np.float32)
     if sensor.kind == SensorKind.depth:
         # Depth is below 0 where the camera is inside a Gaussian (docs/reference/image_contract.md).
-        return Box(-sensor.far_plane, sensor.far_plane, shape, np.float32)
+        far = min(sensor.far_plane, LARGEST)  # It may be infinite.
+        return Box(-far, far, shape, np.float32)
     high = 1.0 if sensor.kind == SensorKind.alpha else LARGEST
     return Box(0.0, high, shape, np.float32)
 
@@ -206,9 +220,12 @@ class Episodes:
     def __init__(self, scenes: Sequence[SimulatorScene], episodes: Sequence[Episode] | None,
                  rules: EpisodeRules | None) -> None:
         self._scenes = scenes
-        self._rules = copy.copy(rules) if rules else EpisodeRules()  # The caller may change its own.
+        checked(rules, EpisodeRules, "rules")
+        self._rules = EpisodeRules() if rules is None else copy.copy(rules)  # The caller may change its own.
         self.given: list[BatchEpisode] | None = None  # Copies of the episodes.
         if episodes is not None:
+            if isinstance(episodes, (str, Mapping)) or not isinstance(episodes, Iterable):
+                raise TypeError(f"episodes: expected a sequence of episodes, got {episodes!r}")
             self.given = [self._checked(e, i) for i, e in enumerate(episodes)]
             if not self.given:
                 raise InvalidArgument("episodes: the list is empty; use None to sample episodes")

@@ -80,7 +80,9 @@ class VectorEnv(BaseVectorEnv):
         Other arguments are those of Env. `config` may be a BatchConfig. With `images=ImageMemory.backend` and a GPU,
         images are DeviceArrays: views that torch and JAX take without a copy.
         """
-        config = SimulatorConfig() if config is None else config
+        config = _task.settings(config)
+        _task.checked(device, (Device, str), "device")
+        _task.checked(copy, bool, "copy")
         mode = AutoresetMode(getattr(autoreset_mode, "value", autoreset_mode))
         self.metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 4, "autoreset_mode": mode}
         if not isinstance(num_envs, (int, np.integer)) or isinstance(num_envs, bool):

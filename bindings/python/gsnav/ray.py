@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from . import _journal, _task
 from ._errors import BackendFailure, ClosedEnvironment, InvalidArgument
-from ._gsnav import EpisodeMetrics, SimulatorConfig
+from ._gsnav import EpisodeMetrics
 from ._vector_env import Observation, VectorEnv
 
 # Returns the actions [N] for observations and the index of each environment's episode, int64 [N].
@@ -106,7 +106,7 @@ class Workers:
         settings: other arguments of VectorEnv, such as `config` and `device`.
         """
         self.deaths = 0  # Number of actors that died and were replaced.
-        settings = {**settings, "config": copy.deepcopy(settings.get("config") or SimulatorConfig())}
+        settings = {**settings, "config": copy.deepcopy(_task.settings(settings.get("config")))}
         scenes = list(scene) if isinstance(scene, (list, tuple)) else [scene]
         self._identity = [environments, [_journal.resolved(one) for one in scenes], settings["config"]]
         self._arguments = (environments, scene, settings)

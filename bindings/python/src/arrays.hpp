@@ -52,6 +52,13 @@ nb::object array_copy(std::span<const T> values, const std::vector<std::size_t>&
   return nb::cast(nb::ndarray<nb::numpy, T>(data, shape.size(), shape.data(), owner));
 }
 
+/// Throws gsnav::Error naming a setting whose value is not finite.
+inline void check_finite(const char* what, double value) {
+  if (is_finite(value)) return;
+  throw Error(Errc::invalid_argument,
+              std::string(what) + " = " + std::to_string(value) + ": must be finite");
+}
+
 /// Whether numbers of type T may be read at this address.
 template <class T>
 bool is_aligned(const void* data) noexcept {

@@ -73,10 +73,10 @@ void bind_generation(nb::module_& m) {
   Struct<R>(m, "EpisodeRules",
             "Rules for sampling episodes. The defaults are those of Habitat's generator.")
       .field("min_distance", &R::min_distance, "Smallest geodesic distance, metres.")
-      .field("max_distance", &R::max_distance, "Largest geodesic distance, metres.")
+      .field("max_distance", &R::max_distance, "Largest geodesic distance, metres. May be infinite.")
       .field("min_island_radius", &R::min_island_radius, "Smallest radius of an island, metres.")
       .field("max_height_difference", &R::max_height_difference,
-             "Largest height difference of start and goal, metres.")
+             "Largest height difference of start and goal, metres. May be infinite.")
       .field("straight_ratio", &R::straight_ratio,
              "Paths with a smaller ratio of length to straight distance are mostly refused.")
       .field("retries_per_goal", &R::retries_per_goal, "Number of starts to try per goal.")

@@ -140,6 +140,7 @@ nb::list draw_places(PythonFreeSensors& self, const std::vector<PosePairs>& plac
                      std::size_t threads) {
   const Busy::Hold hold(self.busy, "FreeSensors.render_places");
   check_fork(self.renderer.device(), "FreeSensors.render_places");
+  check_finite("FreeSensors.render_places: time", time);
   const std::size_t sensors = self.sensors.sensors().size();
   std::vector<SensorPose> poses;
   for (const PosePairs& place : places) {

@@ -27,6 +27,7 @@ void make(PythonRenderer* self, const DeviceArg& device, const SceneArg& scene, 
 PythonFrames render(PythonRenderer& self, const std::vector<Camera>& cameras, double time, bool single) {
   const Busy::Hold hold(self.busy, "Renderer.render");
   check_fork(self.renderer.device(), "Renderer.render");
+  check_finite("Renderer.render: time", time);
   {
     const ReleaseGil release;
     self.renderer.render(std::span<const Camera>(cameras), self.frames, time).throw_if_error();

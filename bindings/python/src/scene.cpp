@@ -46,7 +46,8 @@ void bind_options(nb::module_& m) {
           "Settings of a built NavMesh, instead of cell_size, agent_radius and agent_height. Gaussians "
           "get voxels of at most 0.05 m height, or of cell_size if that is larger.")
       .field("cell_size", &O::cell_size, "Edge of the voxels of a built NavMesh, metres.")
-      .field("crop", &O::crop, "Builds the NavMesh in this box only; world frame, metres.")
+      .field("crop", &O::crop,
+             "Builds the NavMesh in this box only; world frame, metres. May be infinite.")
       .field("agent_radius", &O::agent_radius, "Radius of the agent of a built NavMesh, metres.")
       .field("agent_height", &O::agent_height, "Height of the agent of a built NavMesh, metres.")
       .field("visible_sets", &O::visible_sets, "Visible sets: \"\" (none), \"auto\" or a file.")

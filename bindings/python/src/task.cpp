@@ -118,7 +118,8 @@ void bind_sensors(nb::module_& m) {
       .field("orientation", &S::orientation, "Euler angles about X, then Y, then Z, radians, shape [3].")
       .field("near_plane", &S::near_plane, "Near plane, metres.")
       .field("near_sigma", &S::near_sigma, "See Camera.near_sigma.")
-      .field("far_plane", &S::far_plane, "Far plane, metres. Depth beyond it is no return.")
+      .field("far_plane", &S::far_plane,
+             "Far plane, metres. Depth beyond it is no return. Infinity: no limit.")
       .field("fisheye", &S::fisheye, "Lens of SensorModel.fisheye.")
       .field("cube_size", &S::cube_size,
              "Pixels of the cube that other models are resampled from; 0: auto.")

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "world.hpp"
 
+#include "arrays.hpp"
 #include "bind.hpp"
 #include "fields.hpp"
 #include "gsnav/sim.hpp"
@@ -60,7 +61,14 @@ void bind_policies(nb::module_& m) {
   nb::class_<GeodesicFollower>(m, "GeodesicFollower",
                                "Policy for demonstrations: follows the shortest path and gives way to "
                                "avatars. Deterministic.")
-      .def(nb::init<const FollowerOptions&>(), nb::arg("options") = FollowerOptions{})
+      .def(
+          "__init__",
+          [](GeodesicFollower* self, const FollowerOptions& options) {
+            check_finite("FollowerOptions.watch_distance", options.watch_distance);
+            check_finite("FollowerOptions.comfort", options.comfort);
+            new (self) GeodesicFollower(options);
+          },
+          nb::arg("options") = FollowerOptions{}, "Raises InvalidArgument naming the setting.")
       .def(
           "next",
           [](const GeodesicFollower& f, const WorldView& w) {

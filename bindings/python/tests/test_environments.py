@@ -284,6 +284,60 @@ def test_wrong_arguments(people, small, square):
         gsnav.Env("nowhere.ply")
 
 
+@pytest.mark.parametrize("argument, wrong, words", [
+    ("config", {}, r"config: expected SimulatorConfig, got \{\}"), ("config", 5, "config: expected .* got 5"),
+    ("rules", {}, r"rules: expected EpisodeRules, got \{\}"), ("rules", 0, "rules: expected EpisodeRules, got 0"),
+    ("episodes", 5, "episodes: expected a sequence .* got 5"), ("episodes", {}, r"episodes: expected .* got \{\}"),
+    ("episodes", "mine.json", "episodes: expected"), ("device", 5, "device: expected Device or str, got 5"),
+    ("episodes", [7], r"episodes\[0\]: expected a PointNavEpisode or a BatchEpisode, got int"),
+])
+def test_an_argument_of_another_type_is_named(people, small, argument, wrong, words):
+    arguments = {"config": small, argument: wrong}
+    for make in (lambda: gsnav.Env(people, **arguments), lambda: gsnav.VectorEnv(2, people, **arguments)):
+        with pytest.raises(TypeError, match=words):
+            make()
+    with pytest.raises(TypeError, match="copy: expected bool, got 'no'"):
+        gsnav.VectorEnv(2, people, config=small, copy="no")
+
+
+def test_depth_without_a_far_plane(people):
+    sensors = gsnav.rgbd_sensors(16, 24)
+    images = []
+    for far in (1e6, math.inf):
+        sensors[1].far_plane = far
+        env = gsnav.Env(people, config=gsnav.SimulatorConfig(sensors=sensors))
+        images.append(env.reset(seed=1)[0]["depth"])
+        assert np.isfinite(env.observation_space["depth"].high).all() and images[-1] in env.observation_space["depth"]
+    assert np.array_equal(*images) and images[0].any()
+    for far in (math.nan, -math.inf, 0.0):
+        sensors[1].far_plane = far
+        with pytest.raises(gsnav.InvalidArgument, match='SensorSpec "depth": far_plane = '):
+            gsnav.Env(people, config=gsnav.SimulatorConfig(sensors=sensors))
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_settings_that_are_no_numbers_are_named(people, square, value):
+    camera, cloud = gsnav.Camera.look_at((5, 1.5, 4), (5, 1, 3), (0, 1, 0), 8, 8, 90), people.assets[0].cloud
+
+    def playing(task):
+        return gsnav.Env(people, config=gsnav.SimulatorConfig(task=task))
+
+    for call, words in [
+            (lambda: gsnav.Renderer("cpu", people).render(camera, value), "Renderer.render: time"),
+            (lambda: gsnav.GeodesicFollower(gsnav.FollowerOptions(comfort=value)), "FollowerOptions.comfort"),
+            (lambda: playing(gsnav.TaskConfig(skin=value)), "TaskConfig.skin"),
+            (lambda: playing(gsnav.TaskConfig(reward=gsnav.RewardConfig(slack=value))), "TaskConfig.reward"),
+            (lambda: gsnav.build_visible_sets("cpu", cloud, [(5, 1.5, 4)], gsnav.VisibleSettings(cell=value)), "cell")]:
+        with pytest.raises(gsnav.InvalidArgument, match=f"{words} = -?(nan|inf)"):
+            call()
+    if math.isnan(value):
+        crop = gsnav.Aabb(low=(0, value, 0), high=(1, 1, 1))
+        with pytest.raises(gsnav.InvalidArgument, match="OpenOptions.crop.low = nan"):
+            gsnav.open_scene("default", gsnav.OpenOptions(navmesh="auto", crop=crop))
+        with pytest.raises(gsnav.InvalidArgument, match="max_distance = nan"):
+            gsnav.generate_episodes(square, 1, 1, gsnav.EpisodeRules(max_distance=value))
+
+
 @pytest.mark.parametrize("sides", [(2**15, 2**15), (2**30, 1), (0, 8)])
 def test_sizes_that_no_sensor_can_have(people, sides):
     sensors = gsnav.rgbd_sensors(8, 8)
