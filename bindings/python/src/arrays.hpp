@@ -34,22 +34,35 @@ struct FreeAligned {
   void operator()(void* p) const noexcept { ::operator delete(p, kAlignment); }
 };
 
-/// A writable numpy array with a copy of `values`, aligned to kAlignment. A long copy is made without
-/// the GIL, so no other thread may change `values`.
+/// A writable numpy array, aligned to kAlignment, whose numbers are not set. `data` is their address.
 template <class T>
-nb::object array_copy(std::span<const T> values, const std::vector<std::size_t>& shape) {
+nb::object new_array(const std::vector<std::size_t>& shape, T*& data) {
   static_assert(std::is_trivially_copyable_v<T>);
+  std::size_t count = 1;
+  for (const std::size_t n : shape) count *= n;
   std::unique_ptr<T, FreeAligned> held(
-      static_cast<T*>(::operator new(values.size_bytes() + sizeof(T), kAlignment)));
-  T* const data = held.get();
-  {
-    std::optional<ReleaseGil> release;
-    if (values.size_bytes() > 1u << 17) release.emplace();
-    std::copy(values.begin(), values.end(), data);
-  }
+      static_cast<T*>(::operator new(count * sizeof(T) + sizeof(T), kAlignment)));
+  data = held.get();
   nb::capsule owner(data, [](void* p) noexcept { FreeAligned()(p); });
   held.release();
   return nb::cast(nb::ndarray<nb::numpy, T>(data, shape.size(), shape.data(), owner));
+}
+
+/// Copies numbers, which no other thread may change. A long copy is made without the GIL.
+template <class T>
+void copy_numbers(std::span<const T> values, T* to) {
+  std::optional<ReleaseGil> release;
+  if (values.size_bytes() > 1u << 17) release.emplace();
+  std::copy(values.begin(), values.end(), to);
+}
+
+/// A writable numpy array with a copy of `values`, aligned to kAlignment (copy_numbers).
+template <class T>
+nb::object array_copy(std::span<const T> values, const std::vector<std::size_t>& shape) {
+  T* data = nullptr;
+  nb::object array = new_array(shape, data);
+  copy_numbers(values, data);
+  return array;
 }
 
 /// Throws gsnav::Error naming a setting whose value is not finite.

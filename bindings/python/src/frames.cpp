@@ -8,27 +8,40 @@
 
 namespace gsnav::python {
 
+void FrameArrays::add(const Frames<float>& part) {
+  using P = PythonFrames;
+  constexpr nb::object P::*kArrays[] = {&P::rgb,
+                                        &P::alpha,
+                                        &P::median_depth,
+                                        &P::expected_depth,
+                                        &P::accumulated_depth,
+                                        &P::first_hit_depth};
+  static_assert(std::size(kArrays) == std::size(Frames<float>::kVectors));
+  const std::size_t before = made_.stats.size();  // Cameras that are there.
+  made_.height = part.height;
+  made_.width = part.width;
+  for (std::size_t i = 0; i < std::size(kArrays); ++i) {
+    const std::vector<float>& values = part.*Frames<float>::kVectors[i];
+    if (values.empty()) {
+      made_.*kArrays[i] = nb::none();
+      continue;
+    }
+    if (data_[i] == nullptr) {
+      std::vector<std::size_t> shape;
+      if (!single_) shape.push_back(made_.cameras);
+      shape.insert(shape.end(), {part.height, part.width});
+      if (i == 0) shape.push_back(3);
+      made_.*kArrays[i] = new_array(shape, data_[i]);
+    }
+    copy_numbers(std::span(values), data_[i] + values.size() / part.cameras * before);
+  }
+  made_.stats.insert(made_.stats.end(), part.stats.begin(), part.stats.end());
+}
+
 PythonFrames python_frames(const Frames<float>& frames, bool single) {
-  PythonFrames out;
-  out.cameras = frames.cameras;
-  out.height = frames.height;
-  out.width = frames.width;
-  const auto image = [&](const std::vector<float>& values, std::size_t channels) -> nb::object {
-    if (values.empty()) return nb::none();
-    std::vector<std::size_t> shape;
-    if (!single) shape.push_back(frames.cameras);
-    shape.insert(shape.end(), {frames.height, frames.width});
-    if (channels > 1) shape.push_back(channels);
-    return array_copy(std::span(values), shape);
-  };
-  out.rgb = image(frames.rgb, 3);
-  out.alpha = image(frames.alpha, 1);
-  out.median_depth = image(frames.median_depth, 1);
-  out.expected_depth = image(frames.expected_depth, 1);
-  out.accumulated_depth = image(frames.accumulated_depth, 1);
-  out.first_hit_depth = image(frames.first_hit_depth, 1);
-  out.stats = frames.stats;
-  return out;
+  FrameArrays arrays(frames.cameras, single);
+  arrays.add(frames);
+  return arrays.take();
 }
 
 void bind_frames(nb::module_& m) {

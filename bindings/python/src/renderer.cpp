@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/device/renderer.hpp"
 
+#include <unistd.h>
+
+#include <algorithm>
+#include <thread>
+
 #include "arrays.hpp"
 #include "bind.hpp"
 #include "fields.hpp"
 #include "frames.hpp"
+#include "gsnav/detail/image/validate_camera.hpp"
 #include "guard.hpp"
 
 namespace gsnav::python {
@@ -14,6 +20,7 @@ namespace {
 struct PythonRenderer {
   Renderer renderer;
   Frames<float> frames;  ///< Images of the last call. Their memory is used again.
+  bool one_choice;       ///< The cameras of a call share a choice of detail, so they stay together.
   Busy busy;
 };
 
@@ -21,18 +28,51 @@ void make(PythonRenderer* self, const DeviceArg& device, const SceneArg& scene, 
   const Device chosen = device.value();
   check_fork(chosen, "Renderer");
   const ReleaseGil release;
-  new (self) PythonRenderer{Renderer::create(chosen, scene.scene, options).value(), {}, {}};
+  const bool one_choice = options.detail.lod.has_value() || options.detail.visible_sets;
+  new (self) PythonRenderer{Renderer::create(chosen, scene.scene, options).value(), {}, one_choice, {}};
+}
+
+/// Number of cameras that are rendered at a time. Between the parts, Ctrl-C ends a call. A part has
+/// enough pixels and cameras for all threads. All cameras are one part if one of them is wrong or if
+/// memory is short, so that the renderer refuses them before it renders any.
+std::size_t part_of(const PythonRenderer& self, std::span<const Camera> cameras) {
+  constexpr double kPixels = 1 << 23, kBytesPerPixel = 32;
+  if (self.one_choice || cameras.empty()) return cameras.size();
+  for (const Camera& c : cameras) {
+    const bool fits = c.width == cameras[0].width && c.height == cameras[0].height;
+    if (!fits || !validate(c)) return cameras.size();
+  }
+  const double pixels = static_cast<double>(cameras[0].width) * cameras[0].height;
+  const double memory =
+      static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+  if (kBytesPerPixel * pixels * static_cast<double>(cameras.size()) > memory) return cameras.size();
+  const Device& device = self.renderer.device();
+  std::size_t threads = 1;
+  if (device.kind() != DeviceKind::serial) {
+    threads = device.threads() > 0 ? static_cast<std::size_t>(device.threads())
+                                   : std::max(1u, std::thread::hardware_concurrency());
+  }
+  return std::max(static_cast<std::size_t>(kPixels / pixels), 2 * threads);
 }
 
 PythonFrames render(PythonRenderer& self, const std::vector<Camera>& cameras, double time, bool single) {
   const Busy::Hold hold(self.busy, "Renderer.render");
   check_fork(self.renderer.device(), "Renderer.render");
   check_finite("Renderer.render: time", time);
-  {
-    const ReleaseGil release;
-    self.renderer.render(std::span<const Camera>(cameras), self.frames, time).throw_if_error();
-  }
-  return python_frames(self.frames, single);
+  FrameArrays arrays(cameras.size(), single);
+  std::span<const Camera> left(cameras);
+  const std::size_t most = part_of(self, left);
+  do {
+    const auto part = left.first(std::min(most, left.size()));
+    left = left.subspan(part.size());
+    {
+      const ReleaseGil release;
+      self.renderer.render(part, self.frames, time).throw_if_error();
+    }
+    if (PyErr_CheckSignals() != 0) throw nb::python_error();
+    arrays.add(self.frames);
+  } while (!left.empty());
+  return arrays.take();
 }
 
 }  // namespace
@@ -62,7 +102,8 @@ void bind_renderer(nb::module_& m) {
             return render(r, cameras, time, false);
           },
           nb::arg("cameras"), nb::arg("time") = 0.0,
-          "Renders C cameras of one image size. Images have the shape [C][H][W] or [C][H][W][3].")
+          "Renders C cameras of one image size. Images have the shape [C][H][W] or [C][H][W][3]. Ctrl-C "
+          "ends the call after about eight million pixels, unless the renderer chooses detail.")
       .def(
           "set_config",
           [](PythonRenderer& r, const RenderConfig& config) {

@@ -150,6 +150,53 @@ def test_ctrl_c_in_progress_is_not_lost():
         gsnav.open_scene("default", gsnav.OpenOptions(navmesh="gaussians", density=0.05), stop)
 
 
+INTERRUPTED = """
+import os, signal, threading, time
+import gsnav
+scene = gsnav.default_simulator_scene(people=1, density=0.05)
+camera = gsnav.Camera.look_at((5, 1.5, 4), (5, 1, 3), (0, 1, 0), 1024, 1024, 90)
+renderer = gsnav.Renderer("serial", scene)
+start = time.perf_counter()
+renderer.render([camera] * 8)
+whole = 8 * (time.perf_counter() - start)
+timer = threading.Timer(whole / 32, os.kill, (os.getpid(), signal.SIGINT))
+start = time.perf_counter()
+timer.start()
+try:
+    renderer.render([camera] * 64)
+except KeyboardInterrupt:
+    print(f"{(time.perf_counter() - start) / whole:.2f}")
+assert renderer.render(camera).rgb.any()
+"""
+
+
+def test_ctrl_c_ends_the_rendering_of_many_cameras():
+    run = subprocess.run([sys.executable, "-c", INTERRUPTED], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert float(run.stdout) < 0.6  # of the time of the whole call; mostly an eighth
+
+
+def test_many_cameras_are_rendered_in_parts_with_the_same_bits(people):
+    cameras = [gsnav.Camera.look_at((5, 1.5, 4 + 0.1 * i), (5, 1, 3), (0, 1, 0), 1536, 1024, 90) for i in range(13)]
+    outputs = int(gsnav.Output.kRgb | gsnav.Output.kMedianDepth)
+    renderer = gsnav.Renderer("cpu:1", people, gsnav.RenderOptions(render=gsnav.RenderConfig(outputs=outputs)))
+    frames = renderer.render(cameras, 1.5)
+    assert frames.rgb.shape == (13, 1024, 1536, 3) and frames.median_depth.shape == (13, 1024, 1536)
+    assert frames.alpha is None and frames.cameras == len(frames.stats) == 13
+    for i in (0, 4, 5, 9, 12):
+        one = renderer.render(cameras[i], 1.5)
+        assert np.array_equal(one.rgb, frames.rgb[i]) and np.array_equal(one.median_depth, frames.median_depth[i])
+        assert repr(one.stats[0].visible) == repr(frames.stats[i].visible)
+    for wrong, words in [({"fx": 0.0}, "Camera.fx"), ({"width": 64}, "one size")]:
+        last = gsnav.Camera(**{**cameras[0].__getstate__(), **wrong})
+        start = time.process_time()
+        with pytest.raises(gsnav.InvalidArgument, match=words):
+            renderer.render([*cameras, last])
+        assert time.process_time() - start < 0.5  # before anything is rendered
+    with pytest.raises(gsnav.InvalidArgument, match="no camera"):
+        renderer.render([])
+
+
 def _in_child(function):
     """Runs function in a forked child. Returns its exit status, or None after 60 s."""
     pid = os.fork()
