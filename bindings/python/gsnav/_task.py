@@ -98,15 +98,16 @@ def undone_if_it_fails(env: Any, generators: list[np.random.Generator]) -> Itera
 
 
 def checked(value: Any, kinds: type | tuple[type, ...], what: str) -> None:
-    """Raises TypeError, with the name of the argument, if a value that is not None has another type."""
+    """Raises TypeError, with the name of the argument, if a value has another type."""
     kinds = kinds if isinstance(kinds, tuple) else (kinds,)
-    if value is not None and not isinstance(value, kinds):
-        raise TypeError(f"{what}: expected {' or '.join(kind.__name__ for kind in kinds)}, got {value!r}")
+    if not isinstance(value, kinds):
+        names = ["None" if kind is type(None) else kind.__name__ for kind in kinds]
+        raise TypeError(f"{what}: expected {' or '.join(names)}, got {value!r}")
 
 
 def settings(config: Any) -> SimulatorConfig:
     """The settings of environments; the defaults for None."""
-    checked(config, SimulatorConfig, "config")
+    checked(config, (SimulatorConfig, type(None)), "config")
     return SimulatorConfig() if config is None else config
 
 
@@ -220,7 +221,7 @@ class Episodes:
     def __init__(self, scenes: Sequence[SimulatorScene], episodes: Sequence[Episode] | None,
                  rules: EpisodeRules | None) -> None:
         self._scenes = scenes
-        checked(rules, EpisodeRules, "rules")
+        checked(rules, (EpisodeRules, type(None)), "rules")
         self._rules = EpisodeRules() if rules is None else copy.copy(rules)  # The caller may change its own.
         self.given: list[BatchEpisode] | None = None  # Copies of the episodes.
         if episodes is not None:

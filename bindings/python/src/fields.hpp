@@ -115,6 +115,9 @@ class Struct {
     const std::string type = TypeName<V>::get();
     const auto set = [member](T& t, nb::handle h) {
       V v{};
+      if constexpr (std::is_integral_v<V> && !std::is_same_v<V, bool>) {
+        if (PyBool_Check(h.ptr())) return false;  // An integer to Python, and a mistake here.
+      }
       if (!nb::try_cast<V>(h, v)) return false;
       if constexpr (is_optional<V>) {
         if (!v) return (t.*member).reset(), true;  // Leaves the numbers that Python may hold.

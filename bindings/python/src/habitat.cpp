@@ -228,6 +228,7 @@ void bind_habitat(nb::module_& m) {
           "next",
           [](PythonGreedy& g, const Vec3d& position, double yaw) {
             const Busy::Hold hold(g.busy, "GreedyGeodesicFollower.next");
+            check_finite("GreedyGeodesicFollower.next: yaw", yaw);
             AgentPose pose;
             pose.position = position;
             pose.yaw = yaw;

@@ -147,8 +147,9 @@ def test_wrong_arguments(people, small, square):
 
 
 @pytest.mark.parametrize("argument, wrong, words", [
-    ("config", {}, r"config: expected SimulatorConfig, got \{\}"), ("config", 5, "config: expected .* got 5"),
-    ("rules", {}, r"rules: expected EpisodeRules, got \{\}"), ("rules", 0, "rules: expected EpisodeRules, got 0"),
+    ("config", {}, r"config: expected SimulatorConfig or None, got \{\}"), ("config", 5, "config: expected .* got 5"),
+    ("rules", {}, r"rules: expected EpisodeRules or None, got \{\}"), ("rules", 0, "rules: expected .* got 0"),
+    ("device", None, "device: expected Device or str, got None"),
     ("episodes", 5, "episodes: expected a sequence .* got 5"), ("episodes", {}, r"episodes: expected .* got \{\}"),
     ("episodes", "mine.json", "episodes: expected"), ("device", 5, "device: expected Device or str, got 5"),
     ("episodes", [7], r"episodes\[0\]: expected a PointNavEpisode or a BatchEpisode, got int"),
@@ -160,6 +161,17 @@ def test_an_argument_of_another_type_is_named(people, small, argument, wrong, wo
             make()
     with pytest.raises(TypeError, match="copy: expected bool, got 'no'"):
         gsnav.VectorEnv(2, people, config=small, copy="no")
+
+
+def test_a_bool_is_no_number_of_steps_and_no_seed():
+    for owner, field in [(gsnav.TaskConfig(), "max_steps"), (gsnav.SimulatorConfig(), "seed"),
+                         (gsnav.OpenOptions(), "seed")]:
+        with pytest.raises(TypeError, match=f"{type(owner).__name__}.{field}: expected int, got True"):
+            setattr(owner, field, True)
+        with pytest.raises(TypeError, match=f"{type(owner).__name__}.{field}: expected int, got True"):
+            type(owner)(**{field: True})
+        setattr(owner, field, np.int64(7))
+        assert getattr(owner, field) == 7
 
 
 def test_depth_without_a_far_plane(people):
@@ -186,6 +198,7 @@ def test_settings_that_are_no_numbers_are_named(people, square, value):
 
     for call, words in [
             (lambda: gsnav.Renderer("cpu", people).render(camera, value), "Renderer.render: time"),
+            (lambda: gsnav.GreedyGeodesicFollower(square, (1, 0, 1)).next((2, 0, 2), value), "Follower.next: yaw"),
             (lambda: gsnav.GeodesicFollower(gsnav.FollowerOptions(comfort=value)), "FollowerOptions.comfort"),
             (lambda: playing(gsnav.TaskConfig(skin=value)), "TaskConfig.skin"),
             (lambda: playing(gsnav.TaskConfig(reward=gsnav.RewardConfig(slack=value))), "TaskConfig.reward"),
