@@ -153,6 +153,7 @@ def test_ctrl_c_in_progress_is_not_lost():
 INTERRUPTED = """
 import os, signal, threading, time
 import gsnav
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have ignored it
 scene = gsnav.default_simulator_scene(people=1, density=0.05)
 camera = gsnav.Camera.look_at((5, 1.5, 4), (5, 1, 3), (0, 1, 0), 1024, 1024, 90)
 renderer = gsnav.Renderer("serial", scene)
