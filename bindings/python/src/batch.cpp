@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <chrono>
 #include <optional>
 #include <variant>
 
@@ -188,6 +189,32 @@ PythonStep step(nb::handle self, nb::handle actions) {
       chosen);
 }
 
+/// Seconds of some steps without Python between them: what speed.py compares VectorEnv with.
+double time_steps(nb::handle self, const std::vector<nb::object>& steps) {
+  auto& b = object_of<PythonBatch>(self);
+  const Busy::Hold hold(b.core->busy, "BatchSimulator._time_steps");
+  if (steps.empty() || b.core->pool != nullptr || !b.core->images->function.is_none()) {
+    throw Error(Errc::invalid_argument,
+                "BatchSimulator._time_steps: needs one step, copy = False and no image_source");
+  }
+  std::vector<BatchActions> chosen;
+  for (const nb::object& actions : steps) {
+    chosen.push_back(batch_actions(actions, b.core->sim.environments()));
+  }
+  std::chrono::duration<double> took{};
+  observe(b, "BatchSimulator._time_steps", [&](BatchSimulator& sim) {
+    const auto start = std::chrono::steady_clock::now();
+    std::optional<Result<BatchStep>> last;
+    for (const BatchActions& actions : chosen) {
+      last.emplace(std::visit([&](const auto& a) { return sim.step(a); }, actions));
+      if (!last->ok()) break;
+    }
+    took = std::chrono::steady_clock::now() - start;
+    return std::move(*last);
+  });
+  return took.count();
+}
+
 void check_environment(const BatchCore& b, std::size_t environment) {
   if (environment >= b.sim.environments()) {
     throw nb::index_error(
@@ -292,6 +319,9 @@ void bind_batch(nb::module_& m) {
            "Performs one action per environment and renders. `actions`: integers [N] of any dtype, "
            "stride "
            "and library (DLPack), or a list. Wrong actions are refused before any environment moves.")
+      .def("_time_steps", time_steps, nb::arg("actions"),
+           nb::sig("def _time_steps(self, actions: list[typing.Any]) -> float"),
+           "Seconds of these steps in C++, for benchmarks.")
       .def_prop_ro(
           "environments", [](const P& p) { return p.core->sim.environments(); },
           "Number of environments, N.")

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compares the frames per second of VectorEnv with those of the C++ batch.
 
-Two processes take turns: one makes some steps, then the other makes the same number. So both numbers of a pair
-belong to the same state of the machine. The first pair, which allocates memory, is not counted.
+Three take turns: a process without Python, a VectorEnv, and the VectorEnv's own simulator, which C++ steps without
+Python between the steps. So the numbers of a pair belong to the same state of the machine. The first turn, which
+allocates memory, is not counted. On a GPU, two processes of one program differ by up to 19 %, whatever they run.
+Steps of one simulator do not.
 
     speed.py REFERENCE --side 64 --sensors depth
     speed.py REFERENCE --side 128
@@ -52,16 +54,23 @@ class Ours:
         self.envs.reset(seed=1)
         self.step = 0
 
+    def actions(self, steps):
+        """Actions of the next steps."""
+        self.step += steps
+        return [1 + (np.arange(self.envs.num_envs) + k) % 3 for k in range(self.step - steps, self.step)]
+
     def ms(self, steps):
         """Milliseconds per step of the next steps."""
         seconds = 0.0
-        for _ in range(steps):
-            actions = 1 + (np.arange(self.envs.num_envs) + self.step) % 3
-            self.step += 1
+        for actions in self.actions(steps):
             start = time.perf_counter()
             self.envs.step(actions)
             seconds += time.perf_counter() - start
         return 1000 * seconds / steps
+
+    def ms_without_python(self, steps):
+        """The same of C++, in the same simulator. Only with copy=False."""
+        return 1000 * self.envs.simulator._time_steps(self.actions(steps)) / steps
 
 
 def main():
@@ -78,14 +87,26 @@ def main():
         parser.error("--steps and --pairs must be positive")
     scene = gsnav.default_simulator_scene(people=0, seed=1, density=DENSITY)
     for copy in (True, False):
-        both = Reference(args), Ours(scene, args, copy)
-        pairs = [[one.ms(args.steps) for one in both] for _ in range(args.pairs + 1)][1:]
-        both[0].close()
-        ratios = sorted(100 * theirs / ours for theirs, ours in pairs)
+        reference, ours = Reference(args), Ours(scene, args, copy)
+        turns = {"another process": reference.ms, "VectorEnv": ours.ms}
+        if not copy:
+            turns["its simulator in C++"] = ours.ms_without_python
+        order = list(turns)
+        times = []
+        for _ in range(args.pairs + 1):
+            times.append({name: turns[name](args.steps) for name in order})
+            order.append(order.pop(0))  # who comes first finds a machine that was idle, or cold caches
+        del times[0]
+        reference.close()
+        medians = ", ".join(f"{name} {statistics.median(t[name] for t in times):.4f}" for name in turns)
         print(f"{args.device}, {args.environments} environments, {args.side} x {args.side} {args.sensors}, "
-              f"copy={copy}: VectorEnv has {statistics.median(ratios):.1f} % of the C++ frames per second "
-              f"(pairs {ratios[0]:.1f} to {ratios[-1]:.1f}; medians {statistics.median(p[0] for p in pairs):.4f} and "
-              f"{statistics.median(p[1] for p in pairs):.4f} ms per step)")
+              f"copy={copy}; medians of ms per step: {medians}")
+        for name in turns:
+            if name == "VectorEnv":
+                continue
+            ratios = sorted(100 * t[name] / t["VectorEnv"] for t in times)
+            print(f"  VectorEnv has {statistics.median(ratios):.1f} % of the frames per second of {name} "
+                  f"(pairs {ratios[0]:.1f} to {ratios[-1]:.1f})")
 
 
 if __name__ == "__main__":

@@ -56,6 +56,24 @@ def test_batch_has_the_bits_of_single_simulators(people, episodes, small):
             assert step.final_metrics[name][e] == getattr(metrics, name), name
 
 
+def test_steps_that_are_timed_without_python_are_the_same_steps(people, episodes, small):
+    settings = gsnav.BatchConfig(sensors=small.sensors, task=small.task)
+    timed, stepped = (gsnav.BatchSimulator("cpu", [people], settings, 2, lambda e, k: episodes[e]) for _ in range(2))
+    actions = [np.array([1, 2]), np.array([3, 1]), np.array([2, 1])]
+    timed.reset(), stepped.reset()
+    assert timed._time_steps(actions[:2]) > 0
+    for a in actions[:2]:
+        stepped.step(a)
+    got, expected = timed.step(actions[2]), stepped.step(actions[2])
+    assert all(np.array_equal(got[name], expected[name]) for name in ("rgb", "depth"))
+    with pytest.raises(gsnav.InvalidArgument, match="_time_steps: needs one step"):
+        timed._time_steps([])
+    copies = gsnav.BatchSimulator("cpu", [people], settings, 2, lambda e, k: episodes[e], copy=True)
+    copies.reset()
+    with pytest.raises(gsnav.InvalidArgument, match="copy = False"):
+        copies._time_steps(actions)
+
+
 def test_views_outlive_their_simulator(people, episodes, small):
     for order in range(6):
         simulator = gsnav.Simulator("cpu", people, small)
