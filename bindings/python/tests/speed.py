@@ -95,7 +95,7 @@ def main():
         times = []
         for _ in range(args.pairs + 1):
             times.append({name: turns[name](args.steps) for name in order})
-            order.append(order.pop(0))  # who comes first finds a machine that was idle, or cold caches
+            order.append(order.pop(0))  # the first one finds cold caches
         del times[0]
         reference.close()
         medians = ", ".join(f"{name} {statistics.median(t[name] for t in times):.4f}" for name in turns)
