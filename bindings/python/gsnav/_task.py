@@ -73,6 +73,35 @@ def checked_seed(seed: Any, what: str = "seed") -> int | None:
     return int(seed)
 
 
+def count(value: Any, what: str, least: int = 0) -> int:
+    """An integer of at least `least`. A bool is none."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
+        raise TypeError(f"{what}: expected an integer, got {value!r}")
+    if value < least:
+        raise InvalidArgument(f"{what} = {value}: must be at least {least}")
+    return int(value)
+
+
+def function(value: Any, what: str) -> None:
+    """Raises TypeError if a value cannot be called."""
+    if not callable(value):
+        raise TypeError(f"{what}: expected a function, got {value!r}")
+
+
+def known(names: Iterable[str], present: Mapping[str, Any], what: str) -> None:
+    """Raises InvalidArgument for a name that is not there."""
+    for name in names:
+        if name not in present:
+            raise InvalidArgument(f"{what}: there is no {name!r}; there are {', '.join(present)}")
+
+
+def names(value: Any, what: str) -> list[str]:
+    """A list of names."""
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        raise TypeError(f"{what}: expected a sequence of names, got {value!r}")
+    return list(value)
+
+
 def option(options: Any, name: str) -> Any:
     """The option of a reset, or None."""
     if options is None:
@@ -114,6 +143,8 @@ def settings(config: Any) -> SimulatorConfig:
 def scene_of(scene: Scene, config: SimulatorConfig) -> SimulatorScene:
     """The scene with a NavMesh. A name is opened, and a NavMesh is built for the agent if none is there."""
     if isinstance(scene, (str, os.PathLike)):
+        if "\0" in str(os.fspath(scene)):
+            raise InvalidArgument(f"scene = {scene!r}: no name of a file has the character 0")
         options = OpenOptions(navmesh="auto", agent_radius=config.task.agent_radius,
                               agent_height=config.task.agent_height)
         scene = open_scene(scene, options)
@@ -163,7 +194,7 @@ def memory_for_spaces(config: SimulatorConfig, environments: int) -> Iterator[No
         if needed > present > 0:
             raise MemoryError(f"{needed / 1e9:.3g} GB of {present / 1e9:.3g}")
         yield
-    except MemoryError as e:
+    except (MemoryError, OverflowError) as e:
         sizes = ", ".join(f"{s.uuid!r}: resolution = {list(s.resolution)}" for s in config.sensors) or "no sensors"
         raise OutOfMemory(f"config.sensors: no memory for the spaces of {environments} environments ({sizes}): "
                           f"{e}") from e
@@ -190,7 +221,7 @@ def action_space() -> Discrete:
 
 def rgb_sensor(config: SimulatorConfig, render_mode: str | None) -> str:
     """Name of the sensor whose image `render` returns."""
-    if render_mode not in (None, "rgb_array"):
+    if render_mode is not None and (not isinstance(render_mode, str) or render_mode != "rgb_array"):
         raise InvalidArgument(f"render_mode = {render_mode!r}: use None or \"rgb_array\"")
     names = [s.uuid for s in config.sensors if s.kind == SensorKind.rgb]
     if render_mode is not None and not names:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -53,6 +53,14 @@ def batch_config(config: SimulatorConfig, auto_reset: AutoReset) -> BatchConfig:
     return BatchConfig(**state)
 
 
+def checked_mode(mode: Any) -> AutoresetMode:
+    """An autoreset mode, given as one of Gymnasium or by its name."""
+    try:
+        return AutoresetMode(getattr(mode, "value", mode))
+    except ValueError as e:
+        raise InvalidArgument(f"autoreset_mode = {mode!r}: use one of {', '.join(AUTO_RESETS)}") from e
+
+
 class VectorEnv(BaseVectorEnv):
     """N PointNav environments: a `gymnasium.vector.VectorEnv`, or the same shape without Gymnasium.
 
@@ -83,7 +91,7 @@ class VectorEnv(BaseVectorEnv):
         config = _task.settings(config)
         _task.checked(device, (Device, str), "device")
         _task.checked(copy, bool, "copy")
-        mode = AutoresetMode(getattr(autoreset_mode, "value", autoreset_mode))
+        mode = checked_mode(autoreset_mode)
         self.metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 4, "autoreset_mode": mode}
         if not isinstance(num_envs, (int, np.integer)) or isinstance(num_envs, bool):
             raise TypeError(f"num_envs: expected an integer, got {num_envs!r}")
@@ -98,6 +106,8 @@ class VectorEnv(BaseVectorEnv):
         self._rgb = _task.rgb_sensor(config, render_mode)
         self.render_mode = render_mode
         names: list[Any] = list(scene) if isinstance(scene, (list, tuple)) else [scene]
+        if not names:
+            raise InvalidArgument("scene: the list is empty")
         self.scenes = [_task.scene_of(one, config) for one in names]
         drawn = episodes if callable(episodes) else _task.Episodes(self.scenes, episodes, rules)
         self._source = Source(drawn, self.num_envs)
@@ -168,10 +178,11 @@ class VectorEnv(BaseVectorEnv):
         self._last = None
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
-        if isinstance(seed, (str, bytes)) or not (hasattr(seed, "__len__") and hasattr(seed, "__iter__")):
+        many: Any = seed
+        if isinstance(seed, (str, bytes)) or not isinstance(seed, (Sequence, np.ndarray)) or np.ndim(many) == 0:
             first = _task.checked_seed(seed)
             return [None if first is None else first + e for e in range(self.num_envs)]
-        seeds = list(cast(Sequence[Any], seed))
+        seeds = list(many)
         if len(seeds) != self.num_envs:
             raise InvalidArgument(f"seed: {len(seeds)} seeds for {self.num_envs} environments")
         return [_task.checked_seed(one, f"seed[{e}]") for e, one in enumerate(seeds)]
@@ -191,7 +202,12 @@ class VectorEnv(BaseVectorEnv):
     def _checked(self, actions: Any) -> npt.NDArray[np.integer[Any]]:
         if isinstance(actions, (list, tuple)) and not BOOLS.isdisjoint(map(type, actions)):
             raise TypeError(f"VectorEnv.step: actions = {actions!r}: a bool is no action; use integers")
-        array = np.asarray(_task.from_dlpack(to_host(actions), "VectorEnv.step: actions"))
+        if isinstance(actions, np.ma.MaskedArray):
+            raise TypeError("VectorEnv.step: actions are a masked array: use an array without a mask")
+        try:
+            array = np.asarray(_task.from_dlpack(to_host(actions), "VectorEnv.step: actions"))
+        except ValueError as error:
+            raise InvalidArgument(f"VectorEnv.step: actions = {actions!r}: {error}") from error
         if array.dtype.kind not in "iu":
             raise TypeError(f"VectorEnv.step: actions have dtype {array.dtype}: use integers")
         if array.shape != (self.num_envs,):

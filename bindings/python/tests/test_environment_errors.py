@@ -225,6 +225,26 @@ def test_sizes_that_no_sensor_can_have(people, sides):
             make()
 
 
+def test_odd_values_name_the_argument(people, small):
+    for more, error, words in [({"autoreset_mode": "bad"}, gsnav.InvalidArgument, "autoreset_mode = 'bad': use one"),
+                               ({"scene": []}, gsnav.InvalidArgument, "scene: the list is empty"),
+                               ({"scene": "a\0b"}, gsnav.InvalidArgument, r"scene = 'a\\x00b'"),
+                               ({"render_mode": np.array([1, 2])}, gsnav.InvalidArgument, "render_mode"),
+                               ({"num_envs": 10**400}, gsnav.OutOfMemory, "environments")]:
+        with pytest.raises(error, match=words):
+            gsnav.VectorEnv(**{"num_envs": 2, "scene": people, "config": small, **more})
+    envs = gsnav.VectorEnv(2, people, config=small)
+    before = envs.reset(seed=3)[0]
+    for seed in (np.array(5), {1, 2}, {1: 2, 3: 4}, 1.5, [1, 2.5]):
+        with pytest.raises(TypeError, match="seed"):
+            envs.reset(seed=seed)
+    for actions, error in [([1, [2]], gsnav.InvalidArgument), (np.ma.array([1, 2], mask=[True, False]), TypeError)]:
+        with pytest.raises(error, match="VectorEnv.step: actions"):
+            envs.step(actions)
+    for seed in (3, [3, 4], (3, 4), np.array([3, 4])):
+        assert np.array_equal(envs.reset(seed=seed)[0]["rgb"], before["rgb"])
+
+
 def test_spaces_without_memory_name_the_sensors(people, small):
     with pytest.raises(gsnav.OutOfMemory, match=r"2147483648 environments \('rgb': resolution = \[16, 24\]"):
         gsnav.VectorEnv(2**31, people, config=small)
