@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 
 from . import _task
-from ._errors import InvalidArgument
+from ._errors import FileNotFound, InvalidArgument
 from ._gsnav import EpisodeMetrics
 
 
 DATASET = ".scene_dataset_config.json"
 START = '{"journal": "gsnav.ray", '
+FIELDS = {"episode", "id", "reward", "metrics", "actions"}  # of a line
+ACTIONS = set("0123")
 
 
 def resolved(scene: Any) -> Any:
@@ -34,8 +36,6 @@ def resolved(scene: Any) -> Any:
 
 def header(identity: Sequence[Any], episodes: Sequence[_task.Episode], piece: int) -> str:
     """First line of the journal of an evaluation: number of environments, scenes and settings; episodes; piece."""
-    if piece < 1:
-        raise InvalidArgument(f"piece = {piece}: must be positive")
     environments, scenes, config = identity
     for scene in scenes:
         if not isinstance(scene, (str, os.PathLike)):
@@ -49,8 +49,12 @@ def header(identity: Sequence[Any], episodes: Sequence[_task.Episode], piece: in
 
 def lines(path: pathlib.Path, header: str) -> list[str]:
     """Lines of the episodes in a journal, without one that was cut off. Refuses a file that is no such journal."""
+    if not path.parent.is_dir():
+        raise FileNotFound(f"journal = {path}: there is no folder {path.parent}")
     if not path.exists():
         return []
+    if not path.is_file():
+        raise InvalidArgument(f"journal = {path}: it is a folder or a device, not a file")
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as e:
@@ -75,23 +79,43 @@ def _is_finite(values: Sequence[Any]) -> bool:
     return all(v is None or math.isfinite(v) for v in values)
 
 
+def line(rollout: Any) -> str:
+    """The line of an episode, with the fields of a journal of gsnav-eval. Infinity is null."""
+    metrics = {n: v if np.isfinite(v) else None for n, v in _task.metrics_dict(rollout.metrics).items()}
+    reward = sum(rollout.rewards.tolist())
+    return json.dumps({"episode": rollout.episode, "id": rollout.id, "reward": reward if np.isfinite(reward) else None,
+                       "metrics": metrics, "actions": "".join(map(str, rollout.actions.tolist()))})
+
+
+def _metrics_of(row: Any, index: int, id: str) -> EpisodeMetrics:
+    """Metrics of a line. A wrong line raises ValueError, or the error of its wrong type."""
+    if row.keys() != FIELDS:
+        raise ValueError(f"its fields are not {', '.join(sorted(FIELDS))}")
+    metrics, actions = row["metrics"], row["actions"]
+    if metrics.keys() != set(_task.METRIC_FIELDS):
+        raise ValueError("its metrics are not those of an episode")
+    if type(row["episode"]) is not int or row["episode"] != index:
+        raise ValueError(f"it is of episode {row['episode']}")
+    if row["id"] != id:
+        raise ValueError(f"its id is {row['id']!r}, not {id!r}")
+    if not _is_finite([row["reward"], *metrics.values()]):
+        raise ValueError("it has a number that is not finite; infinity is null")
+    stops = metrics["stop_called"]
+    if not isinstance(actions, str) or not ACTIONS.issuperset(actions) or actions.endswith("0") != stops \
+            or len(actions) != metrics["steps"] + stops:
+        raise ValueError(f"its actions are not those of {metrics['steps']} steps: {actions!r}")
+    return EpisodeMetrics(**dict[str, Any]((n, np.inf if v is None else v) for n, v in metrics.items()))
+
+
 def metrics(path: pathlib.Path, lines: Sequence[str], episodes: Sequence[_task.Episode]) -> list[EpisodeMetrics]:
     """Metrics of the episodes 0, 1, ... of a journal."""
     read = []
-    for i, line in enumerate(lines):
+    if len(lines) > len(episodes):
+        raise InvalidArgument(f"{path}: line {len(episodes) + 2}: there are only {len(episodes)} episodes")
+    for i, text in enumerate(lines):
         episode: Any = getattr(episodes[i], "episode", episodes[i])
         try:
-            row = json.loads(line)
-            if row["metrics"].keys() != set(_task.METRIC_FIELDS):
-                raise ValueError("its metrics are not those of an episode")
-            if row["episode"] != i:
-                raise ValueError(f"it is of episode {row['episode']}")
-            if row["id"] != episode.id:
-                raise ValueError(f"its id is {row['id']!r}, not {episode.id!r}")
-            if not _is_finite([row["reward"], *row["metrics"].values()]):
-                raise ValueError("it has a number that is not finite; infinity is null")
-            values = dict[str, Any]((n, np.inf if v is None else v) for n, v in row["metrics"].items())
-            read.append(EpisodeMetrics(**values))
-        except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as e:
+            read.append(_metrics_of(json.loads(text), i, episode.id))
+        except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as e:
             raise InvalidArgument(f"{path}: line {i + 2} is not that of episode {i}: {e}") from e
     return read

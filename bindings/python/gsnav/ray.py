@@ -10,7 +10,6 @@ from __future__ import annotations
 import collections
 import copy
 import heapq
-import json
 import os
 import pathlib
 from collections.abc import Callable, Iterator, Sequence
@@ -21,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _journal, _task
-from ._errors import BackendFailure, ClosedEnvironment, InvalidArgument
+from ._errors import BackendFailure, ClosedEnvironment
 from ._gsnav import EpisodeMetrics
 from ._vector_env import Observation, VectorEnv
 
@@ -39,13 +38,6 @@ class Rollout:
     rewards: npt.NDArray[np.float64]  # [T]
     metrics: EpisodeMetrics
     observations: Observation  # Before each action, [T][...]; those named in `keep`.
-
-    def line(self) -> str:
-        """The episode's line in a journal, with the fields of a journal of gsnav-eval. Infinity is null."""
-        metrics = {n: v if np.isfinite(v) else None for n, v in _task.metrics_dict(self.metrics).items()}
-        reward = sum(self.rewards.tolist())
-        return json.dumps({"episode": self.episode, "id": self.id, "reward": reward if np.isfinite(reward) else None,
-                           "metrics": metrics, "actions": "".join(map(str, self.actions.tolist()))})
 
 
 class Player:
@@ -73,15 +65,18 @@ class Player:
         self.ready()
         envs, episodes, self._piece, self._given = self._envs, dict(piece), piece, 0
         seen, policy = envs.reset()[0], make_policy(envs)
+        _task.function(policy, "make_policy(envs)")
+        _task.known(keep, seen, "keep")
         rows: list[list[tuple[int, float, dict[str, Any]]]] = [[] for _ in self._playing]
         done: dict[int, Rollout] = {}
         while len(done) < len(piece):
             playing = self._playing.copy()
-            last, actions = seen, np.asarray(policy(seen, playing))
+            actions, counted = np.asarray(policy(seen, playing)), np.flatnonzero(playing >= 0)
+            before = {e: {k: seen[k][e].copy() for k in keep} for e in counted}  # The step may overwrite them.
             seen, rewards, terminated, truncated, infos = envs.step(actions)
-            for e in np.flatnonzero(playing >= 0):
+            for e in counted:
                 index = int(playing[e])
-                rows[e].append((int(actions[e]), float(rewards[e]), {k: last[k][e].copy() for k in keep}))
+                rows[e].append((int(actions[e]), float(rewards[e]), before[e]))
                 if not (terminated[e] or truncated[e]):
                     continue
                 (taken, gained, images), rows[e] = zip(*rows[e]), []
@@ -106,6 +101,8 @@ class Workers:
         settings: other arguments of VectorEnv, such as `config` and `device`.
         """
         self.deaths = 0  # Number of actors that died and were replaced.
+        environments, actors = _task.count(environments, "environments", 1), _task.count(actors, "actors")
+        _task.checked(options, (dict, type(None)), "options")
         settings = {**settings, "config": copy.deepcopy(_task.settings(settings.get("config")))}
         scenes = list(scene) if isinstance(scene, (list, tuple)) else [scene]
         self._identity = [environments, [_journal.resolved(one) for one in scenes], settings["config"]]
@@ -130,10 +127,8 @@ class Workers:
             noise of a sensor depends on the environment's index.
         keep: names of observations to return. They travel over the network.
         """
-        if piece < 1:
-            raise InvalidArgument(f"piece = {piece}: must be positive")
-        if not self._local and not self._actors:
-            raise ClosedEnvironment("Workers: the actors have ended; create new ones")
+        self._check(make_policy, piece)
+        first, keep = _task.count(first, "first"), _task.names(keep, "keep")
         indexed, local = list(enumerate(episodes)), self._local
         pieces = [indexed[i:i + piece] for i in range(first, len(indexed), piece)]
         here = (local.play(one, make_policy, keep) for one in pieces) if local else None
@@ -147,17 +142,25 @@ class Workers:
         An existing journal of the same evaluation is continued. Use the policy that it was begun with. Scenes must
         have names, because the journal is of these scenes: of the absolute paths of their files.
         """
+        self._check(make_policy, piece)
+        episodes = list(episodes)
         header = _journal.header(self._identity, episodes, piece)
         path = pathlib.Path(os.path.realpath(journal))  # A link stays a link.
         lines = _journal.lines(path, header)
         whole = len(episodes) if len(lines) >= len(episodes) else len(lines) // piece * piece
-        kept, metrics = [header, *lines[:whole]], _journal.metrics(path, lines[:whole], episodes)
-        _journal.begin(path, kept)
+        metrics = _journal.metrics(path, lines, episodes)[:whole]
+        _journal.begin(path, [header, *lines[:whole]])
         with path.open("a") as f:
             for one in self.rollouts(episodes, make_policy, piece=piece, first=whole):
-                print(one.line(), file=f, flush=True)
+                print(_journal.line(one), file=f, flush=True)
                 metrics.append(one.metrics)
         return metrics
+
+    def _check(self, make_policy: Any, piece: Any) -> None:
+        _task.function(make_policy, "make_policy")
+        _task.count(piece, "piece", 1)
+        if not self._local and not self._actors:
+            raise ClosedEnvironment("Workers: the actors have ended; create new ones")
 
     def close(self) -> None:
         """Ends the actors."""

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
 import os
+import stat
 import time
 
 import numpy as np
@@ -82,9 +83,15 @@ def wrong_numbers(whole):
                           ({"metrics": {**metrics, "spl": float("inf")}}, "line 3 .* not finite"),
                           ({"metrics": {**metrics, "spl": "high"}}, "line 3"), ({"reward": 10**400}, "line 3"),
                           ({"metrics": {**metrics, "success": None}}, "line 3 .* EpisodeMetrics.success"),
-                          ({"metrics": []}, "line 3"), ({"episode": None}, "line 3")]:
+                          ({"metrics": []}, "line 3"), ({"episode": None}, "line 3"),
+                          ({"episode": 1.0}, "line 3"), ({"more": 1}, "line 3 .* its fields are not actions, episode"),
+                          ({"actions": row["actions"][1:]}, "line 3 .* its actions are not those of"),
+                          ({"actions": "z" * len(row["actions"])}, "line 3 .* actions"), ({"actions": 5}, "line 3"),
+                          ({"metrics": {**metrics, "stop_called": not metrics["stop_called"]}}, "line 3 .* actions")]:
         yield "".join([*whole[:2], json.dumps({**row, **change}) + "\n", *whole[3:]]), words
-    yield "".join([*whole[:2], "[1]\n", *whole[3:]]), "line 3"
+    for line in ("[1]", "[" * 100000):
+        yield "".join([*whole[:2], line + "\n", *whole[3:]]), "line 3"
+    yield "".join([*whole, whole[-1]]), "line 28: there are only 26 episodes"
 
 
 def test_a_journal_behind_a_link_and_a_file_that_was_left(episodes, alone, tmp_path):
@@ -105,6 +112,52 @@ def test_a_journal_behind_a_link_and_a_file_that_was_left(episodes, alone, tmp_p
             workers.evaluate(episodes, policy_maker(), journal, piece=4)
         assert journal.read_bytes() == alone[0] and other.read_text() == "mine"
         part.rmdir() if part.is_dir() else part.unlink()
+
+
+def test_a_journal_is_a_file_in_a_folder(episodes, tmp_path):
+    workers = gsnav.ray.Workers(actors=0, environments=3, config=CONFIG)
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for path, error, words in [(pipe, gsnav.InvalidArgument, "pipe: it is a folder or a device"),
+                               (tmp_path, gsnav.InvalidArgument, "it is a folder or a device"),
+                               (tmp_path / "no" / "file", gsnav.FileNotFound, "there is no folder")]:
+        with pytest.raises(error, match=words):
+            workers.evaluate(episodes, policy_maker(), path, piece=4)
+    assert stat.S_ISFIFO(pipe.stat().st_mode) and [p.name for p in tmp_path.iterdir()] == ["pipe"]
+    workers.close()
+    with pytest.raises(gsnav.ClosedEnvironment):
+        workers.evaluate(episodes, policy_maker(), tmp_path / "journal", piece=4)
+    assert [p.name for p in tmp_path.iterdir()] == ["pipe"]
+
+
+def test_kept_observations_are_those_before_the_actions(episodes, alone):
+    workers = gsnav.ray.Workers(actors=0, environments=3, config=CONFIG, copy=False)
+    rollouts = list(workers.rollouts(episodes[:8], policy_maker(), piece=4, keep=["depth"]))
+    for rollout, expected in zip(rollouts, alone[1]):
+        assert np.array_equal(rollout.observations["depth"], expected.observations["depth"])
+
+
+def test_wrong_arguments_are_named(episodes):
+    config = {"config": CONFIG, "environments": 2}
+    for more, error, words in [({"actors": -1}, gsnav.InvalidArgument, "actors = -1"),
+                               ({"actors": None}, TypeError, "actors: expected an integer, got None"),
+                               ({"actors": True}, TypeError, "actors"),
+                               ({"actors": 0, "options": 5}, TypeError, "options"),
+                               ({"actors": 0, "environments": "x"}, TypeError, "environments"),
+                               ({"actors": 0, "environments": 0}, gsnav.InvalidArgument, "environments = 0")]:
+        with pytest.raises(error, match=words):
+            gsnav.ray.Workers(**{**config, **more})
+    workers = gsnav.ray.Workers(actors=0, **config)
+    for more, error, words in [({"first": -1}, gsnav.InvalidArgument, "first = -1"),
+                               ({"first": 1.5}, TypeError, "first"), ({"piece": True}, TypeError, "piece"),
+                               ({"keep": "depth"}, TypeError, "keep: .* 'depth'"), ({"keep": 5}, TypeError, "keep"),
+                               ({"keep": ["x"]}, gsnav.InvalidArgument, "no 'x'; there are rgb, depth")]:
+        with pytest.raises(error, match=words):
+            list(workers.rollouts(episodes, policy_maker(), **more))
+    for make_policy in (None, lambda envs: None):
+        with pytest.raises(TypeError, match="make_policy.*: expected a function, got None"):
+            list(workers.rollouts(episodes, make_policy))
+    assert len(list(workers.rollouts(episodes[:2], policy_maker()))) == 2
 
 
 def test_a_journal_is_continued(episodes, alone, tmp_path):
