@@ -12,6 +12,7 @@ Steps of one simulator do not.
 """
 
 import argparse
+import itertools
 import statistics
 import subprocess
 import time
@@ -81,7 +82,7 @@ def main():
     parser.add_argument("--sensors", choices=["rgbd", "depth"], default="rgbd")
     parser.add_argument("--device", default="cpu", help="name of a device; on a GPU, images stay there")
     parser.add_argument("--steps", type=int, default=10, help="steps of a turn")
-    parser.add_argument("--pairs", type=int, default=9, help="pairs of turns")
+    parser.add_argument("--pairs", type=int, default=12, help="pairs of turns")
     args = parser.parse_args()
     if args.steps < 1 or args.pairs < 1:
         parser.error("--steps and --pairs must be positive")
@@ -91,12 +92,8 @@ def main():
         turns = {"another process": reference.ms, "VectorEnv": ours.ms}
         if not copy:
             turns["its simulator in C++"] = ours.ms_without_python
-        order = list(turns)
-        times = []
-        for _ in range(args.pairs + 1):
-            times.append({name: turns[name](args.steps) for name in order})
-            order.append(order.pop(0))  # the first one finds cold caches
-        del times[0]
+        orders = itertools.cycle(itertools.permutations(turns))  # All orders: caches are warm from the turn before.
+        times = [{name: turns[name](args.steps) for name in next(orders)} for _ in range(args.pairs + 1)][1:]
         reference.close()
         medians = ", ".join(f"{name} {statistics.median(t[name] for t in times):.4f}" for name in turns)
         print(f"{args.device}, {args.environments} environments, {args.side} x {args.side} {args.sensors}, "
