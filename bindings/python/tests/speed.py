@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compares the frames per second of VectorEnv with those of the C++ batch.
 
-Three take turns: a process without Python, a VectorEnv, and the VectorEnv's own simulator, which C++ steps without
-Python between the steps. So the numbers of a pair belong to the same state of the machine. The first turn, which
-allocates memory, is not counted. On a GPU, two processes of one program differ by up to 19 %, whatever they run.
-Steps of one simulator do not.
+Two take turns, so that the numbers of a pair belong to the same state of the machine. The first pair, which
+allocates memory, is not counted. First a VectorEnv is compared with a process without Python that draws the same
+frames. On a GPU, two processes of one program differ by up to 19 %, whatever they run. So a VectorEnv is also compared
+with its own simulator, which C++ steps without Python between the steps. Their turns are single steps, and the frames
+are neighbours.
 
     speed.py REFERENCE --side 64 --sensors depth
     speed.py REFERENCE --side 128
@@ -12,7 +13,6 @@ Steps of one simulator do not.
 """
 
 import argparse
-import itertools
 import statistics
 import subprocess
 import time
@@ -74,6 +74,21 @@ class Ours:
         return 1000 * self.envs.simulator._time_steps(self.actions(steps)) / steps
 
 
+def compare(args, name, theirs, ours, steps, pairs):
+    """Prints the ratio of frames per second of two functions that return milliseconds per step."""
+    both, times = [theirs, ours], []
+    for _ in range(pairs + 1):
+        taken = {ms: ms(steps) for ms in both}
+        times.append((taken[theirs], taken[ours]))
+        both.reverse()
+    del times[0]
+    ratios = sorted(100 * one / other for one, other in times)
+    one, other = (statistics.median(column) for column in zip(*times))
+    print(f"{args.device}, {args.environments} environments, {args.side} x {args.side} {args.sensors}: VectorEnv has "
+          f"{statistics.median(ratios):.1f} % of the frames per second of {name} (pairs {ratios[0]:.1f} to "
+          f"{ratios[-1]:.1f}; medians {one:.4f} and {other:.4f} ms per step)")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("reference", help="the program gsnav_python_reference")
@@ -89,21 +104,10 @@ def main():
     scene = gsnav.default_simulator_scene(people=0, seed=1, density=DENSITY)
     for copy in (True, False):
         reference, ours = Reference(args), Ours(scene, args, copy)
-        turns = {"another process": reference.ms, "VectorEnv": ours.ms}
-        if not copy:
-            turns["its simulator in C++"] = ours.ms_without_python
-        orders = itertools.cycle(itertools.permutations(turns))  # All orders: caches are warm from the turn before.
-        times = [{name: turns[name](args.steps) for name in next(orders)} for _ in range(args.pairs + 1)][1:]
+        compare(args, f"another process, copy={copy}", reference.ms, ours.ms, args.steps, args.pairs)
         reference.close()
-        medians = ", ".join(f"{name} {statistics.median(t[name] for t in times):.4f}" for name in turns)
-        print(f"{args.device}, {args.environments} environments, {args.side} x {args.side} {args.sensors}, "
-              f"copy={copy}; medians of ms per step: {medians}")
-        for name in turns:
-            if name == "VectorEnv":
-                continue
-            ratios = sorted(100 * t[name] / t["VectorEnv"] for t in times)
-            print(f"  VectorEnv has {statistics.median(ratios):.1f} % of the frames per second of {name} "
-                  f"(pairs {ratios[0]:.1f} to {ratios[-1]:.1f})")
+    ours = Ours(scene, args, copy=False)
+    compare(args, "its own simulator in C++", ours.ms_without_python, ours.ms, 1, args.steps * args.pairs)
 
 
 if __name__ == "__main__":
