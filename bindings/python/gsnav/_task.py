@@ -62,17 +62,6 @@ def from_dlpack(value: Any, what: str) -> Any:
         raise InvalidArgument(f"{what}: an array that numpy cannot read; pass one in host memory: {e}") from e
 
 
-def checked_seed(seed: Any, what: str = "seed") -> int | None:
-    """A seed as an integer, or None. A bool is no seed."""
-    if seed is None:
-        return None
-    if isinstance(seed, (bool, np.bool_)) or not isinstance(seed, (int, np.integer)):
-        raise TypeError(f"{what}: expected an integer or None, got {seed!r}")
-    if seed < 0:
-        raise InvalidArgument(f"{what} = {seed}: must be >= 0")
-    return int(seed)
-
-
 def count(value: Any, what: str, least: int = 0) -> int:
     """An integer of at least `least`. A bool is none."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
@@ -80,6 +69,11 @@ def count(value: Any, what: str, least: int = 0) -> int:
     if value < least:
         raise InvalidArgument(f"{what} = {value}: must be at least {least}")
     return int(value)
+
+
+def checked_seed(seed: Any, what: str = "seed") -> int | None:
+    """A seed as an integer, or None."""
+    return None if seed is None else count(seed, what)
 
 
 def function(value: Any, what: str) -> None:

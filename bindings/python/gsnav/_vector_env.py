@@ -93,11 +93,7 @@ class VectorEnv(BaseVectorEnv):
         _task.checked(copy, bool, "copy")
         mode = checked_mode(autoreset_mode)
         self.metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 4, "autoreset_mode": mode}
-        if not isinstance(num_envs, (int, np.integer)) or isinstance(num_envs, bool):
-            raise TypeError(f"num_envs: expected an integer, got {num_envs!r}")
-        self.num_envs = int(num_envs)
-        if self.num_envs < 1:
-            raise InvalidArgument(f"num_envs = {num_envs}: must be positive")
+        self.num_envs = _task.count(num_envs, "num_envs", 1)
         self.single_action_space = _task.action_space()
         with _task.memory_for_spaces(config, self.num_envs):
             self.single_observation_space = _task.observation_space(config)
