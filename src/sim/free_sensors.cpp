@@ -100,40 +100,69 @@ Status FreeSensors::shoot(std::size_t sensor, std::span<const SensorPose> poses,
   return render(cameras, frames_[sensor]);
 }
 
-std::vector<float> FreeSensors::image(std::size_t sensor, std::size_t place) const {
+std::size_t FreeSensors::pixels(std::size_t sensor) const noexcept {
   const SensorSpec& spec = sensors_[sensor];
+  return static_cast<std::size_t>(spec.resolution[0]) * static_cast<std::size_t>(spec.resolution[1]);
+}
+
+const std::vector<float>& FreeSensors::values(std::size_t sensor) const {
   const Frames<float>& frames = frames_[drawn_[sensor]];
+  const SensorKind kind = sensors_[sensor].kind;
+  return kind == SensorKind::depth ? frames.median_depth
+         : kind == SensorKind::rgb ? frames.rgb
+                                   : frames.alpha;
+}
+
+std::span<const float> FreeSensors::drawn(std::size_t sensor, std::size_t place) const {
+  const std::size_t size = pixels(sensor) * static_cast<std::size_t>(channels_of(sensors_[sensor].kind));
+  return std::span(values(sensor)).subspan(place * size, size);
+}
+
+void FreeSensors::write(std::size_t sensor, std::size_t place, std::span<float> out) const {
+  const SensorSpec& spec = sensors_[sensor];
   const bool depth = spec.kind == SensorKind::depth;
-  const std::vector<float>& from = depth                          ? frames.median_depth
-                                   : spec.kind == SensorKind::rgb ? frames.rgb
-                                                                  : frames.alpha;
   const auto channels = static_cast<std::size_t>(channels_of(spec.kind));
-  const std::size_t size = static_cast<std::size_t>(spec.resolution[0]) *
-                           static_cast<std::size_t>(spec.resolution[1]) * channels;
-  std::vector<float> out;
   if (const CubeMap* const cube = cubes_[sensor].get()) {
     const std::size_t face_size =
         static_cast<std::size_t>(cube->side()) * static_cast<std::size_t>(cube->side()) * channels;
     std::array<const float*, CubeMap::kFaces> faces{};
-    const float* next = from.data() + place * cube->faces().size() * face_size;
+    const float* next = values(sensor).data() + place * cube->faces().size() * face_size;
     for (const std::size_t face : cube->faces()) {
       faces[face] = next;
       next += face_size;
     }
-    out.resize(size);
     if (depth) {
       cube->sample_depth(faces, out);
     } else {
       cube->sample_color(faces, channels, out);
     }
   } else {
-    const float* const first = from.data() + place * size;
-    out.assign(first, first + size);
+    std::ranges::copy(drawn(sensor, place), out.begin());
   }
   if (depth) {
     const CutDepth cut(out.data(), spec.far_plane);
     for (std::size_t i = 0; i < out.size(); ++i) cut(i);
   }
+}
+
+void FreeSensors::write_rgba(std::size_t sensor, std::size_t place, std::span<std::uint8_t> out) const {
+  std::vector<float> sampled;
+  std::span<const float> rgb;
+  if (cubes_[sensor] == nullptr) {
+    rgb = drawn(sensor, place);
+  } else {
+    sampled = image(sensor, place);
+    rgb = sampled;
+  }
+  for (std::size_t p = 0; p < rgb.size() / 3; ++p) {
+    for (std::size_t c = 0; c < 3; ++c) out[4 * p + c] = to_byte(rgb[3 * p + c]);
+    out[4 * p + 3] = 255;
+  }
+}
+
+std::vector<float> FreeSensors::image(std::size_t sensor, std::size_t place) const {
+  std::vector<float> out(pixels(sensor) * static_cast<std::size_t>(channels_of(sensors_[sensor].kind)));
+  write(sensor, place, out);
   return out;
 }
 

@@ -49,7 +49,7 @@ nb::dict step_images(std::span<const BatchObservation> images, const BatchCore& 
   return image_arrays(images, [&](const BatchObservation& o) {
     if (!b.copy) return array_view(o.data.data(), shape_of(o), self);
     // Sensors may share an image, but each has an array of its own.
-    nb::object own = b.pool != nullptr ? b.pool->array(o.data.data(), shape_of(o)) : nb::object();
+    nb::object own = b.pool != nullptr ? b.pool->array<float>(o.data.data(), shape_of(o)) : nb::object();
     return own.is_valid() ? own : copied(o);
   });
 }

@@ -50,6 +50,7 @@ Result<std::span<float>> ImagePool::take(std::size_t floats) {
   return std::span(taken_.emplace_back(std::move(block)).data.get(), floats);
 }
 
+template <class T>
 nb::object ImagePool::array(const float* data, const std::vector<std::size_t>& shape) {
   struct Held {
     std::shared_ptr<ImagePool> pool;
@@ -65,14 +66,16 @@ nb::object ImagePool::array(const float* data, const std::vector<std::size_t>& s
     taken_.erase(found);
   }
   held->pool = shared_from_this();
-  float* const first = held->block.data.get();
+  T* const first = reinterpret_cast<T*>(held->block.data.get());
   nb::capsule owner(held.get(), [](void* p) noexcept {
     const std::unique_ptr<Held> dead(static_cast<Held*>(p));
     dead->pool->put_back(std::move(dead->block));
   });
   held.release();
-  return nb::cast(nb::ndarray<nb::numpy, float>(first, shape.size(), shape.data(), owner));
+  return nb::cast(nb::ndarray<nb::numpy, T>(first, shape.size(), shape.data(), owner));
 }
+template nb::object ImagePool::array<float>(const float*, const std::vector<std::size_t>&);
+template nb::object ImagePool::array<std::uint8_t>(const float*, const std::vector<std::size_t>&);
 
 void ImagePool::close() {
   const std::lock_guard lock(mutex_);

@@ -28,6 +28,8 @@ class ImagePool : public std::enable_shared_from_this<ImagePool> {
   Result<std::span<float>> take(std::size_t floats);
   /// A writable array that owns a block that was taken in this call, from its first number on. Null if
   /// `data` is no such block, or if an array owns it already.
+  /// T: float or std::uint8_t.
+  template <class T>
   nb::object array(const float* data, const std::vector<std::size_t>& shape);
   /// Frees unused blocks, now and later.
   void close();

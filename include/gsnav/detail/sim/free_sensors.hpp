@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <span>
@@ -43,15 +44,25 @@ class FreeSensors {
   /// @return invalid_argument for a wrong number of poses, or one that is not finite or not of unit
   /// length; an error of rendering.
   Status render(std::span<const SensorPose> poses, const Render& render, std::size_t places = 1);
-  /// Image of a sensor at a place of the last render, shape [height][width][channels]. Several threads
-  /// may call it at a time.
-  /// @pre A render has succeeded, and none failed after it.
+  /// Number of pixels of a sensor's image.
+  std::size_t pixels(std::size_t sensor) const noexcept;
+  /// Writes the image of a sensor at a place of the last render, shape [height][width][channels].
+  /// Several threads may call it at a time.
+  /// @pre A render has succeeded, and none failed after it. `out` has the size of the image.
+  void write(std::size_t sensor, std::size_t place, std::span<float> out) const;
+  /// Writes the image of a colour sensor as bytes: red, green, blue and 255 for each pixel. See `write`.
+  void write_rgba(std::size_t sensor, std::size_t place, std::span<std::uint8_t> out) const;
+  /// Image of a sensor. See `write`.
   std::vector<float> image(std::size_t sensor, std::size_t place = 0) const;
   /// Number of calls that rendered so far; a cube counts as one.
   std::size_t render_count() const noexcept { return render_count_; }
 
  private:
   FreeSensors() = default;
+  /// Drawn image of a sensor with a pinhole camera at a place.
+  std::span<const float> drawn(std::size_t sensor, std::size_t place) const;
+  /// Values of all faces or images that show a sensor.
+  const std::vector<float>& values(std::size_t sensor) const;
   /// `poses` are those of all sensors and places.
   Status shoot(std::size_t sensor, std::span<const SensorPose> poses, const Render& render);
 
