@@ -58,7 +58,7 @@ if command -v ccache > /dev/null; then
 fi
 echo "Installing what the build and the tests need in $venv"
 "$venv/bin/pip" install --quiet --disable-pip-version-check "scikit-build-core>=0.11" "nanobind>=2.8" \
-  "numpy>=1.26" "gymnasium>=1.1" "matplotlib>=3.8" "mypy>=1.11" "numpy-quaternion" "pytest>=8" \
+  "numpy>=1.26" "gymnasium>=1.1" "greenlet>=3" "matplotlib>=3.8" "mypy>=1.11" "numpy-quaternion" "pytest>=8" \
   ${GSNAV_TEST_WITH:-}
 echo "Building the package, $CMAKE_BUILD_PARALLEL_LEVEL files at a time"
 # The build folder is kept, so that only changed files are compiled.

@@ -1,63 +1,129 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Turns of threads: one runs Python at a time, with random numbers of its own, and images are drawn outside turns."""
+"""Participants that take turns on one thread, each with random numbers of its own, while other threads draw for them.
 
-import contextlib
+A participant is a greenlet: it runs until it ends or asks for a drawing. To change it takes 2 us. A thread for each
+would wait for the interpreter's lock and for its own wake-up at each drawing.
+"""
+
+import collections
 import threading
-from typing import Any, Callable, Iterator
+from typing import Any, Callable, Iterable
 
 _here = threading.local()
 
 
 class _Request:
-    """A value to draw for a participant, and then the result."""
+    """A value to draw for a participant."""
 
-    def __init__(self, value: Any, draw: Callable[[list[Any]], list[Any]], wake: Any) -> None:
-        self.value, self.draw, self.wake = value, draw, wake
+    def __init__(self, value: Any, draw: Callable[[list[Any]], list[Any]], most: int) -> None:
+        self.value, self.draw, self.most = value, draw, most
+        self.greenlet: Any = None
+        self.who: Any = None
         self.result: Any = None
         self.error: BaseException | None = None
 
 
 class Turns:
-    """Threads that take turns. At most `drawers` of them draw at a time, each on `share` threads of the CPU.
+    """Participants whose drawings run on at most `drawers` threads, each on `share` threads of the CPU.
 
     Each participant, and the thread that waits for them, keeps the states of `random` and `numpy.random`, as
-    processes do. A new participant begins with those of that thread. `together` is the number of requests that are
-    drawn in one call.
+    processes do. A new participant begins with those of that thread. `together` is the largest number of requests
+    that are drawn in one call.
     """
 
     def __init__(self, drawers: int, share: int, together: int = 1) -> None:
-        self.share, self._together = share, together
-        from queue import SimpleQueue  # Imported here because habitat_sim, which imports this file, must be light.
+        # Imported here because habitat_sim, which imports this file, must be light.
+        from concurrent.futures import ThreadPoolExecutor
+        from queue import SimpleQueue
 
         from ._numbers import State
 
-        self._queue, self._state_type = SimpleQueue, State
-        self._lock = threading.Lock()
-        self._permits: SimpleQueue[None] = SimpleQueue()  # Faster than a semaphore.
-        for _ in range(drawers):
-            self._permits.put(None)
+        self.share, self._together, self._state_type = share, together, State
+        self._rounds: SimpleQueue[Any] = SimpleQueue()
+        self._drawn: SimpleQueue[list[_Request]] = SimpleQueue()
+        self._threads = ThreadPoolExecutor(drawers, initializer=self._begin_thread)
         self._states: dict[Any, Any] = {}
         self._put: Any = None  # The state that was put in place last.
         self._last: Any = None  # The participant whose random numbers are in place; None: those of all others.
-        self._guard = threading.Lock()  # For the two below.
-        self._coming = 0  # Turns that were announced and neither ended nor wait for a drawing.
-        self._waiting: dict[Any, list[_Request]] = {}  # Requests by keys.
+        self._hub: Any = None
+        threading.Thread(target=self._serve, daemon=True).start()
 
-    def expect(self, count: int) -> None:
-        """Announces turns that will begin. Requests wait for those of announced turns."""
-        with self._guard:
-            self._coming += count
+    def run(self, works: Iterable[tuple[Any, Callable[[], None]]]) -> None:
+        """Runs a function for each participant, any hashable object but None. Returns when all have ended.
 
-    def _leave(self, key: Any = None, request: "_Request | None" = None) -> None:
-        """Notes that a turn ended or waits for a request. Lets a participant draw each group that need not wait."""
-        with self._guard:
-            self._coming -= 1
-            if request is not None:
-                self._waiting.setdefault(key, []).append(request)
-            full = [k for k, group in self._waiting.items() if self._coming < 1 or len(group) >= self._together]
-            groups = [self._waiting.pop(k) for k in full]
-        for group in groups:
-            group[0].wake.put(group)
+        Raises the first error of a function. After Ctrl-C it waits for the functions, too.
+        """
+        from queue import SimpleQueue
+
+        done: SimpleQueue[BaseException | None] = SimpleQueue()
+        self._rounds.put((list(works), done))
+        try:
+            error = done.get()
+        except BaseException:
+            done.get()
+            raise
+        if error is not None:
+            raise error
+
+    def close(self) -> None:
+        """Ends the threads. Nothing may run."""
+        self._rounds.put(None)
+        self._threads.shutdown()
+
+    def _begin_thread(self) -> None:
+        _here.share = self.share
+
+    def _serve(self) -> None:
+        import greenlet
+
+        self._begin_thread()
+        _here.turns, self._hub = self, greenlet.getcurrent()
+        while (asked := self._rounds.get()) is not None:
+            works, done = asked
+            errors: list[BaseException] = []
+            self._round(works, errors, greenlet.greenlet)
+            self._swap(None)
+            done.put(errors[0] if errors else None)
+
+    def _round(self, works: list[Any], errors: list[BaseException], new: Any) -> None:
+        def begin(work: Callable[[], None]) -> None:
+            try:
+                work()
+            except BaseException as error:
+                errors.append(error)
+
+        waiting: dict[Any, list[_Request]] = {}
+        drawing = 0
+        ready: collections.deque[tuple[Any, Any, Callable[[Any], Any]]] = collections.deque(
+            (new(begin), who, lambda g, work=work: g.switch(work)) for who, work in works
+        )
+        while ready or drawing:
+            while ready:
+                greenlet, who, resume = ready.popleft()
+                self._swap(who)
+                asked = resume(greenlet)
+                if not greenlet.dead:
+                    key, request = asked
+                    request.greenlet, request.who = greenlet, who
+                    waiting.setdefault(key, []).append(request)
+                # When nobody else can ask, groups need not wait for more.
+                for key in [k for k, g in waiting.items() if not ready or len(g) >= min(self._together, g[0].most)]:
+                    self._threads.submit(self._draw, waiting.pop(key))
+                    drawing += 1
+            if drawing:
+                for request in self._drawn.get():
+                    ready.append((request.greenlet, request.who, _resumed(request)))
+                drawing -= 1
+
+    def _draw(self, group: list[_Request]) -> None:
+        try:
+            results = group[0].draw([r.value for r in group])
+            for request, result in zip(group, results):
+                request.result = result
+        except BaseException as error:  # Each participant raises it.
+            for request in group:
+                request.error = error
+        self._drawn.put(group)
 
     def _swap(self, who: Any) -> None:
         if who == self._last:
@@ -67,76 +133,30 @@ class Turns:
         self._put = self._states.pop(who, None) or self._states[None]
         self._put.put(now)
 
-    @contextlib.contextmanager
-    def turn(self, who: Any) -> Iterator[None]:
-        """Runs the body as a turn of a participant, any hashable object but None."""
-        with self._lock:
-            self._swap(who)
-            _here.at = self, who
-            try:
-                yield
-            finally:
-                _here.at = None
-                self._leave()
 
-    @contextlib.contextmanager
-    def _drawing(self, who: Any) -> Iterator[None]:
-        self._lock.release()
-        self._permits.get()
-        try:
-            yield
-        finally:
-            self._permits.put(None)
-            self._lock.acquire()
-            self._swap(who)
-
-    def _draw(self, who: Any, key: Any, value: Any, draw: Callable[[list[Any]], list[Any]]) -> Any:
-        mine = _Request(value, draw, self._queue())
-        self._leave(key, mine)
-        self._lock.release()
-        try:
-            group = mine.wake.get()
-            if group is not None:
-                self._draw_group(group)
-        finally:
-            self._lock.acquire()
-            self._swap(who)
-        if mine.error is not None:
-            raise mine.error
-        return mine.result
-
-    def _draw_group(self, group: list[_Request]) -> None:
-        error = None
-        try:
-            results = group[0].draw([r.value for r in group])
-        except BaseException as raised:  # Each participant raises it.
-            results, error = [None] * len(group), raised
-        self.expect(len(group))
-        for request, result in zip(group, results):
-            request.result, request.error = result, error
-        for request in group[1:]:
-            request.wake.put(None)
-
-    def finish(self) -> None:
-        """Puts the random numbers of the thread that waited back."""
-        with self._lock:
-            self._swap(None)
-
-
-def drawing() -> Any:
-    """A context in which other threads may take their turns, if the present thread has one."""
-    at = getattr(_here, "at", None)
-    return contextlib.nullcontext() if at is None else at[0]._drawing(at[1])
+def _resumed(request: _Request) -> Callable[[Any], Any]:
+    """Goes on with a participant whose request was drawn."""
+    if request.error is not None:
+        return lambda greenlet: greenlet.throw(request.error)
+    return lambda greenlet: greenlet.switch(request.result)
 
 
 def draw_together(key: Any, value: Any, draw: Callable[[list[Any]], list[Any]]) -> Any:
-    """Result for a value. `draw` makes the results of many values. If the present thread has a turn, other threads
-    take turns meanwhile, and `draw` may get values that they ask for with an equal key."""
-    at = getattr(_here, "at", None)
-    return draw([value])[0] if at is None else at[0]._draw(at[1], key, value, draw)
+    """Result for a value. `draw` makes the results of many values. A participant lets others run meanwhile, and `draw`
+    may get values that they ask for with an equal key."""
+    turns = getattr(_here, "turns", None)
+    return draw([value])[0] if turns is None else turns._hub.switch((key, _Request(value, draw, turns._together)))
+
+
+def draw_alone(draw: Callable[[], Any]) -> Any:
+    """Result of a function. A participant lets others run meanwhile."""
+    turns = getattr(_here, "turns", None)
+    if turns is None:
+        return draw()
+    request = _Request(None, lambda _: [draw()], 1)
+    return turns._hub.switch((request, request))
 
 
 def share() -> int | None:
     """How many threads of the CPU the present thread may draw on; None: all."""
-    at = getattr(_here, "at", None)
-    return None if at is None else at[0].share
+    return getattr(_here, "share", None)

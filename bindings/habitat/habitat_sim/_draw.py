@@ -114,9 +114,13 @@ class Painter:
                 key = self._stage, self._key, self._device.index, seconds if self._stage.scene.avatar_count else 0.0
                 images.update(_turns.draw_together(key, poses, functools.partial(self._draw_places, seconds)))
             else:
-                with _turns.drawing(), self._stage.drawer(self._device, self._key, self._natives) as drawer:
-                    images.update(drawer.render(poses, seconds))
+                images.update(_turns.draw_alone(functools.partial(self._draw_place, seconds, poses)))
         return {s.uuid: _noisy(images[s.uuid], s.specification()) for s in sensors}
+
+    def _draw_place(self, seconds: float, poses: list[Any]) -> dict[str, np.ndarray]:
+        """Images at the poses of one environment."""
+        with self._stage.drawer(self._device, self._key, self._natives) as drawer:
+            return dict(drawer.render(poses, seconds))
 
     def _draw_places(self, seconds: float, places: list[Any]) -> list[dict[str, np.ndarray]]:
         """Images at the poses of each environment, drawn in one call."""

@@ -51,8 +51,9 @@ class SceneNode:
 
     def _forget(self) -> None:
         """Poses in the world are kept until a node above changes."""
-        for node in self._subtree():
-            node._world = None
+        self._world = None
+        for child in self.children:
+            child._forget()
 
     @property
     def translation(self) -> Vector3:

@@ -21,7 +21,7 @@ class Quaternion:
             return
         if len(parts) == 1:
             if isinstance(parts[0], Quaternion):
-                self._q = array("f", parts[0]._q)
+                self._q = parts[0]._q[:]
                 return
             parts = tuple(parts[0])
         if len(parts) != 2:
@@ -117,7 +117,8 @@ class Quaternion:
     # ---- Measures
     def dot(self) -> float:
         """Squared length."""
-        return sum(x * x for x in self._q)
+        x, y, z, w = self._q
+        return x * x + y * y + z * z + w * w
 
     def length(self) -> float:
         """Length."""
@@ -197,7 +198,9 @@ class Quaternion:
         return Quaternion._of(other) * self if hasattr(other, "components") else NotImplemented
 
     def __truediv__(self, other: Any) -> Any:
-        return self._with(x / float(other) for x in self._q)
+        x, y, z, w = self._q
+        d = float(other)
+        return Quaternion._xyzw(x / d, y / d, z / d, w / d)
 
     def __add__(self, other: Any) -> Any:
         if not isinstance(other, Quaternion):

@@ -29,6 +29,9 @@ class _Vector:
     def __init__(self, *values: Any) -> None:
         """Takes nothing (zeros), one number (for all components), n numbers, or parts with n numbers in all."""
         n = self._size
+        if len(values) == 1 and type(values[0]) is type(self):
+            self._v = values[0]._v[:]
+            return
         if len(values) == n:
             try:
                 self._v = array("f", values)

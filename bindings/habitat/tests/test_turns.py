@@ -1,13 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Turns of threads: one at a time, with random numbers of their own; drawing overlaps."""
+"""Participants take turns on one thread, with random numbers of their own; their drawings overlap."""
 
+import functools
 import random
+import signal
 import threading
 import time
 
 import numpy as np
 import pytest
 from gsnav_habitat import _turns
+
+
+def play(turns, work, count):
+    """Runs a function of a participant's number."""
+    turns.run([(i, functools.partial(work, i)) for i in range(count)])
 
 
 def test_random_numbers_are_those_of_separate_processes():
@@ -22,55 +29,83 @@ def test_random_numbers_are_those_of_separate_processes():
     turns, got = _turns.Turns(drawers=2, share=1), {i: [] for i in range(4)}
 
     def work(i):
-        for _ in range(3):
-            with turns.turn(i):
-                got[i] += numbers(1)
-                with _turns.drawing():
-                    time.sleep(0.001)
-                got[i] += numbers(1)
+        got[i] += numbers(1)
+        _turns.draw_alone(lambda: time.sleep(0.001))
+        got[i] += numbers(1)
 
-    threads = [threading.Thread(target=work, args=(i,)) for i in got]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    turns.finish()
+    for _ in range(3):
+        play(turns, work, 4)
     assert all(numbers_of == alone for numbers_of in got.values())
     assert numbers(6) == alone  # The present thread's own were kept.
+    turns.close()
 
 
-def test_turns_exclude_each_other_and_few_draw_at_a_time():
-    turns, inside, drawing, most = _turns.Turns(drawers=2, share=3), [0], [0], [0]
-    guard = threading.Lock()
+def test_one_runs_at_a_time_and_few_draw_at_a_time():
+    turns, inside, drawing, most, guard = _turns.Turns(drawers=2, share=3), [0], [0], [0], threading.Lock()
+
+    def draw():
+        assert _turns.share() == 3
+        with guard:
+            drawing[0] += 1
+            most[0] = max(most[0], drawing[0])
+        time.sleep(0.002)
+        with guard:
+            drawing[0] -= 1
+        return drawing
 
     def work(i):
-        with turns.turn(i):
-            for _ in range(20):
-                inside[0] += 1
-                assert inside[0] == 1 and _turns.share() == 3
-                time.sleep(0.0005)
-                inside[0] -= 1
-                with _turns.drawing():
-                    with guard:
-                        drawing[0] += 1
-                        most[0] = max(most[0], drawing[0])
-                    time.sleep(0.002)
-                    with guard:
-                        drawing[0] -= 1
+        for _ in range(20):
+            inside[0] += 1
+            assert inside[0] == 1 and _turns.share() == 3
+            time.sleep(0.0005)
+            inside[0] -= 1
+            assert _turns.draw_alone(draw) is drawing
 
-    threads = [threading.Thread(target=work, args=(i,)) for i in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    play(turns, work, 4)
     assert most[0] == 2 and _turns.share() is None
-    with _turns.drawing():  # Without a turn there is nothing to give away.
-        pass
+    assert _turns.draw_alone(lambda: 5) == 5  # Without participants it is drawn at once.
 
 
-def test_an_error_ends_a_turn():
-    turns = _turns.Turns(drawers=1, share=1)
-    with pytest.raises(KeyError), turns.turn("a"), _turns.drawing():
-        raise KeyError
-    with turns.turn("b"), _turns.drawing():
-        pass
+def test_an_error_ends_a_participant_and_is_raised():
+    turns, ended = _turns.Turns(drawers=1, share=1), []
+
+    def fail():
+        raise KeyError("a")
+
+    def work(i):
+        if i == 1:
+            _turns.draw_alone(fail)
+        _turns.draw_alone(lambda: None)
+        ended.append(i)
+
+    with pytest.raises(KeyError, match="a"):
+        play(turns, work, 3)
+    assert ended == [0, 2]
+    play(turns, lambda i: ended.append(i), 2)
+    assert ended == [0, 2, 0, 1]
+
+
+def test_ctrl_c_waits_for_the_participants():
+    turns, ended = _turns.Turns(drawers=1, share=1), []
+
+    def work(i):
+        if i == 0:
+            signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+        _turns.draw_alone(lambda: time.sleep(0.1))
+        ended.append(i)
+
+    with pytest.raises(KeyboardInterrupt):
+        play(turns, work, 2)
+    assert ended == [0, 1]
+
+
+def test_closing_ends_the_threads():
+    before = threading.active_count()
+    turns = _turns.Turns(drawers=3, share=1)
+    play(turns, lambda i: _turns.draw_alone(lambda: None), 8)
+    assert threading.active_count() > before
+    turns.close()
+    deadline = time.monotonic() + 10
+    while threading.active_count() > before and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert threading.active_count() == before

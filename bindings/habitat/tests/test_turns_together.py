@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Requests of several turns are drawn in one call."""
+"""Requests of several participants are drawn in one call."""
 
+import functools
 import random
-import threading
 
 import numpy as np
 import pytest
@@ -10,19 +10,8 @@ from gsnav_habitat import _turns
 
 
 def play(turns, works):
-    """Runs functions of a participant's number as turns of threads."""
-    turns.expect(len(works))
-    threads = [threading.Thread(target=lambda i=i, w=w: _run(turns, i, w)) for i, w in enumerate(works)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(timeout=60)
-        assert not thread.is_alive()
-
-
-def _run(turns, i, work):
-    with turns.turn(i):
-        work(i)
+    """Runs functions of a participant's number."""
+    turns.run([(i, functools.partial(work, i)) for i, work in enumerate(works)])
 
 
 class Drawer:
@@ -48,8 +37,7 @@ def test_groups_have_the_asked_size_and_each_turn_its_result(together, sizes):
         play(turns, [work] * 6)
         assert got == {i: 2 * i for i in range(6)}
         assert sum(draw.sizes) == 6 and max(draw.sizes) <= together
-        if together != 4:  # The last two may come before the first four are drawn, or with a second request.
-            assert draw.sizes == sizes
+        assert draw.sizes == sizes
 
 
 def test_turns_that_draw_nothing_or_more_often_do_not_block_others():
@@ -102,7 +90,6 @@ def test_random_numbers_stay_with_their_turn():
             _turns.draw_together("key", i, list)
 
     play(turns, [work] * 4)
-    turns.finish()
     assert all(numbers == want for numbers in got.values())
 
 

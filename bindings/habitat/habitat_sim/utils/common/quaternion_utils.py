@@ -33,7 +33,7 @@ def quat_to_magnum(quat: Any) -> Quaternion:
 
 def quat_from_magnum(quat: Quaternion) -> Any:
     """The same rotation in numpy-quaternion."""
-    x, y, z, w = quat.xyzw
+    x, y, z, w = quat._q
     return _make(w, x, y, z)
 
 
