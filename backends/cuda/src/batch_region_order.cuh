@@ -28,12 +28,11 @@ __device__ inline std::uint32_t warp_max(std::uint32_t v) {
 #endif
 }
 
-__device__ inline unsigned long long joined(const uint2& row) {
-  return static_cast<unsigned long long>(row.y) << 32 | row.x;
-}
-__device__ inline uint2 parted(unsigned long long row) {
-  return {static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(row >> 32)};
-}
+/// Numbers that order rows of equal keys, by the rows' places.
+struct TieShared {
+  std::uint32_t ranks[kHeld];  ///< Rank minus the least one.
+  std::uint8_t runs[kHeld];    ///< Number of the row's key.
+};
 
 /// Puts E numbers of a lane in ascending order, if they first fall and then rise, or the reverse.
 template <int E>
@@ -69,50 +68,51 @@ __device__ inline void sort_in_lane(std::uint32_t (&v)[E]) {
   }
 }
 
-/// Returns true if two of n rows in order, E adjacent ones per lane, have one key.
+/// Returns true if two of n keys in order, E adjacent ones per lane, are equal.
 template <int E>
-__device__ inline bool has_equal_keys(const unsigned long long (&row)[E], std::uint32_t n) {
+__device__ inline bool has_equal_keys(const uint2 (&row)[E], std::uint32_t n) {
   const std::uint32_t lane = threadIdx.x % 32;
-  const std::uint32_t before = __shfl_up_sync(kAll, static_cast<std::uint32_t>(row[E - 1] >> 32), 1);
-  bool equal = lane > 0 && lane * E < n && before == static_cast<std::uint32_t>(row[0] >> 32);
+  const std::uint32_t before = __shfl_up_sync(kAll, row[E - 1].y, 1);
+  bool equal = lane > 0 && lane * E < n && before == row[0].y;
 #pragma unroll
   for (int e = 1; e < E; ++e) {
     const bool both = lane * E + static_cast<std::uint32_t>(e) < n;
-    equal = equal || (both && row[e] >> 32 == row[e - 1] >> 32);
+    equal = equal || (both && row[e].y == row[e - 1].y);
   }
   return __any_sync(kAll, equal) != 0;
 }
 
-/// Swaps neighbours until all rows are in order, E adjacent ones per lane.
+/// Swaps neighbours until all numbers are in order, E adjacent ones per lane.
 template <int E>
-__device__ inline void order_neighbors(unsigned long long (&row)[E]) {
+__device__ inline void order_neighbors(unsigned long long (&v)[E]) {
   const std::uint32_t lane = threadIdx.x % 32;
 #pragma unroll 1
   for (bool changed = true; changed;) {
     changed = false;
 #pragma unroll
     for (int e = 0; e + 1 < E; ++e) {
-      if (row[e] <= row[e + 1]) continue;
-      const unsigned long long other = row[e];
-      row[e] = row[e + 1];
-      row[e + 1] = other;
+      if (v[e] <= v[e + 1]) continue;
+      const unsigned long long other = v[e];
+      v[e] = v[e + 1];
+      v[e + 1] = other;
       changed = true;
     }
-    const unsigned long long next = __shfl_down_sync(kAll, row[0], 1),
-                             last = __shfl_up_sync(kAll, row[E - 1], 1);
-    const bool swaps = lane < 31 && row[E - 1] > next, swapped = lane > 0 && last > row[0];
-    if (swaps) row[E - 1] = next;
-    if (swapped) row[0] = last;
+    const unsigned long long next = __shfl_down_sync(kAll, v[0], 1),
+                             last = __shfl_up_sync(kAll, v[E - 1], 1);
+    const bool swaps = lane < 31 && v[E - 1] > next, swapped = lane > 0 && last > v[0];
+    if (swaps) v[E - 1] = next;
+    if (swapped) v[0] = last;
     changed = __any_sync(kAll, changed || swaps) != 0;
   }
 }
 
-/// Puts n <= 32 E rows in order of key and word. First it sorts 32-bit numbers, each made of the leading
-/// bits of a key and the row's place. Then it sorts neighbours whose leading bits are equal. Each lane
-/// has E adjacent numbers. Lists come in bins of depth, so that few rounds of merging with a neighbour
-/// are needed. Returns true if two keys are equal.
-template <int E>
-__device__ __noinline__ inline bool order_rows(uint2* rows, std::uint32_t n) {
+/// Puts n <= 32 E rows in order of number(i), where i is a row's place, and full(i). A number has 32
+/// bits and does not fall as `full` rises, which has up to 56. First this sorts 32-bit numbers, each
+/// made of leading bits and the row's place. If bits were cut off, it then sorts neighbours by `full`.
+/// Each lane has E adjacent numbers. Lists come in bins of depth, so that few rounds of merging with a
+/// neighbour are needed. Returns true if two keys are equal.
+template <int E, class Number, class Full>
+__device__ inline bool order_by(uint2* rows, std::uint32_t n, const Number& number, const Full& full) {
   constexpr std::uint32_t kRows = 32 * E;
   constexpr int kPlaceBits = E == 8 ? 8 : E == 4 ? 7 : 6;
   static_assert(kRows == 1u << kPlaceBits);
@@ -121,7 +121,7 @@ __device__ __noinline__ inline bool order_rows(uint2* rows, std::uint32_t n) {
 #pragma unroll
   for (int e = 0; e < E; ++e) {
     const std::uint32_t i = lane * E + static_cast<std::uint32_t>(e);
-    v[e] = i < n ? rows[i].y : kLastKey;
+    v[e] = i < n ? number(i) : kLastKey;
     if (i < n) {
       low = min(low, v[e]);
       high = max(high, v[e]);
@@ -155,23 +155,65 @@ __device__ __noinline__ inline bool order_rows(uint2* rows, std::uint32_t n) {
     }
     merge_bitonic<E>(v);
   }
-  unsigned long long row[E];
+  if (shift != 0) {
+    unsigned long long whole[E];
 #pragma unroll
-  for (int e = 0; e < E; ++e)
-    row[e] = lane * E + static_cast<std::uint32_t>(e) < n ? joined(rows[v[e] & (kRows - 1)]) : ~0ull;
-  bool equal = has_equal_keys<E>(row, n);
-  if (shift != 0 || equal) {
-    order_neighbors<E>(row);
-    equal = has_equal_keys<E>(row, n);
+    for (int e = 0; e < E; ++e) {
+      const std::uint32_t i = v[e] & (kRows - 1);
+      whole[e] = lane * E + static_cast<std::uint32_t>(e) < n ? full(i) << 8 | i : ~0ull;
+    }
+    order_neighbors<E>(whole);
+#pragma unroll
+    for (int e = 0; e < E; ++e) v[e] = static_cast<std::uint32_t>(whole[e]) & 255u;
   }
+  uint2 row[E];
+#pragma unroll
+  for (int e = 0; e < E; ++e) row[e] = rows[v[e] & (kRows - 1)];
   __syncwarp();
 #pragma unroll
   for (int e = 0; e < E; ++e) {
     const std::uint32_t i = lane * E + static_cast<std::uint32_t>(e);
-    if (i < n) rows[i] = parted(row[e]);
+    if (i < n) rows[i] = row[e];
   }
   __syncwarp();
-  return equal;
+  return has_equal_keys<E>(row, n);
+}
+
+/// Puts n <= 32 E rows in order of key. Returns true if two keys are equal.
+template <int E>
+__device__ __noinline__ inline bool order_keys(uint2* rows, std::uint32_t n) {
+  return order_by<E>(
+      rows, n, [rows](std::uint32_t i) { return rows[i].y; },
+      [rows](std::uint32_t i) { return static_cast<unsigned long long>(rows[i].y); });
+}
+
+/// Puts n <= 32 E rows in order of `ties`, whose ranks have up to rank_bits bits.
+template <int E>
+__device__ __noinline__ inline void order_ties(uint2* rows, std::uint32_t n, const TieShared& ties,
+                                               int rank_bits) {
+  constexpr int kRunBits = 8;
+  static_assert(kHeld == 1u << kRunBits);
+  const int kept = min(rank_bits, 32 - kRunBits);
+  order_by<E>(
+      rows, n,
+      [&](std::uint32_t i) {
+        return static_cast<std::uint32_t>(ties.runs[i]) << kept | ties.ranks[i] >> (rank_bits - kept);
+      },
+      [&](std::uint32_t i) {
+        return static_cast<unsigned long long>(ties.runs[i]) << 32 | ties.ranks[i];
+      });
+}
+
+/// Calls f.template operator()<E>() with the least E that n <= kHeld rows need.
+template <class F>
+__device__ inline auto with_rows_per_lane(std::uint32_t n, const F& f) {
+  if (n <= policy::Order::kOfWarp<2>) return f.template operator()<2>();
+  return n <= policy::Order::kOfWarp<4> ? f.template operator()<4>() : f.template operator()<8>();
+}
+
+/// Puts n <= kHeld rows in order of key. Returns true if two keys are equal.
+__device__ inline bool order_rows(uint2* rows, std::uint32_t n) {
+  return n > 1 && with_rows_per_lane(n, [&]<int E>() { return order_keys<E>(rows, n); });
 }
 
 /// Source of a row of a list.
@@ -183,72 +225,66 @@ __device__ inline std::uint32_t source_of(const RegionArgs& r, std::uint32_t cam
   return r.far_rows[min(place, r.far_capacity - 1)].source;
 }
 
-/// Rank of a row of a list.
-__device__ inline std::uint32_t rank_of_row(const BatchArgs& a, const RegionArgs& r,
-                                            std::uint32_t camera, const uint2& row) {
-  const std::uint32_t source = source_of(r, camera, row.x >> 12);
-  const ViewedSet<float>& args = instance_of(a, camera, source).args;
-  return args.rank_of(source - args.first_rank);
-}
+/// Ranks of the rows of a camera's lists.
+class ListedRanks {
+ public:
+  __device__ ListedRanks(const BatchArgs& a, const RegionArgs& r, std::uint32_t camera)
+      : a_(a), r_(r), camera_(camera) {
+    const std::uint32_t first = a.camera_first[camera];
+    if (a.camera_first[camera + 1] - first == 1) only_ = &a.instances[a.camera_instances[first]].args;
+  }
+  __device__ std::uint32_t operator()(const uint2& row) const {
+    const std::uint32_t source = source_of(r_, camera_, row.x >> 12);
+    const ViewedSet<float>& set = only_ != nullptr ? *only_ : instance_of(a_, camera_, source).args;
+    return set.rank_of(source - set.first_rank);
+  }
 
-/// Puts n <= kHeld rows in order of key and word. Returns true if two keys are equal.
-__device__ inline bool order_rows(uint2* rows, std::uint32_t n) {
-  if (n <= policy::Order::kOfWarp<2>) return n > 1 && order_rows<2>(rows, n);
-  return n <= policy::Order::kOfWarp<4> ? order_rows<4>(rows, n) : order_rows<8>(rows, n);
-}
+ private:
+  const BatchArgs& a_;
+  const RegionArgs& r_;
+  std::uint32_t camera_;
+  const ViewedSet<float>* only_ = nullptr;  ///< Of a camera with one set.
+};
 
 /// Puts rows of equal keys in order of rank, among n <= kHeld rows in order of key. They are sorted once
 /// more, by the number of their key and their rank. Flat walls have many rows of one key.
 __device__ __noinline__ inline void order_equal_keys(const BatchArgs& a, const RegionArgs& r,
-                                                     std::uint32_t camera, uint2* rows,
-                                                     std::uint32_t n) {
+                                                     std::uint32_t camera, uint2* rows, std::uint32_t n,
+                                                     TieShared& ties) {
   constexpr std::uint32_t kPerLane = kHeld / 32;
-  static_assert(kHeld == 256, "a row's place has 8 bits");
   const std::uint32_t lane = threadIdx.x % 32, up_to_lane = ~0u >> (31 - lane);
-  uint2 row[kPerLane];
-  std::uint32_t run[kPerLane], rank[kPerLane], runs = 0, low = kLastKey, high = 0;
+  const ListedRanks rank_of_row(a, r, camera);
+  std::uint32_t rank[kPerLane], run[kPerLane], runs = 0, low = kLastKey, high = 0;
+  bool tied[kPerLane];
 #pragma unroll
   for (std::uint32_t e = 0; e < kPerLane; ++e) {
     const std::uint32_t i = e * 32 + lane;
-    row[e] = i < n ? rows[i] : uint2{0, kLastKey};
-    const bool first = i < n && (i == 0 || rows[i - 1].y != row[e].y);
-    const bool alone = first && (i + 1 == n || rows[i + 1].y != row[e].y);
+    const std::uint32_t key = i < n ? rows[i].y : kLastKey;
+    const bool first = i < n && (i == 0 || rows[i - 1].y != key);
+    tied[e] = i < n && (!first || (i + 1 < n && rows[i + 1].y == key));
     const unsigned votes = __ballot_sync(kAll, first);
     run[e] = runs + static_cast<std::uint32_t>(__popc(votes & up_to_lane)) - 1;
     runs += static_cast<std::uint32_t>(__popc(votes));
+  }
+  // Nothing is stored here, so that the loads need not wait for each other.
+#pragma unroll
+  for (std::uint32_t e = 0; e < kPerLane; ++e) {
     rank[e] = kLastKey;
-    if (i >= n || alone) continue;
-    rank[e] = rank_of_row(a, r, camera, row[e]);
+    if (!tied[e]) continue;
+    rank[e] = rank_of_row(rows[e * 32 + lane]);
     low = min(low, rank[e]);
     high = max(high, rank[e]);
   }
   low = warp_min(low);
   high = warp_max(high);
+#pragma unroll
+  for (std::uint32_t e = 0; e < kPerLane; ++e) {
+    ties.ranks[e * 32 + lane] = min(rank[e], high) - low;
+    ties.runs[e * 32 + lane] = static_cast<std::uint8_t>(run[e]);
+  }
+  __syncwarp();
   const int rank_bits = 32 - __clz(static_cast<int>(high - low));
-  // Run, rank and place have up to 48 bits. The leading 32 become the key.
-  const int shift = max(rank_bits - 24, 0);
-  __syncwarp();
-#pragma unroll
-  for (std::uint32_t e = 0; e < kPerLane; ++e) {
-    const std::uint32_t i = e * 32 + lane, of_run = min(rank[e], high) - low;
-    const unsigned long long number = static_cast<unsigned long long>(run[e]) << rank_bits | of_run;
-    if (i < n)
-      rows[i] = {(of_run & ((1u << shift) - 1)) << 8 | i, static_cast<std::uint32_t>(number >> shift)};
-  }
-  __syncwarp();
-  order_rows(rows, n);
-#pragma unroll
-  for (std::uint32_t e = 0; e < kPerLane; ++e) {
-    const std::uint32_t i = e * 32 + lane, from = i < n ? rows[i].x & 255u : 0u;
-    std::uint32_t word = 0;
-#pragma unroll
-    for (std::uint32_t q = 0; q < kPerLane; ++q) {
-      const std::uint32_t of_lane = __shfl_sync(kAll, row[q].x, static_cast<int>(from % 32));
-      if (from / 32 == q) word = of_lane;
-    }
-    if (i < n) rows[i] = {word, row[e].y};
-  }
-  __syncwarp();
+  with_rows_per_lane(n, [&]<int E>() { order_ties<E>(rows, n, ties, rank_bits); });
 }
 
 /// Pairs of pixels in columns [x0, x1] and pairs of rows [y0, y1] of a tile.
@@ -281,13 +317,14 @@ __device__ __noinline__ inline uint2 take_equal_keys(const BatchArgs& a, const R
                                                      std::uint32_t first_rank, unsigned open,
                                                      uint2* rows) {
   const std::uint32_t lane = threadIdx.x % 32;
+  const ListedRanks rank_of_row(a, r, list.camera);
   const auto each = [&](std::uint32_t last_rank, bool keep) {
     std::uint32_t n = 0;
     for (std::uint32_t first = 0; first < list.length; first += 32) {
       const uint2 row = first + lane < list.length ? list.rows[first + lane] : uint2{0, kLastKey};
       bool wanted = row.y == key && (reached_pairs(row.x, list.x, list.y) & open) != 0;
       if (wanted) {
-        const std::uint32_t rank = rank_of_row(a, r, list.camera, row);
+        const std::uint32_t rank = rank_of_row(row);
         wanted = rank >= first_rank && rank <= last_rank;
       }
       const unsigned votes = __ballot_sync(kAll, wanted);

@@ -10,6 +10,7 @@ namespace gsnav::cuda {
 /// Rows that a warp holds, and which pairs of pixels a rectangle reaches.
 struct ReaderShared {
   uint2 rows[kHeld];
+  TieShared ties;
   std::uint32_t columns[64], lines[64];  ///< By the two ranges of a rectangle.
 };
 
@@ -57,7 +58,7 @@ class TileReader {
         const uint2 taken = take_equal_keys(a_, r_, list_, begin_key_, first_rank_, open, rows_);
         held_ = taken.x;
         first_rank_ = taken.y + 1;
-        order_equal_keys(a_, r_, list_.camera, rows_, held_);
+        order_equal_keys(a_, r_, list_.camera, rows_, held_, s_.ties);
         crowded_ = first_rank_ != 0;
         end_key_ = limit_ = begin_key_ + (crowded_ ? 0 : 1);
         return held_;
@@ -150,7 +151,7 @@ class TileReader {
   }
 
   __device__ void order() {
-    if (order_rows(rows_, held_)) order_equal_keys(a_, r_, list_.camera, rows_, held_);
+    if (order_rows(rows_, held_)) order_equal_keys(a_, r_, list_.camera, rows_, held_, s_.ties);
   }
 
   const BatchArgs& a_;
