@@ -4,6 +4,7 @@
 import ctypes
 import functools
 import random
+import sys
 from typing import Any
 
 import numpy as np
@@ -31,12 +32,34 @@ def _address() -> int:
     return int(bits.ctypes.state_address)
 
 
+@functools.lru_cache(maxsize=None)
+def _plain() -> bool:
+    """Whether the bytes behind the header of a random.Random are its whole state but for `gauss_next`."""
+    if sys.implementation.name != "cpython" or random.Random.__basicsize__ < object.__basicsize__ + _BYTES:
+        return False
+    numbers = random.Random(5)
+    address = id(numbers) + object.__basicsize__
+    first, raw = numbers.getstate(), ctypes.string_at(address, _BYTES)
+    for _ in range(700):
+        numbers.random()
+    ctypes.memmove(address, raw, _BYTES)
+    return first == numbers.getstate()
+
+
+def _random() -> Any:
+    """The generator behind the functions of `random`, if its state can be read in place."""
+    generator = getattr(random.random, "__self__", None)
+    return generator if type(generator) is random.Random and _plain() else None
+
+
 class State:
     """States of both generators at one time."""
 
     def __init__(self, before: "State | None" = None) -> None:
         """Reads the present states. `before` was put in place last: what did not change is not read again."""
-        self._random = random.getstate()
+        generator = _random()
+        self._random: Any = random.getstate() if generator is None else (
+            ctypes.string_at(id(generator) + object.__basicsize__, _BYTES), generator.gauss_next)
         address = _address()
         self._raw = ctypes.string_at(address, _BYTES) if address else b""
         # numpy keeps a normal number for later (index 3), which these bytes do not show.
@@ -45,7 +68,12 @@ class State:
 
     def put(self, present: "State") -> None:
         """Puts these states in place of the present ones."""
-        random.setstate(self._random)
+        generator = _random()
+        if generator is None:
+            random.setstate(self._random)
+        else:
+            ctypes.memmove(id(generator) + object.__basicsize__, self._random[0], _BYTES)
+            generator.gauss_next = self._random[1]
         address = _address()
         if address and self._raw and not self._numpy[3] and not present._numpy[3]:
             ctypes.memmove(address, self._raw, _BYTES)

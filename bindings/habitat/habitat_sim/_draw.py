@@ -134,7 +134,9 @@ def _together(device: Any) -> bool:
 
 
 def _pose(sensor: Any) -> Any:
-    return list(sensor.node.absolute_translation), list(sensor.node.absolute_rotation.wxyz)
+    position, rotation = sensor.node._in_world()
+    x, y, z, w = rotation._q
+    return list(position._v), [w, x, y, z]
 
 
 def _nothing(spec: Any) -> np.ndarray:

@@ -28,6 +28,7 @@ def draws():
 def test_a_state_comes_back(mine, others, raw, monkeypatch):
     if not raw:
         monkeypatch.setattr(_numbers, "_address", lambda: 0)
+        monkeypatch.setattr(_numbers, "_random", lambda: None)
     kept = random.getstate(), np.random.get_state()
     random.seed(1)
     np.random.seed(2)
@@ -51,7 +52,7 @@ def test_a_state_comes_back(mine, others, raw, monkeypatch):
 
 
 def test_bytes_are_used_and_another_generator_is_left_to_numpy():
-    assert _numbers._readable() and _numbers._address()
+    assert _numbers._readable() and _numbers._address() and _numbers._random() is random.random.__self__
     usual = np.random.get_bit_generator()
     np.random.set_bit_generator(np.random.PCG64(4))
     try:

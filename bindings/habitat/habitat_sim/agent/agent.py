@@ -29,6 +29,15 @@ class _Pose:
         self.position = np.zeros(3, np.float32) if position is None else position
         self.rotation = _identity() if rotation is None else rotation
 
+    @classmethod
+    def _of_node(cls, node: SceneNode) -> Any:
+        """The pose of a node in the world."""
+        position, rotation = node._in_world()
+        made = cls.__new__(cls)
+        # Habitat-Lab asks for poses several times per step: the values need no conversion.
+        made.__dict__.update(position=np.array(position._v), rotation=quat_from_magnum(rotation))
+        return made
+
     def __setattr__(self, name: str, value: Any) -> None:
         if name == "position":
             value = np.array(value, dtype=np.float32)
@@ -129,14 +138,9 @@ class Agent:
 
     def get_state(self) -> AgentState:
         """Pose of the body and the sensors in the world."""
-        return AgentState(
-            np.array(self.body.absolute_translation),
-            quat_from_magnum(self.body.absolute_rotation),
-            {
-                uuid: SixDOFPose(np.array(s.node.absolute_translation), quat_from_magnum(s.node.absolute_rotation))
-                for uuid, s in self.sensors.items()
-            },
-        )
+        state: AgentState = AgentState._of_node(self.body)
+        state.sensor_states = {uuid: SixDOFPose._of_node(s.node) for uuid, s in self.sensors.items()}
+        return state
 
     def set_state(
         self, state: AgentState, reset_sensors: bool = True, infer_sensor_states: bool = True, is_initial: bool = False
