@@ -245,7 +245,7 @@ Result<NavMesh> build_whole(const NavGround& ground, GaussianNavReport& report) 
       return s;
   }
   return detail::finish_navmesh(log, settings, **field, ground.origin(),
-                                {Pruner{ground.options.min_island_area, report}, ground.height});
+                                {Pruner{ground.options.min_island_area, report}, ground.height, {}});
 }
 
 Result<NavMeshFromGaussians> build(const NavMeshSettings& settings, std::span<const GaussianSet> sets,

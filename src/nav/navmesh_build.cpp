@@ -9,7 +9,7 @@ namespace detail {
 
 Result<NavMesh> finish_navmesh(RecastLog& log, const NavMeshSettings& s, rcHeightfield& field,
                                const Vec3d& origin, const BuildHooks& hooks) {
-  auto made = build_polygons(log, s, field, 0, hooks.prune);
+  auto made = build_polygons(log, s, field, 0, hooks.prune, hooks.progress);
   if (!made.ok()) return made.status();
   if (!(made->areas.eroded > 0)) return nothing_navigable("no walkable cell is left", s, made->areas);
   if (made->empty())
@@ -39,7 +39,8 @@ double floor_below(const TriangleHeights& heights, const NavMeshSettings& s, con
 }  // namespace detail
 
 Result<NavMesh> NavMesh::build(const NavMeshSettings& settings, std::span<const Vec3d> vertices,
-                               std::span<const Triangle> triangles, int threads) {
+                               std::span<const Triangle> triangles, int threads,
+                               const std::function<void(double)>& progress) {
   if (Status s = settings.validate(); !s.ok()) return s;
   if (vertices.empty() || triangles.empty()) {
     return Status(Errc::nothing_navigable, "NavMesh: there are no triangles to build from");
@@ -51,17 +52,19 @@ Result<NavMesh> NavMesh::build(const NavMeshSettings& settings, std::span<const 
   const Vec3d origin{std::floor(middle.x), std::floor(middle.y), std::floor(middle.z)};
   const Aabb<double> box{checked->low - origin, checked->high - origin};
   if (settings.tile_size > 0) {
-    return detail::build_in_tiles(settings, vertices, triangles, origin, box, threads);
+    return detail::build_in_tiles(settings, vertices, triangles, origin, box, threads,
+                                  {{}, {}, 0, {}, progress});
   }
   detail::RecastLog log;
   auto field = detail::make_heightfield(log, settings, box.low, box.high);
   if (!field.ok()) return field.status();
-  if (Status s = detail::rasterise(log, settings, vertices, triangles, origin, **field); !s.ok())
+  if (Status s = detail::rasterise(log, settings, vertices, triangles, origin, **field, progress);
+      !s.ok())
     return s;
   const detail::TriangleHeights heights(vertices, triangles, origin, box);
   return detail::finish_navmesh(
       log, settings, **field, origin,
-      {{}, [&](const Vec3d& p) { return detail::floor_below(heights, settings, p); }});
+      {{}, [&](const Vec3d& p) { return detail::floor_below(heights, settings, p); }, progress});
 }
 
 }  // namespace gsnav

@@ -42,10 +42,10 @@ Result<NavMeshTriangles> gather_parts(const NavMeshSettings& settings,
 }
 
 Result<NavMesh> NavMesh::build(const NavMeshSettings& settings, std::span<const NavMeshPart> parts,
-                               int threads) {
+                               int threads, const std::function<void(double)>& progress) {
   const auto all = gather_parts(settings, parts);
   if (!all) return all.status();
-  return build(settings, all->vertices, all->triangles, threads);
+  return build(settings, all->vertices, all->triangles, threads, progress);
 }
 
 }  // namespace gsnav

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
+#include <utility>
 
 namespace gsnav::detail {
 namespace {
@@ -87,11 +88,16 @@ Result<Aabb<double>> check_triangles(std::span<const Vec3d> vertices,
 }
 
 Status rasterise(RecastLog& log, const NavMeshSettings& settings, std::span<const Vec3d> vertices,
-                 std::span<const NavMesh::Triangle> triangles, const Vec3d& origin,
-                 rcHeightfield& field) {
+                 std::span<const NavMesh::Triangle> triangles, const Vec3d& origin, rcHeightfield& field,
+                 const Progress& progress) {
   const int climb = VoxelSettings(settings).climb;
   const double cos_slope = slope_cosine(settings);
-  for (const NavMesh::Triangle& t : triangles) {
+  const std::size_t part = triangles.size() / 32 + 1;
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    if (progress && i % part == 0) {
+      progress(kRasterised * static_cast<double>(i) / static_cast<double>(triangles.size()));
+    }
+    const NavMesh::Triangle& t = triangles[i];
     float v[9];
     Vec3d p[3];
     for (std::size_t k = 0; k < 3; ++k) {
@@ -172,20 +178,26 @@ Status nothing_navigable(const char* why, const NavMeshSettings& s, const Walkab
 }
 
 Result<TilePolygons> build_polygons(RecastLog& log, const NavMeshSettings& s, rcHeightfield& field,
-                                    int border,
-                                    const std::function<void(rcCompactHeightfield&)>& prune) {
+                                    int border, const std::function<void(rcCompactHeightfield&)>& prune,
+                                    const Progress& progress) {
   const VoxelSettings voxels(s);
+  const auto tell = [&](double share) {
+    if (progress) progress(share);
+  };
+  tell(kRasterised);
   TilePolygons out;
   out.areas.facing_up = walkable_area(field, border);
   if (s.filter_low_hanging_obstacles) rcFilterLowHangingWalkableObstacles(&log, voxels.climb, field);
   if (s.filter_ledge_spans) rcFilterLedgeSpans(&log, voxels.height, voxels.climb, field);
   if (s.filter_walkable_low_height_spans) rcFilterWalkableLowHeightSpans(&log, voxels.height, field);
   out.areas.clear = walkable_area(field, border);
+  tell(0.2);
 
   RecastPtr<rcCompactHeightfield> compact(rcAllocCompactHeightfield());
   if (!rcBuildCompactHeightfield(&log, voxels.height, voxels.climb, field, *compact)) {
     return stage("compacting the heightfield", log);
   }
+  tell(0.25);
   if (voxels.radius > 0 && !rcErodeWalkableArea(&log, voxels.radius, *compact)) {
     return stage("eroding by the agent's radius", log);
   }
@@ -194,11 +206,14 @@ Result<TilePolygons> build_polygons(RecastLog& log, const NavMeshSettings& s, rc
   if (!(out.areas.eroded > 0)) return out;
 
   const auto squared = [](double v) { return static_cast<int>(min(v * v, 2e9)); };
-  if (!rcBuildDistanceField(&log, *compact) ||
-      !rcBuildRegions(&log, *compact, border, squared(s.region_min_size),
+  tell(0.3);
+  if (!rcBuildDistanceField(&log, *compact)) return stage("building regions", log);
+  tell(0.35);
+  if (!rcBuildRegions(&log, *compact, border, squared(s.region_min_size),
                       squared(s.region_merge_size))) {
     return stage("building regions", log);
   }
+  tell(0.5);
   out.region_cells.assign(std::size_t{compact->maxRegions} + 1, 0);
   for (int i = 0; i < compact->spanCount; ++i) {
     const unsigned short region = compact->spans[i].reg;
@@ -214,16 +229,10 @@ Result<TilePolygons> build_polygons(RecastLog& log, const NavMeshSettings& s, rc
   if (!rcBuildPolyMesh(&log, *contours, s.verts_per_poly, *out.polys))
     return stage("building polygons", log);
   if (out.polys->npolys == 0) return out;
-  out.heights.reset(rcAllocPolyMeshDetail());
-  // A distance above the length of any edge means no samples. (For 0, Recast reads an empty hull, see
-  // its issue 650.)
-  constexpr double kNoSamples = 1e9;
-  const double sample = s.detail_sample_dist < 0.9 ? kNoSamples : s.detail_sample_dist * s.cell_size;
-  if (!rcBuildPolyMeshDetail(&log, *out.polys, *compact, static_cast<float>(sample),
-                             static_cast<float>(s.cell_height * s.detail_sample_max_error),
-                             *out.heights)) {
-    return stage("sampling heights", log);
-  }
+  tell(kPolygons);
+  auto heights = sample_heights(log, s, *out.polys, *compact, progress);
+  if (!heights.ok()) return heights.status();
+  out.heights = std::move(*heights);
   for (int i = 0; i < out.polys->npolys; ++i) out.polys->flags[i] = 1;
   return out;
 }

@@ -70,11 +70,16 @@ double slope_cosine(const NavMeshSettings& settings) noexcept;
 Result<Aabb<double>> check_triangles(std::span<const Vec3d> vertices,
                                      std::span<const NavMesh::Triangle> triangles);
 
+/// Receives the completed fraction of a build. May be empty. Its exceptions leave the stage.
+using Progress = std::function<void(double)>;
+
 /// Adds triangles to a heightfield whose frame is at `origin`.
+/// @param progress Receives fractions up to kRasterised.
 /// @return out_of_memory.
 Status rasterise(RecastLog& log, const NavMeshSettings& settings, std::span<const Vec3d> vertices,
-                 std::span<const NavMesh::Triangle> triangles, const Vec3d& origin,
-                 rcHeightfield& field);
+                 std::span<const NavMesh::Triangle> triangles, const Vec3d& origin, rcHeightfield& field,
+                 const Progress& progress = {});
+inline constexpr double kRasterised = 0.15;  ///< Fraction of a build until all triangles are added.
 
 /// Checks the size of a grid over a box.
 /// @return invalid_argument if it exceeds `settings.max_cells` or Recast's limits.
@@ -105,13 +110,24 @@ struct TilePolygons {
   bool empty() const noexcept { return polys == nullptr || polys->npolys == 0; }
 };
 
+/// Samples the heights of the polygons. On open ground this is half of the work of a build.
+/// @param progress Receives fractions from kPolygons up to 1.
+/// @return out_of_memory.
+Result<RecastPtr<rcPolyMeshDetail>> sample_heights(RecastLog& log, const NavMeshSettings& settings,
+                                                   const rcPolyMesh& polys,
+                                                   const rcCompactHeightfield& compact,
+                                                   const Progress& progress);
+inline constexpr double kPolygons = 0.55;  ///< Fraction of a build until there are polygons.
+
 /// Filters, erodes, and builds regions, contours and polygons.
 /// @param border Cells around the tile that are used as context and then cut off.
 /// @param prune Removes areas after erosion.
+/// @param progress Receives fractions from kRasterised up to 1.
 /// @return out_of_memory.
 Result<TilePolygons> build_polygons(RecastLog& log, const NavMeshSettings& settings,
                                     rcHeightfield& field, int border,
-                                    const std::function<void(rcCompactHeightfield&)>& prune = {});
+                                    const std::function<void(rcCompactHeightfield&)>& prune = {},
+                                    const Progress& progress = {});
 
 /// Position of a tile.
 struct TilePlace {
@@ -128,6 +144,7 @@ Result<DetourBytes> make_tile(const NavMeshSettings& settings, const TilePolygon
 struct BuildHooks {
   std::function<void(rcCompactHeightfield&)> prune;  ///< Removes areas after erosion.
   std::function<double(const Vec3d&)> height;        ///< True height of a vertex of the surface.
+  Progress progress;                                 ///< See build_polygons.
 };
 
 /// All stages after voxelization, as one tile.
@@ -150,6 +167,7 @@ struct TileHooks {
   double least_area = 0;                       ///< Islands below this area are dropped, m².
   std::function<void(double)> progress;        ///< Receives the completed fraction of the tiles. Calls
                                                ///< do not overlap.
+  Progress calling_progress;  ///< The same for the thread that builds. Its exceptions leave the build.
 };
 
 /// Builds in tiles of `settings.tile_size`. `box` contains the triangles, relative to the origin.

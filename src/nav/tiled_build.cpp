@@ -3,6 +3,8 @@
 // and filters see the same context as in a single tile. The walkable cells are therefore
 // those of a single tile.
 #include <algorithm>
+#include <atomic>
+#include <exception>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -159,11 +161,52 @@ Result<NavMeshPtr> link_tiles(const TileGrid& grid, std::span<const TilePolygons
   return mesh;
 }
 
+/// Progress of tiles for the thread that builds. Once it threw, all threads end their tiles.
+class CallingProgress {
+ public:
+  CallingProgress(const Progress& progress, std::size_t tiles) : progress_(progress), tiles_(tiles) {}
+
+  /// Function for the stages of a tile, on any thread. It throws if the build shall end.
+  Progress of_tile() {
+    if (!progress_) return {};
+    return [this](double share) { tell(share); };
+  }
+  void tile_is_done() {
+    ++done_;
+    if (progress_) tell(0);
+  }
+  bool stopped() const noexcept { return stopped_; }
+  /// Throws what the progress function threw, once no thread is at work.
+  void rethrow() const {
+    if (error_) std::rethrow_exception(error_);
+  }
+
+ private:
+  void tell(double share) {
+    if (std::this_thread::get_id() == caller_ && !stopped_) {
+      try {
+        progress_(min((static_cast<double>(done_) + share) / static_cast<double>(tiles_), 1.0));
+      } catch (...) {
+        error_ = std::current_exception();
+        stopped_ = true;
+      }
+    }
+    if (stopped_) throw Error(Errc::out_of_memory, "stopped");  // rethrow() replaces it
+  }
+
+  const Progress& progress_;
+  const std::size_t tiles_;
+  const std::thread::id caller_ = std::this_thread::get_id();
+  std::atomic<std::size_t> done_{0};
+  std::atomic<bool> stopped_{false};
+  std::exception_ptr error_;
+};
+
 /// Builds the polygons of one tile.
 Result<TilePolygons> build_tile(const TileGrid& grid, const TriangleLists& lists, std::size_t tile,
                                 std::span<const Vec3d> vertices,
                                 std::span<const NavMesh::Triangle> triangles, const Vec3d& origin,
-                                const TileHooks& hooks) {
+                                const TileHooks& hooks, const Progress& progress) {
   std::vector<NavMesh::Triangle> own;
   for (std::size_t i = lists.first[tile]; i < lists.first[tile + 1]; ++i)
     own.push_back(triangles[lists.triangles[i]]);
@@ -177,9 +220,10 @@ Result<TilePolygons> build_tile(const TileGrid& grid, const TriangleLists& lists
     const int x0 = at % columns * side - grid.border, z0 = at / columns * side - grid.border;
     if (Status s = hooks.fill(log, x0, z0, **field); !s.ok()) return s;
   }
-  if (Status s = rasterise(log, grid.settings, vertices, own, origin, **field); !s.ok()) return s;
+  if (Status s = rasterise(log, grid.settings, vertices, own, origin, **field, progress); !s.ok())
+    return s;
   grid.clip(tile, **field);
-  return build_polygons(log, grid.settings, **field, grid.border);
+  return build_polygons(log, grid.settings, **field, grid.border, {}, progress);
 }
 
 }  // namespace
@@ -204,16 +248,19 @@ Result<NavMesh> build_in_tiles(const NavMeshSettings& settings, std::span<const 
   std::sort(work.begin(), work.end(), std::greater<>());
   std::mutex lock;
   std::size_t done = 0;
+  CallingProgress calling(hooks.calling_progress, tiles.size());
   const auto piece = [&](std::uint32_t turn) noexcept {
     const std::uint32_t i = work[turn].second;
+    if (calling.stopped()) return;
     failed[i] = guarded([&] {
       if (i == 0) {
         if (!hooks.height) heights.emplace(vertices, triangles, origin, box);
         return Status();
       }
-      auto made = build_tile(grid, lists, i - 1, vertices, triangles, origin, hooks);
+      auto made = build_tile(grid, lists, i - 1, vertices, triangles, origin, hooks, calling.of_tile());
       if (!made.ok()) return made.status();
       tiles[i - 1] = std::move(*made);
+      calling.tile_is_done();
       if (!hooks.progress) return Status();
       const std::lock_guard held(lock);
       hooks.progress(static_cast<double>(++done) / static_cast<double>(tiles.size()));
@@ -221,6 +268,7 @@ Result<NavMesh> build_in_tiles(const NavMeshSettings& settings, std::span<const 
     });
   };
   pool.run(static_cast<std::uint32_t>(tiles.size() + 1), piece);
+  calling.rethrow();
   WalkableAreas areas;
   for (const Status& s : failed) {
     if (s.code() == Errc::out_of_memory) return {s.code(), "NavMesh, tiles: " + s.message()};

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <functional>
 #include <map>
 #include <memory>
 #include <utility>
@@ -79,7 +80,11 @@ NavMeshSettings settings_of(const OpenOptions& o) {
 Result<NavMesh> build(OpeningScene& s, const NavMeshChoice& choice, NavMeshSettings settings,
                       const std::string& what) {
   const OpenOptions& o = s.options;
-  if (choice.triangles) return NavMesh::build(settings, s.triangles.vertices, s.triangles.triangles);
+  if (choice.triangles) {
+    std::function<void(double)> progress;
+    if (o.progress) progress = [&](double share) { o.progress(what + ": triangles", share); };
+    return NavMesh::build(settings, s.triangles.vertices, s.triangles.triangles, 0, progress);
+  }
   settings.cell_height = std::max(
       std::min(settings.cell_height, gaussian_navmesh_settings().cell_height), settings.cell_size);
   GaussianNavOptions how;

@@ -52,13 +52,18 @@ Status add_objects(const Options& o, NavMeshTriangles& all) {
   return {};
 }
 
+Result<NavMesh> build(const Options& o, const NavMeshTriangles& all) {
+  return NavMesh::build(o.settings, all.vertices, all.triangles, o.threads,
+                        [&o](double share) { o.gaussians.progress("triangles", share); });
+}
+
 Result<NavMesh> from_triangles(const Options& o) {
   const auto placed = placement(o, o.up == "auto" || o.up == "keep" ? "y" : o.up);
   if (!placed) return placed.status();
   NavMeshTriangles all;
   if (Status s = add_triangles(o.scene, *placed, all); !s) return s;
   if (Status s = add_objects(o, all); !s) return s;
-  return NavMesh::build(o.settings, all.vertices, all.triangles, o.threads);
+  return build(o, all);
 }
 
 /// Computes the visible sets for positions on the NavMesh, and writes them.
@@ -161,8 +166,7 @@ Result<NavMesh> from_scene(const Options& o) {
     if (Status s = add_triangles(file, *placed, all); !s) return s;
   }
   if (Status s = add_objects(o, all); !s) return s;
-  auto mesh = of_gaussians ? from_gaussians(o, assets[0].cloud->set(*placed), all)
-                           : NavMesh::build(o.settings, all.vertices, all.triangles, o.threads);
+  auto mesh = of_gaussians ? from_gaussians(o, assets[0].cloud->set(*placed), all) : build(o, all);
   if (!mesh || o.visible_sets.empty()) return mesh;
   if (Status s = write_visible_sets(o, *assets[0].cloud, *mesh, *placed); !s) return s;
   return mesh;

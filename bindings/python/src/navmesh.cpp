@@ -224,13 +224,17 @@ void bind_paths(nb::class_<NavMesh>& c) {
 void bind_mesh(nb::class_<NavMesh>& c) {
   c.def_static(
        "build", build_navmesh, nb::arg("settings"), nb::arg("vertices"), nb::arg("triangles"),
-       nb::arg("threads") = 0,
+       nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
        nb::sig("def build(settings: NavMeshSettings, vertices: numpy.typing.ArrayLike, "
-               "triangles: numpy.typing.ArrayLike, threads: int = 0) -> NavMesh"),
+               "triangles: numpy.typing.ArrayLike, threads: int = 0, progress: "
+               "collections.abc.Callable[[float], object] | None = None) -> NavMesh"),
        "Builds a NavMesh from triangles.\n\n"
        "`vertices`: real numbers [V][3], metres, Y up. `triangles`: integers [T][3], indices. A "
        "triangle can be walked on if it is counter-clockwise seen from above. Raises InvalidArgument "
-       "naming the setting or index, or NothingNavigable.")
+       "naming the setting or index, or NothingNavigable.\n\n"
+       "`progress(share)` is called some hundred times with the share that is done. Its exceptions and "
+       "Ctrl-C end the call. Stages of Recast are not cut: up to half of the time on a large field, or "
+       "that of a tile, passes between two calls.")
       .def_prop_ro(
           "settings", [](const NavMesh& n) { return n.settings(); },
           "A copy of the settings that the mesh was built with.")

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "arrays.hpp"
+#include "progress.hpp"
 
 namespace gsnav::python {
 namespace {
@@ -42,15 +43,16 @@ nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu> rows_of_three(n
 }  // namespace
 
 std::shared_ptr<NavMesh> build_navmesh(NavMeshSettings settings, nb::handle vertices,
-                                       nb::handle triangles, int threads) {
+                                       nb::handle triangles, int threads, const nb::object& progress) {
   const auto v = rows_of_three<double>(vertices, "vertices", "f", "float64");
   const auto t = rows_of_three<std::uint32_t>(triangles, "triangles", "iu", "uint32");
   std::vector<Vec3d> points(v.shape(0));
   for (std::size_t i = 0; i < points.size(); ++i) points[i] = {v(i, 0), v(i, 1), v(i, 2)};
   std::vector<NavMesh::Triangle> faces(t.shape(0));
   for (std::size_t i = 0; i < faces.size(); ++i) faces[i] = {t(i, 0), t(i, 1), t(i, 2)};
+  const auto stopping = stopping_progress(progress);
   const ReleaseGil release;
-  return std::make_shared<NavMesh>(NavMesh::build(settings, points, faces, threads).value());
+  return std::make_shared<NavMesh>(NavMesh::build(settings, points, faces, threads, stopping).value());
 }
 
 nb::tuple navmesh_surface(const NavMesh& mesh, std::optional<std::size_t> island) {

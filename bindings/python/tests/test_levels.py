@@ -200,6 +200,14 @@ def interrupted(call):
         signal.signal(signal.SIGALRM, before)
 
 
+def hills(side):
+    """Triangles of a square of hills, metres."""
+    x, z = np.meshgrid(np.linspace(0, side, 65), np.linspace(0, side, 65), indexing="ij")
+    at = np.arange(64)[:, None] * 65 + np.arange(64)
+    triangles = np.stack([at, at + 1, at + 65, at + 1, at + 66, at + 65], -1).reshape(-1, 3)
+    return np.stack([x, np.sin(x / 5) * np.cos(z / 7), z], -1).reshape(-1, 3), triangles
+
+
 def test_signals_end_the_builders(scene):
     cloud = gsnav.open_scene("default", gsnav.OpenOptions(density=1.0)).scene.assets[0].cloud
     places = gsnav.navmesh_viewpoints(scene.navmesh, [1.5], 0.1)
@@ -207,6 +215,9 @@ def test_signals_end_the_builders(scene):
     assert interrupted(lambda progress: gsnav.build_lod("serial", cloud, progress=progress)) < 1
     assert interrupted(lambda progress: gsnav.build_visible_sets("cpu", cloud, places, settings, gsnav.Similarity(),
                                                                  progress)) < 1
+    for tile_size, threads in ((0, 1), (1024, 1), (64, 3)):
+        ground = gsnav.NavMeshSettings(cell_size=0.03, tile_size=tile_size)
+        assert interrupted(lambda progress: gsnav.NavMesh.build(ground, *hills(80), threads, progress)) < 1
 
 
 def test_progress(scene, cloud):

@@ -59,6 +59,27 @@ def test_map_and_surface(square):
     assert np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2 == pytest.approx(square.navigable_area())
 
 
+@pytest.mark.parametrize("tile_size, threads", [(0, 1), (64, 1), (64, 3)])
+def test_progress_of_a_build(tile_size, threads, tmp_path):
+    vertices, triangles = [(0.0, 0, 0), (0, 0, 30), (30, 1, 30), (30, 0, 0)], [(0, 1, 2), (0, 2, 3)]
+    settings, shares = gsnav.NavMeshSettings(tile_size=tile_size), []
+    quiet = gsnav.NavMesh.build(settings, vertices, triangles)
+    told = gsnav.NavMesh.build(settings, vertices, triangles, threads, progress=shares.append)
+    gsnav.save_navmesh(quiet, tmp_path / "quiet.navmesh")
+    gsnav.save_navmesh(told, tmp_path / "told.navmesh")
+    assert (tmp_path / "quiet.navmesh").read_bytes() == (tmp_path / "told.navmesh").read_bytes()
+    assert len(shares) > 5 and shares == sorted(shares) and 0 <= shares[0] < 0.1 and shares[-1] <= 1
+
+    def fail(share):
+        if share > 0.3:
+            raise LookupError("enough")
+
+    with pytest.raises(LookupError, match="enough"):
+        gsnav.NavMesh.build(settings, vertices, triangles, threads, fail)
+    with pytest.raises(TypeError):
+        gsnav.NavMesh.build(settings, vertices, triangles, threads, 3)
+
+
 def test_files(square, tmp_path):
     gsnav.save_navmesh(square, tmp_path / "a.navmesh")
     again = gsnav.load_navmesh(str(tmp_path / "a.navmesh"))

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -166,15 +167,19 @@ class NavMesh {
   /// @param triangles Indices. A triangle can be walked on if it is counter-clockwise seen from above.
   /// @param threads Threads that build tiles if `settings.tile_size` is set. 0: one thread per core, at
   /// most 16.
+  /// @param progress Called some hundred times with the share of the work that is done, in [0, 1], by
+  /// the calling thread. If it throws, the build ends and the exception leaves it. Stages of Recast are
+  /// not cut: up to half of the time on a large field, or that of a tile, passes between two calls.
   /// @return invalid_argument for a setting, vertex or index out of range (the message names it) or a
   /// grid of more than `max_cells` cells; nothing_navigable if no surface remains; unsupported if Detour
   /// cannot number the polygons.
   static Result<NavMesh> build(const NavMeshSettings& settings, std::span<const Vec3d> vertices,
-                               std::span<const Triangle> triangles, int threads = 0);
+                               std::span<const Triangle> triangles, int threads = 0,
+                               const std::function<void(double)>& progress = {});
   /// Builds a NavMesh from a static scene and the objects in it. See gather_parts.
   /// @return the errors of gather_parts and of the other build().
   static Result<NavMesh> build(const NavMeshSettings& settings, std::span<const NavMeshPart> parts,
-                               int threads = 0);
+                               int threads = 0, const std::function<void(double)>& progress = {});
 
   /// Moves the mesh. The source may then only be assigned to or destroyed.
   NavMesh(NavMesh&&) noexcept;
