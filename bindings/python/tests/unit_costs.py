@@ -76,11 +76,11 @@ def messages():
     row("episode, sent to an actor", len(pickle.dumps(list(enumerate(episodes)))) / 64, "bytes")
     result = pickle.dumps(rollouts)
     row("rollout of 100 actions without observations, sent back", len(result) / 64, "bytes")
-    row("line of a journal", sum(len(r.line()) + 1 for r in rollouts) / 64, "bytes")
+    row("line of a journal", sum(len(gsnav.ray._journal.line(r)) + 1 for r in rollouts) / 64, "bytes")
 
     def receive():
         for rollout in pickle.loads(result):
-            rollout.line()
+            gsnav.ray._journal.line(rollout)
 
     row("driver: an episode", cpu_seconds(receive, 20) / 64 * 1e6, "us")
 
@@ -92,7 +92,7 @@ def calls():
         print("driver: a call of an actor: needs ray, which is not installed")
         return
     ray.init(log_to_driver=False, logging_level="ERROR")
-    player = ray.remote(gsnav._rollout.Player).options(num_cpus=1).remote(4, "default", {})
+    player = ray.remote(gsnav.ray.Player).options(num_cpus=1).remote(4, "default", {})
     ray.get(player.ready.remote())
     row("driver: a call of an actor", cpu_seconds(lambda: ray.get(player.__ray_call__.remote(len_of)), 300) * 1e6, "us")
 
