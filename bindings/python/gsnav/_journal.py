@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Journals of gsnav.ray: a header, and then a line of JSON for each episode, in order."""
+"""Journals of gsnav.ray: a header, and then a line of JSON for each episode, in order.
+
+The last field of a line, "crc32", is the CRC-32 of all bytes before its comma, in eight hexadecimal digits. A line
+with another one was edited or damaged, and is an error. Other fields are those of a journal of gsnav-eval, which
+needs no checksum: it plays the actions of a line again. Journals of format 1 had no checksums and are refused.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +13,7 @@ import json
 import math
 import os
 import pathlib
+import zlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -20,7 +26,9 @@ from ._gsnav import EpisodeMetrics
 
 DATASET = ".scene_dataset_config.json"
 START = '{"journal": "gsnav.ray", '
-FIELDS = {"episode", "id", "reward", "metrics", "actions"}  # of a line
+FORMAT = 2
+FIELDS = {"episode", "id", "reward", "metrics", "actions", "crc32"}  # of a line
+SUM = ', "crc32": '
 ACTIONS = set("0123")
 
 
@@ -43,7 +51,7 @@ def header(identity: Sequence[Any], episodes: Sequence[_task.Episode], piece: in
                                   "pass a name or path, or use rollouts()")
     names = [os.fspath(scene) for scene in scenes]
     content = json.dumps([int(environments), names, config, *episodes], default=_task.plain)
-    return json.dumps({"journal": "gsnav.ray", "format": 1, "piece": int(piece),
+    return json.dumps({"journal": "gsnav.ray", "format": FORMAT, "piece": int(piece),
                        "content": hashlib.sha256(content.encode()).hexdigest()})
 
 
@@ -59,6 +67,9 @@ def lines(path: pathlib.Path, header: str) -> list[str]:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as e:
         raise InvalidArgument(f"{path} is not a journal: {e}") from e
+    version = text.partition("\n")[0].removeprefix(f'{START}"format": ').partition(",")
+    if version[1] and version[0].isdecimal() and int(version[0]) != FORMAT:
+        raise InvalidArgument(f"{path}: line 1: format = {version[0]}: this gsnav reads {FORMAT}: use another journal")
     if not text.startswith(header + "\n") and not (header + "\n").startswith(text):
         raise InvalidArgument(f"{path} is of other episodes, scenes, settings or pieces: use another, or remove it")
     return text.split("\n")[1:-1]
@@ -79,16 +90,23 @@ def _is_finite(values: Sequence[Any]) -> bool:
     return all(v is None or math.isfinite(v) for v in values)
 
 
+def _sum(text: str) -> str:
+    """The checksum of the text of a line before it."""
+    return f"{zlib.crc32(text.encode()):08x}"
+
+
 def line(rollout: Any) -> str:
-    """The line of an episode, with the fields of a journal of gsnav-eval. Infinity is null."""
+    """The line of an episode. Infinity is null."""
     metrics = {n: v if np.isfinite(v) else None for n, v in _task.metrics_dict(rollout.metrics).items()}
     reward = sum(rollout.rewards.tolist())
-    return json.dumps({"episode": rollout.episode, "id": rollout.id, "reward": reward if np.isfinite(reward) else None,
-                       "metrics": metrics, "actions": "".join(map(str, rollout.actions.tolist()))})
+    text = json.dumps({"episode": rollout.episode, "id": rollout.id, "reward": reward if np.isfinite(reward) else None,
+                       "metrics": metrics, "actions": "".join(map(str, rollout.actions.tolist()))})[:-1]
+    return f'{text}{SUM}"{_sum(text)}"}}'
 
 
-def _metrics_of(row: Any, index: int, id: str) -> EpisodeMetrics:
+def _metrics_of(text: str, index: int, id: str) -> EpisodeMetrics:
     """Metrics of a line. A wrong line raises ValueError, or the error of its wrong type."""
+    row: Any = json.loads(text)
     if row.keys() != FIELDS:
         raise ValueError(f"its fields are not {', '.join(sorted(FIELDS))}")
     metrics, actions = row["metrics"], row["actions"]
@@ -104,7 +122,12 @@ def _metrics_of(row: Any, index: int, id: str) -> EpisodeMetrics:
     if not isinstance(actions, str) or not ACTIONS.issuperset(actions) or actions.endswith("0") != stops \
             or len(actions) != metrics["steps"] + stops:
         raise ValueError(f"its actions are not those of {metrics['steps']} steps: {actions!r}")
-    return EpisodeMetrics(**dict[str, Any]((n, np.inf if v is None else v) for n, v in metrics.items()))
+    read = EpisodeMetrics(**dict[str, Any]((n, np.inf if v is None else v) for n, v in metrics.items()))
+    before, _, last = text.rpartition(SUM)
+    if last != f'"{_sum(before)}"}}':
+        raise ValueError(f"its crc32 is {row['crc32']!r}, but its other fields give {_sum(before)!r}: it was edited or "
+                         "damaged")
+    return read
 
 
 def metrics(path: pathlib.Path, lines: Sequence[str], episodes: Sequence[_task.Episode]) -> list[EpisodeMetrics]:
@@ -115,7 +138,7 @@ def metrics(path: pathlib.Path, lines: Sequence[str], episodes: Sequence[_task.E
     for i, text in enumerate(lines):
         episode: Any = getattr(episodes[i], "episode", episodes[i])
         try:
-            read.append(_metrics_of(json.loads(text), i, episode.id))
+            read.append(_metrics_of(text, i, episode.id))
         except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as e:
             raise InvalidArgument(f"{path}: line {i + 2} is not that of episode {i}: {e}") from e
     return read

@@ -139,8 +139,8 @@ class Workers:
                  journal: str | os.PathLike[str], *, piece: int = 64) -> list[EpisodeMetrics]:
         """Plays episodes and writes a line for each to `journal`, in order. Returns their metrics.
 
-        An existing journal of the same evaluation is continued. Use the policy that it was begun with. Scenes must
-        have names, because the journal is of these scenes: of the absolute paths of their files.
+        An existing journal of the same evaluation is continued, if it has checksums and no line was edited. Use the
+        policy that it was begun with. Scenes must have names, because the journal is of the paths of their files.
         """
         self._check(make_policy, piece)
         episodes = list(episodes)

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
 import os
+import re
 import stat
 import time
+import zlib
 
 import numpy as np
 import pytest
@@ -73,6 +75,16 @@ def test_a_single_process_plays_every_episode(episodes, alone):
             assert getattr(world.metrics(), name) == (np.inf if value is None else value), name
 
 
+EDITED = r"notes\.txt: line 3 is not that of episode 1: its crc32 is .*, but its other fields give"
+TURNED = str.maketrans("23", "32")
+
+
+def test_a_line_has_the_checksum_of_its_text(alone):
+    for line in alone[0].splitlines()[1:]:
+        text, _, last = line.rpartition(b", ")
+        assert last == b'"crc32": "%08x"}' % zlib.crc32(text)
+
+
 def wrong_numbers(whole):
     """Journals whose line 3 is wrong, and words of the error."""
     row = json.loads(whole[2])
@@ -84,11 +96,20 @@ def wrong_numbers(whole):
                           ({"metrics": {**metrics, "spl": "high"}}, "line 3"), ({"reward": 10**400}, "line 3"),
                           ({"metrics": {**metrics, "success": None}}, "line 3 .* EpisodeMetrics.success"),
                           ({"metrics": []}, "line 3"), ({"episode": None}, "line 3"),
-                          ({"episode": 1.0}, "line 3"), ({"more": 1}, "line 3 .* its fields are not actions, episode"),
+                          ({"episode": 1.0}, "line 3"),
+                          ({"more": 1}, "line 3 .* its fields are not actions, crc32, episode"),
                           ({"actions": row["actions"][1:]}, "line 3 .* its actions are not those of"),
                           ({"actions": "z" * len(row["actions"])}, "line 3 .* actions"), ({"actions": 5}, "line 3"),
-                          ({"metrics": {**metrics, "stop_called": not metrics["stop_called"]}}, "line 3 .* actions")]:
+                          ({"metrics": {**metrics, "stop_called": not metrics["stop_called"]}}, "line 3 .* actions"),
+                          ({"reward": row["reward"] + 1e-9}, EDITED), ({"reward": None}, EDITED),
+                          ({"metrics": {**metrics, "spl": 0.5}}, EDITED), ({"crc32": "00000000"}, EDITED),
+                          ({"metrics": {**metrics, "success": not metrics["success"]}}, EDITED),
+                          ({"actions": row["actions"].translate(TURNED)}, EDITED), ({"crc32": None}, EDITED)]:
         yield "".join([*whole[:2], json.dumps({**row, **change}) + "\n", *whole[3:]]), words
+    yield "".join([*whole[:2], whole[2].replace('"reward": ', '"reward": 9, "reward": '), *whole[3:]]), EDITED
+    bare = re.sub(', "crc32": "[^"]*"', "", whole[2])
+    yield "".join([*whole[:2], bare, *whole[3:]]), "line 3 .* its fields are not"
+    yield whole[0].replace('"format": 2', '"format": 1') + whole[1], "line 1: format = 1: this gsnav reads 2"
     for line in ("[1]", "[" * 100000):
         yield "".join([*whole[:2], line + "\n", *whole[3:]]), "line 3"
     yield "".join([*whole, whole[-1]]), "line 28: there are only 26 episodes"
