@@ -39,3 +39,12 @@ def limit(root: str = "/") -> int:
     except (OSError, ValueError):  # There are no control groups.
         pass
     return min(limits)
+
+
+def lack(needed: float) -> str:
+    """Text on the memory that is missing for this number of bytes, or "" if this process may use them.
+
+    Linux may promise more memory than there is, and then kills the process that uses it.
+    """
+    present = limit()
+    return f"{needed / 1e9:.3g} GB of {present / 1e9:.3g}" if needed > present > 0 else ""

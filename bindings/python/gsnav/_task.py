@@ -175,18 +175,13 @@ def sensor_space(sensor: SensorSpec) -> Box:
 
 @contextlib.contextmanager
 def memory_for_spaces(config: SimulatorConfig, environments: int) -> Iterator[None]:
-    """Checks the sensors, and names them if there is no memory for the spaces of their images.
-
-    Linux may promise more memory than there is, and then kills the process that uses it. So the size is compared
-    with that of the machine, or with the limit of a container.
-    """
+    """Checks the sensors, and names them if there is no memory for the spaces of their images."""
     for sensor in config.sensors:
         sensor.validate()
     try:
         numbers = sum(math.prod(image_shape(s)) for s in config.sensors)
-        needed, present = environments * (8 * numbers + ENVIRONMENT_BYTES), _memory.limit()  # two bounds of 4 bytes
-        if needed > present > 0:
-            raise MemoryError(f"{needed / 1e9:.3g} GB of {present / 1e9:.3g}")
+        if lack := _memory.lack(environments * (8 * numbers + ENVIRONMENT_BYTES)):  # two bounds of 4 bytes
+            raise MemoryError(lack)
         yield
     except (MemoryError, OverflowError) as e:
         sizes = ", ".join(f"{s.uuid!r}: resolution = {list(s.resolution)}" for s in config.sensors) or "no sensors"

@@ -3,6 +3,7 @@
 
 import math
 import os
+import time
 
 import numpy as np
 import pytest
@@ -277,3 +278,19 @@ def test_limits_of_containers(people, small, tmp_path, monkeypatch, group, limit
         for config in (small, gsnav.SimulatorConfig(sensors=[])):
             with pytest.raises(gsnav.OutOfMemory, match=f"5000 environments .* GB of {expected / 1e9:.3g}$"):
                 gsnav.VectorEnv(5000, people, config=config)
+
+
+@pytest.mark.parametrize("config, gigabytes", [({}, "0.419"), ({"outputs": int(gsnav.Output.kMedianDepth)}, "0.0839")])
+def test_images_of_a_renderer_fit_into_the_container(people, monkeypatch, config, gigabytes):
+    camera = gsnav.Camera.look_at((5, 1.5, 4), (5, 1, 3), (0, 1, 0), 1024, 1024, 90)
+    renderer = gsnav.Renderer("serial", people, gsnav.RenderOptions(render=gsnav.RenderConfig(**config)))
+    monkeypatch.setattr(gsnav._memory, "limit", lambda: 80_000_000)
+    start = time.process_time()
+    with pytest.raises(gsnav.OutOfMemory, match=f"the images of 12 of 1024 x 1024 pixels: {gigabytes} GB of 0.08$"):
+        renderer.render([camera] * 12)
+    assert time.process_time() - start < 0.2  # before anything is rendered
+    monkeypatch.setattr(gsnav._memory, "limit", lambda: 1 << 40)
+    assert renderer.render([camera] * 2).median_depth.shape == (2, 1024, 1024)
+    renderer.set_config(gsnav.RenderConfig(outputs=int(gsnav.Output.kAlpha)))
+    monkeypatch.setattr(gsnav._memory, "limit", lambda: 80_000_000)
+    assert renderer.render([camera] * 4).alpha.shape == (4, 1024, 1024)
