@@ -22,7 +22,7 @@ usage_error() {
 
 # Refuses a value that is not of the kind that the help text names for the option.
 check_value() {
-  local option=$1 value=$2 pattern= kind choices
+  local option=$1 value=$2 pattern= kind choices range
   kind=$(sed -nE "s/^  $option ([A-Z]+[^ =]*).*/\1/p" "$help" | head -n 1)
   case $kind in
     INT* | UINT*) pattern='^[+-]?[0-9]+$' ;;
@@ -32,6 +32,13 @@ check_value() {
       [[ ,${choices%%\}*}, == *",$value,"* ]] || usage_error "$option $value: nav_loop does not take this value"
       ;;
   esac
+  # The range, such as "in [0 - 64]".
+  range=$(sed -nE "s/^  $option [A-Z:]+ in \[(\S+ - [^]]+)\].*/\1/p" "$help" | head -n 1)
+  if [[ -n $range && $value =~ $pattern ]]; then
+    awk -v v="$value" -v low="${range% - *}" -v high="${range#* - }" \
+      'BEGIN { exit !(v + 0 >= low + 0 && v + 0 <= high + 0) }' ||
+      usage_error "$option $value: nav_loop does not take this value, but those in [$range]"
+  fi
   [[ $option == --device ]] && pattern='^(best|cpu|cuda|serial(64)?)(:[0-9]+)?$'
   [[ $value =~ $pattern ]] || usage_error "$option $value: nav_loop does not take this value"
 }

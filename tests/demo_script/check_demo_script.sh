@@ -37,13 +37,20 @@ for help in --help -h "--episodes 3 --help"; do
 done
 demo --episode 3
 [[ $status -eq 2 ]] && grep -q -- "no option --episode;" "$work/err.txt" || fail "run_demo.sh --episode: status $status"
-for value in "--episodes abc" --episodes=1.5 "--hfov 1e2x" --device=bogus "--device cpu:x" "--up w" --storage=none; do
+for value in "--episodes abc" --episodes=1.5 "--hfov 1e2x" --device=bogus "--device cpu:x" "--up w" --storage=none \
+  "--avatars 99" --episodes=0 "--hfov 170.5" --density=1e3 "--show -2"; do
   # shellcheck disable=SC2086
   demo $value
   [[ $status -eq 2 ]] && grep -q "does not take this" "$work/err.txt" || fail "run_demo.sh $value: $status"
 done
 demo --device
 [[ $status -eq 2 ]] && grep -q -- "--device needs a value" "$work/err.txt" || fail "run_demo.sh --device: $status"
+for value in "--avatars 64" --avatars=+0 "--show -1" "--hfov 1.7e2" --lod-error=.01; do
+  # The range is right, and the device is the next thing that is wrong.
+  # shellcheck disable=SC2086
+  demo $value --device cuda
+  [[ $status -eq 2 ]] && grep -q "no GPU" "$work/err.txt" || fail "run_demo.sh $value: $status"
+done
 demo --version
 version=$(exec -a nav_loop "$program" --version)
 [[ $status -eq 0 && $(cat "$work/out.txt") == "$version" ]] || fail "run_demo.sh --version"
