@@ -62,6 +62,7 @@ USAGE = {
     "gsnav-eval": [
         ("none.ply --navmesh none", "--navmesh: none: agents need one"),
         ("none.ply --storage packed", "--storage: packed: journals"),
+        ("none.ply --pictures -5", "--pictures: Value -5 not in range"),
     ],
     "gsnav-viewer": [("none.ply --navmesh none", "--navmesh: none: agents need one")],
     "nav_loop": [

@@ -150,7 +150,8 @@ int main(int argc, char** argv) try {
       "gsnav-eval --scene apartment.ply --avatars 5 --episodes 100 --out eval"};
   gsnav_eval::add_world_options(app, o);
   app.add_option("--pictures", pictures, "number of episodes with images on the page; -1 shows all")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(CLI::Range(-1, 1000000));
   bool restart = false;
   app.add_flag("--restart", restart, "remove the evaluation in --out and begin again");
   if (const auto status = gsnav_tools::parse_options(app, argc, argv)) return *status;
