@@ -28,6 +28,7 @@ USAGE = {
         ("none.ply --out= --orbit 1", "--out= has no value"),
         ("none.ply --out o --orbit 4 --eye 1 1 1 --target 0 0 0", "--orbit"),
         ("none.ply --out o --cell-size 0", "--cell-size: 0: must be positive"),
+        ("none.ply --out o --cell-size 0.1", "--cell-size: there is no NavMesh; give --navmesh or --avatars"),
     ],
     "gsnav-convert": [
         ("none.ply out.xyz", "out.xyz: unknown kind of file to write: use .ply"),

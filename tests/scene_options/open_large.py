@@ -46,7 +46,7 @@ def opens(program, folder):
     """Why the program does not open the scene, or None."""
     name = pathlib.Path(program).name
     common = ["--scene", "ground.ply", "--up", "y"]
-    if name not in ("gsnav-convert", "gsnav-report"):
+    if name not in ("gsnav-convert", "gsnav-render", "gsnav-report"):  # These build no NavMesh.
         common += ["--cell-size", "0.5"]
     if name in ("gsnav-eval", "nav_loop", "gsnav-viewer"):
         common += ["--avatars", "2"]

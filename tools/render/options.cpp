@@ -123,13 +123,15 @@ std::optional<int> parse_options(int argc, char** argv, Options& o) {
   add_images(app, o);
   add_cameras(app, o);
   gsnav_tools::add_scene_options(app, o, &o.float64);
-  const auto check = [&o] {
+  const auto check = [&o, &app] {
+    if (o.avatars > 0 && o.navmesh == "none") o.navmesh = "auto";
+    if (o.navmesh == "none" && app.get_option("--cell-size")->count() > 0)
+      throw CLI::ValidationError("--cell-size", "there is no NavMesh; give --navmesh or --avatars too");
     if (const std::string why = refused(o); !why.empty()) throw CLI::ValidationError(why);
     gsnav_tools::check_eye_and_target(o.eye, o.target);
   };
   if (const auto status = gsnav_tools::parse_options(app, argc, argv, check)) return *status;
   if (!o.npy && !o.png) o.npy = o.png = true;
-  if (o.avatars > 0 && o.navmesh == "none") o.navmesh = "auto";
   o.depth_choice = *parse_depth(o.depth);
   return std::nullopt;
 }
