@@ -9,6 +9,7 @@
 #include "eval/oracle_support.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/frame/sh.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
 #include "hard_cases/cases.hpp"
 #include "support/brush.hpp"
 #include "support/oracle.hpp"
@@ -189,6 +190,22 @@ TEST_CASE("oracle: ties go by the file's order, however rows lie in memory") {
     CHECK(same_images(f, oracle({a_sorted.set(), b_sorted.set()}, axis_camera(), config)));
     CHECK(same_images(f, oracle({a.set(), b_sorted.set()}, axis_camera(), config)));
     CHECK(!same_images(f, oracle({b.set(), a.set()}, axis_camera(), config)));
+  }
+}
+
+TEST_CASE("oracle: codes and halves are read as renderers read them") {
+  GaussianCloud cloud = random_cloud(70, {.count = 700, .sh_degree = 3, .needle = 0.2});
+  sort_spatially(cloud);
+  GaussianCloud halves = cloud;
+  compact_sh(halves);
+  GaussianCloud of_halves = halves;
+  expand_sh(of_halves);
+  const PackLimits any{1e9, 1e9, 1e9}, float_means{0, 1e9, 1e9}, half_bands{1e9, 0, 1e9};
+  CHECK(same_images(oracle({halves.set()}, axis_camera()), oracle({of_halves.set()}, axis_camera())));
+  for (const PackLimits& limits : {any, float_means, half_bands}) {
+    const PackedCloud packed = pack_cloud(cloud, limits);
+    const GaussianCloud floats = unpack_cloud(packed);
+    CHECK(same_images(oracle({packed.set()}, axis_camera()), oracle({floats.set()}, axis_camera())));
   }
 }
 

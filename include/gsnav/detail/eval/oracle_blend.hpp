@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 #include <vector>
 
 #include "gsnav/core/backend.hpp"
@@ -20,7 +21,7 @@ namespace gsnav::eval::detail {
 /// State of a pixel during blending from front to back.
 struct OraclePixel {
   double transmittance = 1, weights = 0;
-  Vec3d color{};
+  Double3 color{};
   double median = 0, accumulated = 0, first_hit = 0;
   std::uint32_t blended = 0, last_rank = 0;
   bool closed = false, undecided = false, undecided_depth = false, order_flip = false;
@@ -30,41 +31,42 @@ struct OraclePixel {
   /// @param mesh Depth of the mesh at this pixel, infinity if there is none.
   /// @param depth Returns the depth of the Gaussian along the ray.
   template <class Depth>
-  void blend(const OracleRules& rules, double log2_alpha, const Vec3d& c, std::uint32_t rank,
+  void blend(const OracleRules& rules, double log2_alpha, const Double3& c, std::uint32_t rank,
              double mesh, const Depth& depth) noexcept {
     const double excess = log2_alpha - rules.log2_alpha_min;
-    if (is_finite(mesh)) {
+    if (std::isfinite(mesh)) {
       const double beyond = depth() - mesh;
-      if (abs(beyond) < kUndecidedMesh && excess * kLn2 > -kUndecidedRelative) undecided = true;
+      if (std::abs(beyond) < kUndecidedMesh && excess * std::numbers::ln2 > -kUndecidedRelative)
+        undecided = true;
       if (beyond > 0) return;
     }
-    if (abs(excess) * kLn2 < kUndecidedRelative) undecided = true;
+    if (std::abs(excess) * std::numbers::ln2 < kUndecidedRelative) undecided = true;
     if (!(excess >= 0)) return;
-    const double alpha = min(rules.max_alpha, std::exp2(log2_alpha));
+    const double alpha = std::min(rules.max_alpha, std::exp2(log2_alpha));
     if (!(alpha > 0)) return;
     if (blended++ > 0 && rank < last_rank) order_flip = true;
     last_rank = rank;
     const double z = depth(), before = transmittance, weight = alpha * before;
     transmittance = before * (1 - alpha);
-    color += c * weight;
+    color = color + weight * c;
     weights += weight;
     accumulated += weight * z;
     const double open = 1 - rules.first_hit_tau;
     if (before > 0.5 && transmittance <= 0.5) median = z;
     if (before > open && transmittance <= open) first_hit = z;
-    if (abs(transmittance - 0.5) < kUndecidedCrossing ||
-        abs(transmittance - open) < kUndecidedCrossing) {
+    if (std::abs(transmittance - 0.5) < kUndecidedCrossing ||
+        std::abs(transmittance - open) < kUndecidedCrossing) {
       undecided_depth = true;
     }
     const double stop = rules.transmittance_min;
-    if (abs(transmittance - stop) < kUndecidedRelative * stop) undecided = true;
+    if (std::abs(transmittance - stop) < kUndecidedRelative * stop) undecided = true;
     closed = transmittance < stop;
   }
 
   /// Blends an opaque mesh at depth z, which takes the remaining transmittance.
-  void close(const OracleRules& rules, double z, const Vec3d& c) noexcept {
+  void close(const OracleRules& rules, double z, const Double3& c) noexcept {
     const double weight = transmittance;
-    color += c * weight;
+    color = color + weight * c;
     weights += weight;
     accumulated += weight * z;
     if (weight > 0.5) median = z;
@@ -77,14 +79,14 @@ struct OraclePixel {
     const double before = transmittance, weight = f.alpha * before, open = 1 - rules.first_hit_tau;
     const double stop = rules.transmittance_min;
     transmittance = before * (1 - f.alpha);
-    color += f.rgb * weight;
+    color = color + weight * Double3{f.rgb.x, f.rgb.y, f.rgb.z};
     weights += weight;
     accumulated += weight * f.depth;
     if (before > 0.5 && transmittance <= 0.5) median = f.depth;
     if (before > open && transmittance <= open) first_hit = f.depth;
     for (const double at : {0.5, open})
-      undecided_depth = undecided_depth || abs(transmittance - at) < kUndecidedCrossing;
-    undecided = undecided || abs(transmittance - stop) < kUndecidedRelative * stop;
+      undecided_depth = undecided_depth || std::abs(transmittance - at) < kUndecidedCrossing;
+    undecided = undecided || std::abs(transmittance - stop) < kUndecidedRelative * stop;
     closed = closed || transmittance < stop;
     last_rank = 0;  // Another list begins.
   }
@@ -92,8 +94,10 @@ struct OraclePixel {
   void write(const OracleRules& rules, OracleFrames& out, std::size_t pixel) const noexcept {
     const bool opaque = closed && rules.normalize_closed && transmittance < 1;
     const double scale = opaque ? 1 / (1 - transmittance) : 1, through = opaque ? 0 : transmittance;
-    const Vec3d rgb = color * scale + rules.background * through;
-    for (int c = 0; c < 3; ++c) out.rgb[3 * pixel + static_cast<std::size_t>(c)] = rgb[c];
+    const Double3 rgb = scale * color + through * rules.background;
+    out.rgb[3 * pixel] = rgb.x;
+    out.rgb[3 * pixel + 1] = rgb.y;
+    out.rgb[3 * pixel + 2] = rgb.z;
     out.alpha[pixel] = 1 - through;
     out.median_depth[pixel] = median;
     out.expected_depth[pixel] = weights > 0 ? accumulated / weights : 0;
@@ -132,10 +136,11 @@ void blend_among(const OracleScene<Model>& scene, View<const std::uint32_t> list
     Met m{0, &r, r.model.log2_alpha(px, py), 0};
     if (!(m.log2_alpha >= scene.log2_cut)) continue;
     m.depth = r.model.depth(px, py);
-    const bool drawn = (m.log2_alpha - scene.rules.log2_alpha_min) * kLn2 > -kUndecidedRelative;
+    const bool drawn =
+        (m.log2_alpha - scene.rules.log2_alpha_min) * std::numbers::ln2 > -kUndecidedRelative;
     for (const OracleFragment& f : fragments) {
       m.behind += f.depth < m.depth ? 1 : 0;
-      if (drawn && abs(f.depth - m.depth) < kUndecidedMesh) pixel.undecided = true;
+      if (drawn && std::abs(f.depth - m.depth) < kUndecidedMesh) pixel.undecided = true;
     }
     met.push_back(m);
   }
@@ -261,7 +266,7 @@ OracleCounts blend_row(const OracleScene<Model>& scene, View<const std::uint32_t
   }
   for (std::size_t x = 0; x < pixels.size(); ++x) {
     const int column = scene.rect.x0 + static_cast<int>(x);
-    if (const double z = scene.mesh_depth(column, y); is_finite(z)) {
+    if (const double z = scene.mesh_depth(column, y); std::isfinite(z)) {
       const double* const c = scene.mesh->rgb.data() + 3 * scene.pixel(column, y);
       pixels[x].close(scene.rules, z, {c[0], c[1], c[2]});
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -42,7 +43,7 @@ struct PixelRect {
   std::size_t height() const noexcept { return empty() ? 0 : static_cast<std::size_t>(y1 - y0); }
   /// Pixels that both rectangles have.
   PixelRect intersection(const PixelRect& o) const noexcept {
-    return {max(x0, o.x0), max(y0, o.y0), min(x1, o.x1), min(y1, o.y1)};
+    return {std::max(x0, o.x0), std::max(y0, o.y0), std::min(x1, o.x1), std::min(y1, o.y1)};
   }
 };
 

@@ -9,33 +9,25 @@
 #include <cstdint>
 
 #include "gsnav/detail/eval/oracle_config.hpp"
-#include "gsnav/detail/frame/set_rows.hpp"
-#include "gsnav/detail/math/half.hpp"
+#include "gsnav/detail/eval/oracle_rows.hpp"
 #include "gsnav/frame/gaussians.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/math/similarity.hpp"
 #include "gsnav/render/config.hpp"
 
-// A row of a set in long double and metres. Only the decoding of stored rows (set_rows.hpp) is shared
-// with the kernels. Every formula here is written independently from the contract.
+// A row of a set in long double and metres. Nothing is shared with the kernels: every formula here is
+// written independently, from the contract.
 
 namespace gsnav::eval::detail {
 
-using Real = long double;
-
-struct Real3 {
-  Real x = 0, y = 0, z = 0;
-};
-
-inline Real3 operator*(Real s, const Real3& a) noexcept { return {s * a.x, s * a.y, s * a.z}; }
-inline Real3 operator+(const Real3& a, const Real3& b) noexcept {
-  return {a.x + b.x, a.y + b.y, a.z + b.z};
+template <class T>
+T inner(const Triple<T>& a, const Triple<T>& b) noexcept {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
 }
-inline Real inner(const Real3& a, const Real3& b) noexcept { return a.x * b.x + a.y * b.y + a.z * b.z; }
 inline Real3 outer(const Real3& a, const Real3& b) noexcept {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-inline Vec3d rounded(const Real3& a) noexcept {
+inline Double3 rounded(const Real3& a) noexcept {
   return {static_cast<double>(a.x), static_cast<double>(a.y), static_cast<double>(a.z)};
 }
 
@@ -89,20 +81,6 @@ inline Real in_blend_space(Real value, ColorSpace from, ColorSpace to) noexcept 
   return value <= 0.0031308L ? value * 12.92L : 1.055L * std::pow(value, 1 / 2.4L) - 0.055L;
 }
 
-/// SH coefficient k of a row.
-inline Real3 stored_coefficient(const ColorRows& gs, std::size_t row, int k) noexcept {
-  if (gs.packed()) {
-    const Vec3<float> c = packed_coefficient(gs, row, k);
-    return {c.x, c.y, c.z};
-  }
-  if (k == 0) return {gs.sh0[3 * row], gs.sh0[3 * row + 1], gs.sh0[3 * row + 2]};
-  const std::size_t rest = static_cast<std::size_t>((gs.degree + 1) * (gs.degree + 1) - 1);
-  const std::size_t at = 3 * (rest * row + static_cast<std::size_t>(k - 1));
-  if (gs.band_encoding() == BandEncoding::floats) return {gs.shN[at], gs.shN[at + 1], gs.shN[at + 2]};
-  return {half_to_float(gs.shN_half[at]), half_to_float(gs.shN_half[at + 1]),
-          half_to_float(gs.shN_half[at + 2])};
-}
-
 /// One set in the frame of a camera.
 struct OracleSet {
   GaussianSet set;
@@ -148,8 +126,7 @@ struct OracleSet {
   /// Mean in the asset's frame.
   Real3 place(std::size_t row) const noexcept {
     const GaussianRows& gs = set.gaussians;
-    const Vec3<float> offset = mean_of(gs.shape, row);
-    Real3 p{offset.x, offset.y, offset.z};
+    Real3 p = StoredShape{gs.shape, row}.mean();
     if (!gs.origins.empty()) {
       const Vec3d& from = gs.origins[gs.shape.origin_ids.empty() ? 0 : gs.shape.origin_ids[row]];
       p = p + Real3{from.x, from.y, from.z};
@@ -169,10 +146,11 @@ struct OracleSet {
       for (std::size_t k = 0; k < 3; ++k)
         m[k] = {gs.axes[k][row], gs.axes[3 + k][row], gs.axes[6 + k][row]};
     } else {
-      const Quat<float> q = quat_of(gs, row);
-      const Vec3<float> s = scales_of(gs, row);
-      m = rotation_columns(q.w, q.x, q.y, q.z);
-      for (std::size_t k = 0; k < 3; ++k) m[k] = Real(s[static_cast<int>(k)]) * m[k];
+      const StoredShape stored{gs, row};
+      const std::array<Real, 4> q = stored.quat();
+      const std::array<Real, 3> s = stored.scales();
+      m = rotation_columns(q[0], q[1], q[2], q[3]);
+      for (std::size_t k = 0; k < 3; ++k) m[k] = s[k] * m[k];
     }
     for (Real3& column : m) column = camera_from_asset * column;
     return m;
@@ -192,7 +170,7 @@ struct OracleSet {
   }
 
   /// Colour towards the camera, with SH up to `degree`, in `blend_space`.
-  Vec3d color(std::size_t row, int degree, ColorSpace blend_space) const noexcept {
+  Double3 color(std::size_t row, int degree, ColorSpace blend_space) const noexcept {
     const ColorRows& gs = set.gaussians.color;
     Real3 d = place(row) + Real(-1) * eye;
     const Real length = std::sqrt(inner(d, d));
@@ -248,11 +226,11 @@ struct EwaModel {
   double per_variance_x, slope,
       per_rest;  ///< 1 / var(x), cov / var(x), and 1 / (var(y) - cov^2 / var(x)), in pixels.
   double log2_opacity;
-  Vec3d mean_ray;              ///< Ray through the mean. The third component is 1.
-  std::array<Vec3d, 3> areas;  ///< Cross products m1 x m2, m2 x m0, m0 x m1 of the columns of M, divided
-                               ///< by the length of the longest of the three.
-  double fx, fy, z, reach;     ///< Focal lengths in pixels; depth of the mean and limit of the depth
-                               ///< offset in metres.
+  Double3 mean_ray;              ///< Ray through the mean. The third component is 1.
+  std::array<Double3, 3> areas;  ///< Cross products m1 x m2, m2 x m0, m0 x m1 of the columns of M,
+                                 ///< divided by the length of the longest of the three.
+  double fx, fy, z, reach;       ///< Focal lengths in pixels; depth of the mean and limit of the depth
+                                 ///< offset in metres.
 
   /// Projects a Gaussian. `box` contains every pixel with alpha >= 2^log2_cut.
   /// @return false if it is not drawn.
@@ -277,7 +255,7 @@ struct EwaModel {
     const auto dilated = [&](Real h) { return inner(crossed, crossed) + h * (a0 + c0) + h * h; };
     const Real h = s.set.eps2d, det = dilated(h);
 
-    Real opacity = opacity_of(s.set.gaussians.shape, row);
+    Real opacity = StoredShape{s.set.gaussians.shape, row}.opacity();
     if (s.set.filter == Filter::mip) opacity *= std::sqrt(dilated(s.set.base_eps2d) / det);
     out.mean_x = static_cast<double>(c.fx * u + c.cx);
     out.mean_y = static_cast<double>(c.fy * v + c.cy);
@@ -297,7 +275,7 @@ struct EwaModel {
     Real longest = 0;
     for (const Real3& n : areas) longest = std::max(longest, std::sqrt(inner(n, n)));
     for (std::size_t k = 0; k < 3; ++k)
-      out.areas[k] = longest > 0 ? rounded((1 / longest) * areas[k]) : Vec3d{};
+      out.areas[k] = longest > 0 ? rounded((1 / longest) * areas[k]) : Double3{};
     out.mean_ray = {static_cast<double>(u), static_cast<double>(v), 1};
     out.fx = c.fx;
     out.fy = c.fy;
@@ -329,7 +307,7 @@ struct EwaModel {
   double depth(double px, double py) const noexcept {
     const double du = (px - mean_x) / fx, dv = (py - mean_y) / fy;
     double along = 0, turned = 0;
-    for (const Vec3d& n : areas) {
+    for (const Double3& n : areas) {
       const double change = n.x * du + n.y * dv;
       const double response = n.x * mean_ray.x + n.y * mean_ray.y + n.z + change;
       along += response * response;

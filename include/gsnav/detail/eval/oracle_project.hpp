@@ -23,7 +23,7 @@ namespace gsnav::eval::detail {
 template <class Model>
 struct OracleRecord {
   Model model;
-  Vec3d color;
+  Double3 color;
   PixelRect box;       ///< Box within the crop. May be empty if boxes are not used.
   std::uint32_t id;    ///< Stable id.
   std::uint32_t rank;  ///< Position in the order that order_flip compares with.
@@ -33,7 +33,7 @@ struct OracleRecord {
 struct OracleRules {
   double log2_alpha_min, max_alpha, transmittance_min, first_hit_tau;
   bool normalize_closed;
-  Vec3d background;
+  Double3 background;
 };
 
 /// Records of one camera and crop, in blending order (for OracleOrder::per_ray, in the order of float32
@@ -117,7 +117,7 @@ OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> ga
                  stop,
                  c.first_hit_tau,
                  normalized,
-                 c.background};
+                 {c.background.x, c.background.y, c.background.z}};
   scene.rect = oracle_rect(config, camera);
   scene.boxed = config.boxed;
   scene.mesh = config.mesh;

@@ -2,12 +2,12 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 
 #include "gsnav/detail/eval/oracle_gaussian.hpp"
-#include "gsnav/math/mat.hpp"
 
 namespace gsnav::eval::detail {
 
@@ -21,10 +21,10 @@ namespace gsnav::eval::detail {
 /// inverted. A ray does not see a Gaussian whose largest response lies behind the camera. There is no
 /// Jacobian and hence no limit on it.
 struct RayModel {
-  std::array<Vec3d, 3> factor;  ///< Columns: axes times standard deviations, metres.
-  Vec3d dilation;               ///< Diagonal of S - Sigma.
-  Mat3d adjugate;               ///< adj(S).
-  double u, v, z;               ///< Ray through the mean, and its depth in metres.
+  std::array<Double3, 3> factor;    ///< Columns: axes times standard deviations, metres.
+  std::array<double, 2> dilation;   ///< Diagonal of S - Sigma in x and y; 0 in z.
+  std::array<Double3, 3> adjugate;  ///< Columns of adj(S), which is symmetric.
+  double u, v, z;                   ///< Ray through the mean, and its depth in metres.
   double fx, fy, cx, cy;
   double log2_opacity, reach;
 
@@ -44,27 +44,32 @@ struct RayModel {
     out.fy = c.fy;
     out.cx = c.cx;
     out.cy = c.cy;
-    const double spread = std::sqrt(static_cast<double>(s.set.eps2d));
-    const double wide = spread * out.z / c.fx, high = spread * out.z / c.fy;
-    out.dilation = {wide * wide, high * high, 0};
-    const Vec3d columns[5] = {out.factor[0], out.factor[1], out.factor[2], {wide, 0, 0}, {0, high, 0}};
-    const Vec3d mean_ray{out.u, out.v, 1};
-    double area0 = 0, area = 0;  // Area of the outline, without and with the dilation.
-    out.adjugate = {};
+    const Real spread = std::sqrt(Real(s.set.eps2d)) * mean.z, wide = spread / c.fx,
+               high = spread / c.fy;
+    out.dilation = {static_cast<double>(wide * wide), static_cast<double>(high * high)};
+    const Real3 columns[5] = {m[0], m[1], m[2], {wide, 0, 0}, {0, high, 0}};
+    const Real3 mean_ray{mean.x / mean.z, mean.y / mean.z, 1};
+    Real area0 = 0, area = 0;  // Area of the outline, without and with the dilation.
+    RealColumns adjugate{};
     for (int i = 0; i < 5; ++i) {
       for (int j = i + 1; j < 5; ++j) {
-        const Vec3d n = cross(columns[i], columns[j]);
-        for (int k = 0; k < 3; ++k) out.adjugate.row[k] = out.adjugate.row[k] + n * n[k];
-        const double across = dot(n, mean_ray);
+        const Real3 n = outer(columns[i], columns[j]);
+        adjugate = {adjugate[0] + n.x * n, adjugate[1] + n.y * n, adjugate[2] + n.z * n};
+        const Real across = inner(n, mean_ray);
         area += across * across;
         if (j < 3) area0 += across * across;
       }
     }
-    double opacity = static_cast<double>(opacity_of(s.set.gaussians.shape, row));
-    if (s.set.filter == Filter::mip) opacity *= std::sqrt(area0 / area);
+    for (std::size_t k = 0; k < 3; ++k) out.adjugate[k] = rounded(adjugate[k]);
+    double opacity = static_cast<double>(StoredShape{s.set.gaussians.shape, row}.opacity());
+    if (s.set.filter == Filter::mip) opacity *= static_cast<double>(std::sqrt(area0 / area));
     out.log2_opacity = std::log2(opacity);
-    if (!(opacity > 0 && out.log2_opacity >= log2_cut && out.z > 0 && std::isfinite(area))) return false;
-    out.reach = reached_sigmas(out.log2_opacity, s.log2_alpha_min) * norm(out.row(2));
+    if (!(opacity > 0 && out.log2_opacity >= log2_cut && out.z > 0 &&
+          std::isfinite(static_cast<double>(area)))) {
+      return false;
+    }
+    const Double3 along_z = out.row(&Double3::z);
+    out.reach = reached_sigmas(out.log2_opacity, s.log2_alpha_min) * std::sqrt(inner(along_z, along_z));
     const double k = reached_sigmas(out.log2_opacity, log2_cut);
     box = out.outline(c, k * k);
     return true;
@@ -74,9 +79,9 @@ struct RayModel {
     const double du = (px - cx) / fx - u, dv = (py - cy) / fy - v;
     const Along along_ray = along(du, dv);
     if (!(along_ray.response > along_ray.turn)) return -std::numeric_limits<double>::infinity();
-    const Vec3d n{-dv * z, du * z, (u * dv - v * du) * z};  // mu x r.
-    double q = dilation.x * n.x * n.x + dilation.y * n.y * n.y;
-    for (const Vec3d& column : factor) {
+    const Double3 n{-dv * z, du * z, (u * dv - v * du) * z};  // mu x r.
+    double q = dilation[0] * n.x * n.x + dilation[1] * n.y * n.y;
+    for (const Double3& column : factor) {
       const double across = column.x * n.x + column.y * n.y + column.z * n.z;
       q += across * across;
     }
@@ -92,7 +97,9 @@ struct RayModel {
   }
 
  private:
-  Vec3d row(int axis) const noexcept { return {factor[0][axis], factor[1][axis], factor[2][axis]}; }
+  Double3 row(double Double3::*axis) const noexcept {
+    return {factor[0].*axis, factor[1].*axis, factor[2].*axis};
+  }
 
   /// r' adj(S) r and r' adj(S) d for the ray r = (u + du, v + dv, 1) with d = (du, dv, 0). Uses plain
   /// products: where the compiler has no fma instruction, a call of fma costs ten times more.
@@ -101,29 +108,29 @@ struct RayModel {
   };
   Along along(double du, double dv) const noexcept {
     const double ru = u + du, rv = v + dv;
-    const Mat3d& a = adjugate;
-    const double x = a(0, 0) * ru + a(0, 1) * rv + a(0, 2), y = a(0, 1) * ru + a(1, 1) * rv + a(1, 2);
-    return {ru * x + rv * y + (a(0, 2) * ru + a(1, 2) * rv + a(2, 2)), du * x + dv * y};
+    const Double3 turned = ru * adjugate[0] + rv * adjugate[1] + adjugate[2];
+    return {ru * turned.x + rv * turned.y + turned.z, du * turned.x + dv * turned.y};
   }
 
   /// Pixels inside the outline of the ellipsoid q = k2. Its extent d in u around the mean solves (d z)^2
   /// = k2 (X - 2 d Y + d^2 Z), where X, Y, Z are the covariance of (x - u z, z). It is bounded if the
   /// ellipsoid lies completely in front of the camera.
   PixelRect outline(const Camera& c, double k2) const noexcept {
-    const Vec3d along_z = row(2);
-    const double depth2 = dot(along_z, along_z);
+    const Double3 along_z = row(&Double3::z);
+    const double depth2 = inner(along_z, along_z);
     const double front = z * z - k2 * depth2;
     // Closer to the camera than this, rounding decides the extent.
     if (!(front > 1e-6 * z * z)) return {0, 0, c.width, c.height};
-    const auto extent = [&](double slope, int axis, double& center, double& half) {
-      const Vec3d across = row(axis) - along_z * slope;
-      const double x = dot(across, across) + dilation[axis], y = dot(across, along_z);
+    const auto extent = [&](double slope, const Double3& across_axis, double dilated, double& center,
+                            double& half) {
+      const Double3 across = across_axis + -slope * along_z;
+      const double x = inner(across, across) + dilated, y = inner(across, along_z);
       center = -k2 * y / front;
       half = std::sqrt(k2 * (k2 * y * y + front * x)) / front * (1 + 1e-8);
     };
     double center_u, half_u, center_v, half_v;
-    extent(u, 0, center_u, half_u);
-    extent(v, 1, center_v, half_v);
+    extent(u, row(&Double3::x), dilation[0], center_u, half_u);
+    extent(v, row(&Double3::y), dilation[1], center_v, half_v);
     const double mean_x = cx + fx * u, mean_y = cy + fy * v;
     // Add 1e-8 of the offset as well, because `front` is a difference.
     return pixels_within(
