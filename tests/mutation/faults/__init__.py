@@ -10,7 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 
-# Renderers of hard cases that share the formulas.
+# Renderers of hard cases that share the formulas, and the backends that they use.
+BACKENDS = ("serial", "openmp", "cuda float")
+BY_TILES = ("serial", "openmp", "cuda float", "cuda tiles")  # regions list rows before their ellipse is known
 EVERY = ("serial", "openmp", "cuda float", "cuda tiles", "cuda regions")
 
 
@@ -30,14 +32,15 @@ class Fault:
     why: str = ""
     more: tuple[str, ...] = ()  # compiled with it: what the test needs of the libraries
     on: tuple[str, ...] = ()    # backends of hard cases, each of which must notice it by itself
+    device: bool = False        # a test of no hard case that runs on the emulated CUDA runtime
 
     @property
     def on_device(self) -> bool:
         """Whether the test needs the emulated CUDA runtime."""
-        return self.source.endswith(".cu") or any(name.startswith("cuda") for name in self.on)
+        return self.device or self.source.endswith(".cu") or any(name.startswith("cuda") for name in self.on)
 
 
 def fault(name: str, function: str, old: str, new: str, source: str, *cases: str, why: str = "",
-          more: tuple[str, ...] = (), on: tuple[str, ...] = ()) -> Fault:
+          more: tuple[str, ...] = (), on: tuple[str, ...] = (), device: bool = False) -> Fault:
     """The usual kind: one edit."""
-    return Fault(name, (Edit(function, old, new),), source, cases, why, more, on)
+    return Fault(name, (Edit(function, old, new),), source, cases, why, more, on, device)
