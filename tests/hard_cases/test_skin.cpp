@@ -78,6 +78,26 @@ Mat3d covariance(const Quatd& q, const Vec3d& s) {
   return m * transpose(m);
 }
 
+/// Means of an actor's Gaussians at time 0, as a backend skins them, and where they stand.
+struct SkinnedMeans {
+  std::vector<Vec3d> means;
+  Similarity world_from_asset;
+};
+template <class B>
+SkinnedMeans skinned_means(B& backend, const AvatarActor& actor) {
+  Arrays<B> arrays(backend);
+  SkinnedGaussians<B> skinned(backend, actor.asset());
+  skinned.pose(actor, 0).throw_if_error();
+  const GaussianSet set = skinned.set();
+  SkinnedMeans out{std::vector<Vec3d>(actor.asset()->size()), set.world_from_asset};
+  for (int k = 0; k < 3; ++k) {
+    const View<const float> v = set.gaussians.shape.means[static_cast<std::size_t>(k)];
+    const std::vector<float> plane = arrays.fetch(View<float>{const_cast<float*>(v.data), v.size});
+    for (std::size_t i = 0; i < plane.size(); ++i) out.means[i][k] = plane[i];
+  }
+  return out;
+}
+
 }  // namespace
 
 TEST_CASE("N54_lbs_identity") {
@@ -150,26 +170,56 @@ TEST_CASE("N55_lbs_rigid_far") {
     const Similarity all = Similarity{axis_angle(Vec3d{0, 1, 0}, 0.7), place, 1} *
                            Similarity{{}, {0, 0, by_root ? -1000.0 : 0.0}, 1};
     for_each_backend([&](auto& renderer) {
-      using B = std::remove_cvref_t<decltype(renderer.backend())>;
-      Arrays<B> arrays(renderer.backend());
-      SkinnedGaussians<B> skinned(renderer.backend(), shared);
-      skinned.pose(actor, 0).throw_if_error();
-      const GaussianSet set = skinned.set();
-      std::vector<float> mean[3];
-      for (std::size_t k = 0; k < 3; ++k) {
-        const View<const float> v = set.gaussians.shape.means[k];
-        mean[k] = arrays.fetch(View<float>{const_cast<float*>(v.data), v.size});
-      }
+      const auto [means, world_from_asset] = skinned_means(renderer.backend(), actor);
       double worst = 0;
       for (std::size_t i = 0; i < shared->size(); ++i) {
-        const Vec3d p{mean[0][i], mean[1][i], mean[2][i]};
-        worst = std::max(worst, norm(set.world_from_asset * p - all * shared->cloud.mean(i)));
+        worst = std::max(worst, norm(world_from_asset * means[i] - all * shared->cloud.mean(i)));
       }
       CHECK(worst <= 1e-5);
       largest = std::max(largest, worst);
     });
   }
   MESSAGE("1000 m from zero: off by " << largest << " m");
+}
+
+TEST_CASE("joints that turn carry what hangs on them, from the last to the first") {
+  AvatarAsset asset;
+  asset.skeleton.names = {"a", "b", "c"};
+  asset.skeleton.parents = {-1, 0, 1};
+  asset.skeleton.rest_local.resize(3);
+  Rng rng(59);
+  const auto point = [&] { return Vec3d{rng.uniform(-1, 1), rng.uniform(0, 2), rng.uniform(-1, 1)}; };
+  GaussianCloudBuilder builder(0);
+  std::vector<std::uint16_t> indices;
+  std::vector<float> weights;
+  constexpr std::size_t kCount = 300;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    builder.add(gaussian(point(), {0.1, 0.1, 0.1}, 0.9));
+    for (std::uint16_t k = 0; k < 3; ++k) {
+      indices.push_back(k);
+      weights.push_back(k == i % 3 ? 1.0f : 0.0f);
+    }
+  }
+  asset.cloud = builder.cloud();
+  CHECK(asset.set_weights(3, indices, weights).ok());
+  LocalPose pose;
+  for (int j = 0; j < 3; ++j) {
+    pose.rotations.push_back(random_rotation(rng));
+    pose.translations.push_back(point());
+  }
+  const auto shared = std::make_shared<const AvatarAsset>(asset);
+  const AvatarActor actor = AvatarActor::create(shared, std::make_shared<const FixedPose>(pose)).value();
+  for_each_backend([&](auto& renderer) {
+    const auto means = skinned_means(renderer.backend(), actor).means;
+    double worst = 0;
+    for (std::size_t i = 0; i < kCount; ++i) {
+      Vec3d want = shared->cloud.mean(i);
+      for (std::size_t j = i % 3 + 1; j-- > 0;)
+        want = rotate(pose.rotations[j], want) + pose.translations[j];
+      worst = std::max(worst, norm(means[i] - want));
+    }
+    CHECK(worst < 2e-6);
+  });
 }
 
 TEST_CASE("a crowd is skinned as each of its actors alone, bit for bit") {

@@ -318,6 +318,7 @@ TEST_CASE("cuda batch: an empty view, no sets, and what cannot be drawn") {
     CHECK(f.frames.rgb[1] == 0.5f);
     CHECK(f.frames.alpha.back() == 0.0f);
     CHECK(f.frames.median_depth.back() == 0.0f);
+    CHECK(f.rgb8[0] == 64);
     CHECK(f.rgb8[2] == 191);
   }
   const std::vector<GaussianSet> sets{arrays.set()};

@@ -6,6 +6,8 @@ STACK_TEST = "tests/hard_cases/test_stack.cpp"
 DEPTH_TEST = "tests/hard_cases/test_depth.cpp"
 CUT_TEST = "tests/hard_cases/test_determinism.cpp"
 ORDER_TEST = "tests/hard_cases/test_order.cpp"
+PANE_TEST = "tests/hard_cases/test_fragments.cpp"
+MESH_TEST = "tests/hard_cases/test_composite.cpp"
 
 OPEN = "transmittance >= L(rules.transmittance_min)"
 WEIGHT = "L weight = select(drawn, alpha * before, zero);"
@@ -72,11 +74,17 @@ FAULTS = [
     fault("median_alone_at_another_t", "crosses",
           "falls_through(step.before, step.after, kMedianLevel<scalar_of<L>>);",
           "falls_through(step.before, step.after, scalar_of<L>(0.49));",
-          DEPTH_TEST, "N70_depth_only_equals_rgbd"),
+          DEPTH_TEST, "N45_depth_definitions", on=("serial", "cuda float")),
     fault("median_by_number_at_another_t", "last_above_half",
           "select(before > L(kMedianLevel<scalar_of<L>>), met, last)",
-          "select(before > L(scalar_of<L>(0.49)), met, last)",
-          DEPTH_TEST, "N70_depth_only_equals_rgbd"),
+          "select(before > L(scalar_of<L>(0.51)), met, last)",
+          DEPTH_TEST, "N45_depth_definitions", on=("openmp", "cuda tiles", "cuda regions"),
+          why="who looks for a number does not use the rule above"),
+    fault("first_of_a_list_left_out", "PixelWalk", "begin = args.tile_offsets[tile];",
+          "begin = args.tile_offsets[tile] + 1;",
+          PANE_TEST, "N71_panes_between_layers*", on=EVERY, why="the nearest splat of each tile"),
+    fault("behind_by_the_centre", "behind", "return d.z - d.reach > depth;", "return d.z > depth;",
+          MESH_TEST, "N50_mesh_straddle_cloud", on=EVERY, why="a splat that reaches through a mesh is before it"),
     fault("lists_filled_up_with_a_splat", "blend_list", "list[i] = kNothing;", "list[i] = list[0];",
           CUT_TEST, "N63_determinism_100 of work that is cut"),
     fault("first_hit_of_the_last", "first_hit", FIRST, "select(step.after <= L(S(1) - first_hit_tau), z, first_hit)",
@@ -88,6 +96,8 @@ FAULTS = [
           "state.accumulated / select(returned, alpha, one) + state.z_ref",
           "fma(alpha, state.z_ref, state.accumulated)",
           DEPTH_TEST, "N45_depth_definitions", "N48_depth_no_return", why="drawn towards the camera by what is clear"),
+    fault("accumulated_from_the_camera", "accumulated", "accumulated = fma(step.weight, z - z_ref, accumulated);",
+          "accumulated = fma(step.weight, z, accumulated);", DEPTH_TEST, "N45_depth_definitions", on=EVERY),
     fault("accumulated_without_reference", "pixel_accumulated_depth",
           "fma(pixel_alpha(state), state.z_ref, state.accumulated);",
           "state.accumulated;", DEPTH_TEST, "N45_depth_definitions"),

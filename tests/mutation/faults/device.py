@@ -21,6 +21,8 @@ FAULTS = [
           why="the sum rounds"),
     fault("byte_truncated", "to_byte", BYTE, "return static_cast<std::uint8_t>(static_cast<int>(whole));", FUNCTIONS,
           "a byte is the nearest*"),
+    fault("byte_truncated_on_a_gpu", "to_byte", BYTE, "return static_cast<std::uint8_t>(static_cast<int>(whole));",
+          "tests/ops/test_cuda_batch.cpp", "cuda batch: an empty view*", device=True),
     fault("errors_lose_their_code", "guarded", "return Status(e.code(), e.what());",
           "return Status(Errc::out_of_memory, e.what());", POOL, PIECES),
     fault("no_memory_is_a_broken_device", "guarded", 'Status(Errc::out_of_memory, "not enough memory")',

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Footprints, keys and order."""
-from . import EVERY, fault
+from . import BY_TILES, EVERY, fault
 
 FOOTPRINT = "tests/hard_cases/test_footprint.cpp"
 ORDER = "tests/hard_cases/test_order.cpp"
 KEYS = "tests/hard_cases/test_keys.cpp"
 CULLING = "tests/hard_cases/test_culling.cpp"
+N11_ALPHA = "N11_tile_cover_conservative in images: few needles*"
 
 FAULTS = [
     fault("three_sigma_box", "project",
@@ -28,7 +29,7 @@ FAULTS = [
     fault("strip_turned_wrong", "columns",
           "    const L y_right = select(negative_k_, at_k, against_k);\n",
           "    const L y_right = select(negative_k_, against_k, at_k);\n",
-          FOOTPRINT, "N11_tile_cover_conservative", on=EVERY),
+          FOOTPRINT, N11_ALPHA, on=BY_TILES),
     fault("cull_by_means", "reach",
           "    const double reach = f * bounds.scale_max * sqrt(1 + limit * limit);\n",
           "    const double reach = 0 * f * bounds.scale_max * sqrt(1 + limit * limit);\n",
@@ -71,6 +72,9 @@ FAULTS = [
           "F(static_cast<float>(camera.scale));\n"
           "  return {delta64, delta, z};\n",
           ORDER, "N77_quantised_capture*", "N79_near_ties*", why="the chain in float32 swaps near ties"),
+    fault("key_of_a_rounded_offset", "row_key", "static_cast<F>(depth_key(camera, delta64))",
+          "static_cast<F>(depth_key(camera, vec_cast<D>(mean + row.rounded_offset(offset))))",
+          ORDER, "N79_near_ties*", on=EVERY, why="the offset in float32 swaps near ties as the key in float32 does"),
     fault("reference_key_in_float", "project_row",
           "    key.z = static_cast<float>(position.z * args.camera.scale);\n",
           "    key.z = dot(vec_cast<float>(args.camera.rotation.row[2]), key.delta);\n",
@@ -99,6 +103,9 @@ FAULTS = [
     fault("last_tile_of_a_row_lost", "of",
           "tile_of(box.x1 - one)", "tile_of(box.x1 - one - one)",
           FOOTPRINT, "N11_tile_cover_conservative"),
+    fault("last_tile_of_a_list_lost", "for_each_tile_row", "last = (static_cast<int>(columns.end) - 1) >> shift;",
+          "last = (static_cast<int>(columns.end) - 2) >> shift;",
+          FOOTPRINT, N11_ALPHA, on=BY_TILES),
     fault("distance_of_the_asset", "distance_key", "norm(delta) * D(camera.scale)", "norm(delta)",
           ORDER, "N22_depth_tie_grid", why="an asset that is placed larger is farther away, too"),
     fault("last_pixel_of_a_box_lost", "pixel_range", "select(l > last, l - one, l) + one",

@@ -30,6 +30,8 @@ FAULTS = [
     fault("exponent_from_the_corner", "column_exponent", "const L w2 = whitened_2(terms.w2, py - ref_y, b);",
           "const L w2 = fma(py, b, fma(-ref_y, b, terms.w2));",
           EXPONENT, "N07_alpha_long_needle", why="offsets from the image's corner cancel", on=EVERY),
+    fault("offset_of_the_pixel_unturned", "whitened_2", "return fma(dx, L(g.k), L(g.w2));", "return L(g.w2);",
+          RESPONSE, "N01_ewa_offaxis_grid", on=EVERY, why="w2 of a pixel has a part along x, too"),
     fault("response_ignored", "splat_exponent", "if (along_rays) return perspective_exponent",
           "if (false) return perspective_exponent",
           RESPONSE, "N02_exact_ray_grid", why="the ellipse of the linearised response", on=EVERY),
@@ -37,10 +39,13 @@ FAULTS = [
           "  return (fma(abs(p.k), length_x, p.b * length_y) > L(S(kFloatLength))) ||\n"
           "         (fma(abs(p.k), abs(ref.dx), p.b * abs(ref.dy)) > L(S(kFloatOffset)));",
           "  return length_x + length_y + ref.dx + ref.dy < L(S(-1e30));",
-          EXPONENT, "N07_alpha_long_needle", "N09_huge_needle_tilelocal"),
+          EXPONENT, "N07_alpha_long_needle", "N09_huge_needle_tilelocal", on=EVERY),
     fault("offset_of_the_reference_unturned", "splat_geometry", "fma(p.k, ref.dx, p.b * ref.dy), p.log2_opacity};",
           "p.b * ref.dy, p.log2_opacity};",
           RESPONSE, "N01_ewa_offaxis_grid", "N02_exact_ray_grid", why="w2 has a part along x", on=EVERY),
+    fault("footprint_of_the_axis", "project", "const Vec3<L> l1 = fma(-uj, m.row[2], m.row[0]) * fz_x;",
+          "const Vec3<L> l1 = m.row[0] * fz_x;",
+          RESPONSE, "N01_ewa_offaxis_grid", on=EVERY, why="beside the view axis depth widens a footprint"),
     fault("mean_in_float", "make_splat",
           "  return make_splat<GeometryOnly>(camera, depth, projected, mean_x, mean_y, out);",
           "  return make_splat<GeometryOnly>(camera, depth, projected, projected.splat.mean_x, projected.splat.mean_y,"
