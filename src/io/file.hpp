@@ -6,14 +6,13 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
-#include <new>
 #include <span>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "gsnav/core/status.hpp"
+#include "gsnav/detail/core/guarded.hpp"
 
 namespace gsnav::io::detail {
 
@@ -91,18 +90,18 @@ inline Status invalid_file(const std::filesystem::path& path, const std::string&
 /// of the first. `spec` is that of load_scene.
 std::string path_beside(const std::string& spec);
 
-/// Runs `f` and turns a failed allocation into a Status; `what` names the file.
+/// gsnav::detail::guarded for work on a file with the given name. Errors of the file system become
+/// file_not_found.
 template <class F>
-auto guarded(const std::string& what, F&& f) -> decltype(f()) {
-  try {
-    return f();
-  } catch (const std::bad_alloc&) {
-    return Status(Errc::out_of_memory, what + ": not enough memory");
-  } catch (const std::length_error&) {
-    return Status(Errc::out_of_memory, what + ": not enough memory");
-  } catch (const std::filesystem::filesystem_error& e) {
-    return Status(Errc::file_not_found, what + ": " + e.what());
-  }
+auto guarded(const std::string& name, const F& f) noexcept -> decltype(f()) {
+  const auto on_files = [&]() -> decltype(f()) {
+    try {
+      return f();
+    } catch (const std::filesystem::filesystem_error& e) {
+      return Status(Errc::file_not_found, name + ": " + e.what());
+    }
+  };
+  return gsnav::detail::guarded(on_files, name);
 }
 
 /// Returns freed memory to the system. glibc keeps it otherwise, and never reuses it for large arrays.

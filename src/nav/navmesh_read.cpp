@@ -3,9 +3,9 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <new>
 #include <utility>
 
+#include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/detail/nav/navmesh_file.hpp"
 #include "navmesh_read_tile.hpp"
 
@@ -149,11 +149,7 @@ Result<NavMesh> parse(std::span<const std::byte> file, const Where& where) {
 }  // namespace detail
 
 Result<NavMesh> parse_navmesh(std::span<const std::byte> bytes, const std::string& name) {
-  try {
-    return detail::parse(bytes, {name});
-  } catch (const std::bad_alloc&) {
-    return Status(Errc::out_of_memory, name + ": not enough memory");
-  }
+  return detail::guarded([&] { return detail::parse(bytes, {name}); }, name);
 }
 
 Result<NavMesh> load_navmesh(const std::filesystem::path& path) {
@@ -165,14 +161,13 @@ Result<NavMesh> load_navmesh(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
   const auto size = std::filesystem::file_size(path, error);
   if (!in || error) return Status(Errc::file_not_found, path.string() + ": cannot be opened");
-  try {
+  const auto read = [&]() -> Result<NavMesh> {
     std::vector<std::byte> bytes(size);
     in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
     if (!in) return Status(Errc::invalid_file, path.string() + ": cannot be read");
     return parse_navmesh(bytes, path.string());
-  } catch (const std::bad_alloc&) {
-    return Status(Errc::out_of_memory, path.string() + ": not enough memory");
-  }
+  };
+  return detail::guarded(read, path.string());
 }
 
 }  // namespace gsnav
