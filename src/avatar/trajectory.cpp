@@ -71,9 +71,9 @@ void WalkTrajectory::build(const std::vector<Vec3d>& raw) {
     build_closed(path);
   } else {
     std::vector<Vec3d> back(path.rbegin(), path.rend());
-    cut(path);
+    split(path);
     one_way_ = legs_.size();
-    cut(back);
+    split(back);
   }
   finish();
 }
@@ -88,7 +88,7 @@ void WalkTrajectory::build_closed(std::vector<Vec3d> path) {
     if (corner(path[(i + n - 1) % n], path[i], path[(i + 1) % n]) > options_.stop_angle) {
       std::vector<Vec3d> open;
       for (std::size_t k = 0; k <= n; ++k) open.push_back(path[(i + k) % n]);
-      cut(open);
+      split(open);
       return;
     }
   }
@@ -101,7 +101,7 @@ void WalkTrajectory::build_closed(std::vector<Vec3d> path) {
   add_leg(round);
 }
 
-void WalkTrajectory::cut(const std::vector<Vec3d>& path) {
+void WalkTrajectory::split(const std::vector<Vec3d>& path) {
   std::vector<Vec3d> leg{path[0]};
   for (std::size_t i = 1; i < path.size(); ++i) {
     leg.push_back(path[i]);

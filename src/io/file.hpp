@@ -55,12 +55,13 @@ class ByteSource {
   ByteSource(const RandomFile& file) : file_(&file), size_(file.size()) {}
 
   std::uint64_t size() const noexcept { return size_; }
-  /// The n bytes from `offset` on, which must be in range: a pointer to memory, or to `room` after
+  /// The n bytes from `offset` on, which must be in range: a pointer to memory, or to `scratch` after
   /// reading into it. Null if reading failed.
-  const std::byte* get(std::uint64_t offset, std::size_t n, std::vector<std::byte>& room) const {
+  const std::byte* get(std::uint64_t offset, std::size_t n, std::vector<std::byte>& scratch) const {
     if (file_ == nullptr) return bytes_ + offset_ + offset;
-    if (room.size() <= n) room.resize(n + 1);  // never empty, so that data() is not null even for n = 0
-    return file_->read(offset_ + offset, {room.data(), n}) ? room.data() : nullptr;
+    if (scratch.size() <= n)
+      scratch.resize(n + 1);  // never empty, so that data() is not null even for n = 0
+    return file_->read(offset_ + offset, {scratch.data(), n}) ? scratch.data() : nullptr;
   }
   /// A part of it, which must be in range.
   ByteSource part(std::uint64_t offset, std::uint64_t size) const noexcept {

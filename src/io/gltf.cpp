@@ -133,8 +133,8 @@ class SplatReader {
     }
     const auto view = detail::get_index(spz, "bufferView", detail::kNoIndex, where);
     if (!view) return view.status();
-    std::vector<std::byte> room;
-    const auto bytes = file_.view(*view, room);
+    std::vector<std::byte> scratch;
+    const auto bytes = file_.view(*view, scratch);
     if (!bytes) return bytes.status();
     return parse_spz(*bytes, where, {.keep_axes = true});
   }
@@ -189,13 +189,13 @@ class SplatReader {
     for (const GltfValues& band : bands) planes.push_back(&band);
     std::atomic<std::size_t> negative{0};
     const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
-      std::vector<std::byte> room;
+      std::vector<std::byte> scratch;
       std::vector<std::vector<double>> block(planes.size());
       for (std::size_t row = first; row < last; row += detail::kRowsAtOnce) {
         const std::size_t n = std::min(detail::kRowsAtOnce, last - row);
         for (std::size_t p = 0; p < planes.size(); ++p) {
           block[p].resize(detail::kRowsAtOnce * planes[p]->components());
-          if (!planes[p]->unpack(row, n, room, block[p].data())) return detail::reading_failed(where);
+          if (!planes[p]->unpack(row, n, scratch, block[p].data())) return detail::reading_failed(where);
         }
         for (std::size_t i = 0; i < n; ++i) add(block, i, sink);
         const double* const s = block[2].data();

@@ -102,9 +102,9 @@ Result<GltfFile> GltfFile::parse(const ByteSource& bytes, const std::string& sou
 }
 
 Status GltfFile::read_chunks(const ByteSource& bytes, ByteSource& binary) {
-  std::vector<std::byte> room;
+  std::vector<std::byte> scratch;
   ByteSource text = bytes;
-  const std::byte* header = bytes.size() >= kGlbHeader ? bytes.get(0, kGlbHeader, room) : nullptr;
+  const std::byte* header = bytes.size() >= kGlbHeader ? bytes.get(0, kGlbHeader, scratch) : nullptr;
   if (header == nullptr && bytes.size() >= kGlbHeader) return reading_failed(source_);
   if (header != nullptr && load_le<std::uint32_t>(header) == kGlbMagic) {
     const std::uint32_t version = load_le<std::uint32_t>(header + 4);
@@ -119,7 +119,7 @@ Status GltfFile::read_chunks(const ByteSource& bytes, ByteSource& binary) {
     text = {};
     ByteSource left = bytes.part(kGlbHeader, length - kGlbHeader);
     for (std::size_t chunk = 0; left.size() >= kChunkHeader; ++chunk) {
-      const std::byte* p = left.get(0, kChunkHeader, room);
+      const std::byte* p = left.get(0, kChunkHeader, scratch);
       if (p == nullptr) return reading_failed(source_);
       const std::uint32_t size = load_le<std::uint32_t>(p), type = load_le<std::uint32_t>(p + 4);
       const std::uint64_t there = left.size() - kChunkHeader;
@@ -134,7 +134,7 @@ Status GltfFile::read_chunks(const ByteSource& bytes, ByteSource& binary) {
     if (text.size() == 0) return fail("the first chunk is no JSON");
   }
   const auto size = static_cast<std::size_t>(text.size());
-  const std::byte* characters = text.get(0, size, room);
+  const std::byte* characters = text.get(0, size, scratch);
   if (characters == nullptr && size != 0) return reading_failed(source_);
   auto json = parse_json({characters, size}, source_, limits_);
   if (!json) return json.status();
@@ -275,11 +275,11 @@ Result<ByteSource> GltfFile::find_view(std::size_t view_index) const {
 }
 
 Result<std::span<const std::byte>> GltfFile::view(std::size_t view_index,
-                                                  std::vector<std::byte>& room) const {
+                                                  std::vector<std::byte>& scratch) const {
   const auto found = find_view(view_index);
   if (!found) return found.status();
   const auto size = static_cast<std::size_t>(found->size());
-  const std::byte* p = found->get(0, size, room);
+  const std::byte* p = found->get(0, size, scratch);
   if (p == nullptr && size != 0) return reading_failed(where("bufferViews", view_index));
   return std::span<const std::byte>(p, size);
 }

@@ -21,9 +21,9 @@ class GltfValues {
  public:
   std::size_t size() const noexcept { return count_; }
   std::size_t components() const noexcept { return components_; }
-  /// Reads elements [first, first + n) as [n][components]; `room` is scratch. Returns false if reading
-  /// failed.
-  bool unpack(std::size_t first, std::size_t n, std::vector<std::byte>& room, double* out) const;
+  /// Reads elements [first, first + n) as [n][components]; `scratch` is memory to work in. Returns false
+  /// if reading failed.
+  bool unpack(std::size_t first, std::size_t n, std::vector<std::byte>& scratch, double* out) const;
 
  private:
   friend class GltfFile;
@@ -73,8 +73,8 @@ class GltfFile {
   Result<std::size_t> index(const Json& object, const char* key, const char* list,
                             const std::string& where) const;
 
-  /// Bytes of a buffer view, in place or read into `room`.
-  Result<std::span<const std::byte>> view(std::size_t index, std::vector<std::byte>& room) const;
+  /// Bytes of a buffer view, in place or read into `scratch`.
+  Result<std::span<const std::byte>> view(std::size_t index, std::vector<std::byte>& scratch) const;
   /// Bytes of a "uri": a data URI, or a file in this file's folder. Errors: invalid_file,
   /// file_not_found.
   Result<std::vector<std::byte>> uri_bytes(const std::string& uri, const std::string& where) const;

@@ -56,9 +56,9 @@ std::size_t GltfValues::extent(std::size_t n) const noexcept {
   return n == 0 ? 0 : (n - 1) * stride_ + components_ * component_size(static_cast<std::size_t>(type_));
 }
 
-bool GltfValues::unpack(std::size_t first, std::size_t n, std::vector<std::byte>& room,
+bool GltfValues::unpack(std::size_t first, std::size_t n, std::vector<std::byte>& scratch,
                         double* out) const {
-  const std::byte* p = bytes_.get(std::uint64_t{first} * stride_, extent(n), room);
+  const std::byte* p = bytes_.get(std::uint64_t{first} * stride_, extent(n), scratch);
   if (p == nullptr) return n == 0;
   const auto scale = [this](double greatest) { return normalized_ ? greatest : 1.0; };
   switch (type_) {
@@ -169,17 +169,17 @@ Status GltfFile::apply_sparse(const Json& sparse, const std::string& where, Gltf
   if (Status s = locate(*replaced, where, to); !s) return s;
   const std::size_t element = values.extent(1), replaced_bytes = to.extent(to.count_);
   auto own = std::make_shared<std::vector<std::byte>>(element * values.count_);
-  std::vector<std::byte> room;
+  std::vector<std::byte> scratch;
   if (values.bytes_.size() != 0) {
-    const std::byte* from = values.bytes_.get(0, values.extent(values.count_), room);
+    const std::byte* from = values.bytes_.get(0, values.extent(values.count_), scratch);
     if (from == nullptr) return reading_failed(where);
     for (std::size_t i = 0; i < values.count_; ++i) {
       std::copy_n(from + i * values.stride_, element, own->data() + i * element);
     }
   }
   std::vector<double> places(at.count_);
-  if (!at.unpack(0, at.count_, room, places.data())) return reading_failed(where);
-  const std::byte* from = to.bytes_.get(0, replaced_bytes, room);
+  if (!at.unpack(0, at.count_, scratch, places.data())) return reading_failed(where);
+  const std::byte* from = to.bytes_.get(0, replaced_bytes, scratch);
   if (from == nullptr && replaced_bytes != 0) return reading_failed(where);
   for (std::size_t i = 0; i < at.count_; ++i) {
     const auto row = static_cast<std::size_t>(places[i]);
@@ -204,8 +204,8 @@ Result<GltfNumbers> GltfFile::numbers(std::size_t accessor, const std::string& t
     return Status(Errc::invalid_file, where("accessors", accessor) + " has no elements");
   out.width = held->components();
   out.values.resize(out.count * out.width);
-  std::vector<std::byte> room;
-  if (!held->unpack(0, out.count, room, out.values.data()))
+  std::vector<std::byte> scratch;
+  if (!held->unpack(0, out.count, scratch, out.values.data()))
     return reading_failed(where("accessors", accessor));
   for (std::size_t i = 0; i < out.values.size(); ++i) {
     if (!std::isfinite(out.values[i])) {
@@ -226,11 +226,12 @@ Result<std::vector<std::uint32_t>> GltfFile::indices(std::size_t accessor) const
   }
   std::vector<std::uint32_t> out;
   out.reserve(held->size());
-  std::vector<std::byte> room;
+  std::vector<std::byte> scratch;
   std::array<double, 1024> block;
   for (std::size_t first = 0; first < held->size(); first += block.size()) {
     const std::size_t n = std::min(block.size(), held->size() - first);
-    if (!held->unpack(first, n, room, block.data())) return reading_failed(where("accessors", accessor));
+    if (!held->unpack(first, n, scratch, block.data()))
+      return reading_failed(where("accessors", accessor));
     for (std::size_t i = 0; i < n; ++i) out.push_back(static_cast<std::uint32_t>(block[i]));
   }
   return out;

@@ -91,8 +91,8 @@ class KsplatReader {
     if (bytes_.size() < kHeader) {
       return fail(std::to_string(bytes_.size()) + " bytes, the header alone has 4096");
     }
-    std::vector<std::byte> room;
-    const std::byte* h = bytes_.get(0, kHeader, room);
+    std::vector<std::byte> scratch;
+    const std::byte* h = bytes_.get(0, kHeader, scratch);
     if (h == nullptr) return detail::reading_failed(source_);
     const int major = std::to_integer<int>(h[0]), minor = std::to_integer<int>(h[1]);
     if (major != 0 || minor < 1) {
@@ -121,8 +121,8 @@ class KsplatReader {
 
   /// Reads section k, whose data begin at `data`. Moves `data` to their end.
   Status read_section(std::size_t k, std::uint64_t& data) {
-    std::vector<std::byte> room;
-    const std::byte* h = bytes_.get(kHeader + k * kSectionHeader, kSectionHeader, room);
+    std::vector<std::byte> scratch;
+    const std::byte* h = bytes_.get(kHeader + k * kSectionHeader, kSectionHeader, scratch);
     if (h == nullptr) return detail::reading_failed(source_);
     const std::string where = "section " + std::to_string(k) + ": ";
     const auto field = [h](std::size_t offset) {
@@ -192,10 +192,10 @@ class KsplatReader {
 
   /// Adds the Gaussians [from, to) of a section.
   Status add_rows(const Section& s, std::size_t from, std::size_t to, detail::CloudSink& sink) const {
-    std::vector<std::byte> room;
+    std::vector<std::byte> scratch;
     for (std::size_t row = from; row < to; row += detail::kRowsAtOnce) {
       const std::size_t n = std::min(detail::kRowsAtOnce, to - row);
-      const std::byte* records = s.records.get(std::uint64_t{row} * s.record, n * s.record, room);
+      const std::byte* records = s.records.get(std::uint64_t{row} * s.record, n * s.record, scratch);
       if (records == nullptr) return detail::reading_failed(source_);
       for (std::size_t i = 0; i < n; ++i) add(s, row + i, records + i * s.record, sink);
     }

@@ -78,12 +78,12 @@ class CompressedPlyReader {
   Status fail(const std::string& what) const { return {Errc::invalid_file, source_ + ": " + what}; }
 
   /// Reads n rows from `row` on. The element may be missing.
-  Status get(const Rows& rows, std::size_t row, std::size_t n, std::vector<std::byte>& room,
+  Status get(const Rows& rows, std::size_t row, std::size_t n, std::vector<std::byte>& scratch,
              Block& out) const {
     out.rows = &rows;
     if (rows.element == nullptr) return {};
     const std::size_t stride = rows.element->stride;
-    out.first = rows.bytes.get(std::uint64_t{row} * stride, n * stride, room);
+    out.first = rows.bytes.get(std::uint64_t{row} * stride, n * stride, scratch);
     return out.first != nullptr ? Status() : reading_failed(source_);
   }
 

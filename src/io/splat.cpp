@@ -39,10 +39,10 @@ Result<LoadedCloud> parse(const detail::ByteSource& bytes, const std::string& so
                                     " bytes, must be records of 32 bytes, at least one"};
   }
   const auto decode = [&](std::size_t first, std::size_t last, detail::CloudSink& sink) -> Status {
-    std::vector<std::byte> room;
+    std::vector<std::byte> scratch;
     for (std::size_t row = first; row < last; row += detail::kRowsAtOnce) {
       const std::size_t n = std::min(detail::kRowsAtOnce, last - row);
-      const std::byte* p = bytes.get(std::uint64_t{row} * kRecord, n * kRecord, room);
+      const std::byte* p = bytes.get(std::uint64_t{row} * kRecord, n * kRecord, scratch);
       if (p == nullptr) return detail::reading_failed(source);
       for (std::size_t i = 0; i < n; ++i) sink.add(gaussian(p + i * kRecord));
     }

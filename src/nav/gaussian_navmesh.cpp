@@ -66,12 +66,12 @@ struct Pruner {
     for (int c = 0; c < f.width * f.height; ++c) {
       for (unsigned i = 0; i < f.cells[c].count; ++i) column[f.cells[c].index + i] = c;
     }
-    std::vector<std::uint8_t> seen(count, 0);
+    std::vector<std::uint8_t> visited(count, 0);
     std::vector<std::size_t> piece;
     for (std::size_t start = 0; start < count; ++start) {
-      if (f.areas[start] == RC_NULL_AREA || seen[start] != 0) continue;
+      if (f.areas[start] == RC_NULL_AREA || visited[start] != 0) continue;
       piece.assign(1, start);
-      seen[start] = 1;
+      visited[start] = 1;
       for (std::size_t k = 0; k < piece.size(); ++k) {
         const std::size_t i = piece[k];
         const int x = column[i] % f.width, z = column[i] / f.width;
@@ -80,8 +80,8 @@ struct Pruner {
           if (link == RC_NOT_CONNECTED) continue;
           const int c = (x + rcGetDirOffsetX(dir)) + (z + rcGetDirOffsetY(dir)) * f.width;
           const std::size_t n = f.cells[c].index + static_cast<unsigned>(link);
-          if (f.areas[n] == RC_NULL_AREA || seen[n] != 0) continue;
-          seen[n] = 1;
+          if (f.areas[n] == RC_NULL_AREA || visited[n] != 0) continue;
+          visited[n] = 1;
           piece.push_back(n);
         }
       }

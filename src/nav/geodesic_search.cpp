@@ -49,8 +49,8 @@ void GeodesicSearch::begin(const UnfoldedMesh& mesh, double bound) {
   slack_ = 0;
   nodes_.clear();
   heap_.clear();
-  if (seen_.size() < mesh.vertices.size()) {
-    seen_.resize(mesh.vertices.size(), 0);
+  if (reached_.size() < mesh.vertices.size()) {
+    reached_.resize(mesh.vertices.size(), 0);
     distance_.resize(mesh.vertices.size());
   }
   ++round_;
@@ -136,7 +136,7 @@ void GeodesicSearch::leave(const Site& start) {
     if (length(e.at - start.at) > kRounding) continue;
     // The start lies on a vertex. A window on an adjacent edge would turn around it forever.
     const UnfoldedMesh::Vertex& v = mesh_->vertices[e.vertex];
-    seen_[e.vertex] = round_;
+    reached_[e.vertex] = round_;
     distance_[e.vertex] = 0;
     leave_vertex(e.vertex, 0.0, kNone, 0.0, v.total);
     return;
@@ -153,8 +153,8 @@ void GeodesicSearch::reach(std::uint32_t edge, const Flat& root, double g, std::
   const UnfoldedMesh::Edge& e = mesh_->edges[edge];
   const double d = g + length(e.at - root);
   double& known = distance_[e.vertex];
-  if (seen_[e.vertex] == round_ && d >= known - 1e-12) return;
-  seen_[e.vertex] = round_;
+  if (reached_[e.vertex] == round_ && d >= known - 1e-12) return;
+  reached_[e.vertex] = round_;
   known = d;
   if (!mesh_->vertices[e.vertex].turning && !every_vertex_) return;
   Node n;

@@ -86,7 +86,7 @@ class GeodesicSearch {
   bool finished() const noexcept { return heap_.empty(); }
   /// Distance of a vertex found by the last search. Infinity if it was not reached.
   double vertex_distance(std::uint32_t vertex) const noexcept {
-    return seen_[vertex] == round_ ? distance_[vertex] : std::numeric_limits<double>::infinity();
+    return reached_[vertex] == round_ ? distance_[vertex] : std::numeric_limits<double>::infinity();
   }
 
  private:
@@ -133,7 +133,7 @@ class GeodesicSearch {
   std::vector<Node> nodes_;
   std::vector<std::pair<double, std::uint32_t>> heap_;
   std::vector<double> distance_;
-  std::vector<std::uint64_t> seen_;
+  std::vector<std::uint64_t> reached_;
   std::uint64_t round_ = 0;
 };
 

@@ -43,7 +43,7 @@ std::size_t GeodesicSearch::look_around(const UnfoldedMesh& mesh, std::uint32_t 
   straight_ = true;
   begin(mesh);
   const UnfoldedMesh::Vertex& v = mesh.vertices[vertex];
-  seen_[vertex] = round_;
+  reached_[vertex] = round_;
   distance_[vertex] = 0;
   if (v.closed || v.total > 2 * kPi - kRounding) {
     leave_vertex(vertex, 0.0, kNone, 0.0, v.total);

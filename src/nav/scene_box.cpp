@@ -42,12 +42,12 @@ Aabb<double> scene_box(std::span<const GaussianSet> sets, const GaussianNavOptio
     Aabb<double> box;
   };
   std::vector<Part> parts;
-  std::map<Cell, bool> seen;
+  std::map<Cell, bool> visited;
   for (const auto& [start, m] : mass) {
-    if (m < least || seen[start]) continue;
+    if (m < least || visited[start]) continue;
     Part part;
     std::vector<Cell> stack{start};
-    seen[start] = true;
+    visited[start] = true;
     while (!stack.empty()) {
       const Cell c = stack.back();
       stack.pop_back();
@@ -58,8 +58,8 @@ Aabb<double> scene_box(std::span<const GaussianSet> sets, const GaussianNavOptio
       for (std::int64_t i = 0; i < 27; ++i) {
         const Cell n{c[0] + i % 3 - 1, c[1] + i / 3 % 3 - 1, c[2] + i / 9 - 1};
         const auto it = mass.find(n);
-        if (it == mass.end() || it->second < least || seen[n]) continue;
-        seen[n] = true;
+        if (it == mass.end() || it->second < least || visited[n]) continue;
+        visited[n] = true;
         stack.push_back(n);
       }
     }

@@ -50,7 +50,7 @@ bool drop_small_islands(const dtNavMesh& mesh, double least, std::span<TilePolyg
     first.push_back(count);
     count += static_cast<std::size_t>(t.polys->npolys);
   }
-  std::vector<bool> seen(count, false);
+  std::vector<bool> visited(count, false);
   std::vector<std::vector<bool>> drop(of.size());
   using Poly = std::pair<std::size_t, std::size_t>;  // Tile and polygon.
   std::vector<Poly> island;
@@ -58,8 +58,8 @@ bool drop_small_islands(const dtNavMesh& mesh, double least, std::span<TilePolyg
   bool any = false;
   for (std::size_t t = 0; t < of.size(); ++t) {
     for (std::size_t p = 0; p < static_cast<std::size_t>(of[t]->polys->npolys); ++p) {
-      if (seen[first[t] + p]) continue;
-      seen[first[t] + p] = true;
+      if (visited[first[t] + p]) continue;
+      visited[first[t] + p] = true;
       island.assign(1, {t, p});
       regions.clear();
       for (std::size_t i = 0; i < island.size(); ++i) {
@@ -69,8 +69,8 @@ bool drop_small_islands(const dtNavMesh& mesh, double least, std::span<TilePolyg
         for (unsigned l = tile.polys[poly].firstLink; l != DT_NULL_LINK; l = tile.links[l].next) {
           const Poly next{mesh.decodePolyIdTile(tile.links[l].ref),
                           mesh.decodePolyIdPoly(tile.links[l].ref)};
-          if (seen[first[next.first] + next.second]) continue;
-          seen[first[next.first] + next.second] = true;
+          if (visited[first[next.first] + next.second]) continue;
+          visited[first[next.first] + next.second] = true;
           island.push_back(next);
         }
       }

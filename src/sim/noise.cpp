@@ -54,13 +54,13 @@ double poisson(Rng& rng, double mean) {
 float in_range(double c) { return static_cast<float>(clamp(c, 0.0, 1.0)); }
 
 void add_poisson(Rng& rng, std::span<float> rgb) {
-  std::bitset<256> seen;
+  std::bitset<256> used;
   for (float& c : rgb) {
     c = in_range(static_cast<double>(c));
-    seen.set(to_byte(c));
+    used.set(to_byte(c));
   }
   double levels = 1;
-  while (levels < static_cast<double>(seen.count())) levels *= 2;
+  while (levels < static_cast<double>(used.count())) levels *= 2;
   for (float& c : rgb) c = in_range(poisson(rng, levels * static_cast<double>(c)) / levels);
 }
 

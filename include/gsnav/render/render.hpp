@@ -230,7 +230,7 @@ Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Cam
   slices.plan(backend, sets);
   const int count = depth_slices_of(config, slices.candidates(), camera);
   if (count < 2) return false;
-  slices.cut(count);
+  slices.split(count);
   const int last = slices.count() - 1;
 
   const TileGrid grid = grid_of<B>(config, camera);

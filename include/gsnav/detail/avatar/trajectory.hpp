@@ -97,7 +97,7 @@ class WalkTrajectory final : public Trajectory {
 
   void build_closed(std::vector<Vec3d> path);
 
-  void cut(const std::vector<Vec3d>& path);
+  void split(const std::vector<Vec3d>& path);
 
   void add_leg(const std::vector<Vec3d>& points);
 

@@ -13,23 +13,23 @@
 namespace gsnav {
 
 /// Reorders rows of `stride` values in parallel: new row i is old row order[i]. Wide rows are moved a
-/// few columns at a time through `room`, so that a second copy of a scene's largest array is never
-/// needed. Fresh memory costs more than the moves. `room` can be reused between calls.
+/// few columns at a time through `scratch`, so that a second copy of a scene's largest array is never
+/// needed. Fresh memory costs more than the moves. `scratch` can be reused between calls.
 template <Backend B, class T>
 void permute_rows(B& backend, std::span<const std::uint32_t> order, std::size_t stride,
-                  std::vector<T>& values, std::vector<T>& room) {
+                  std::vector<T>& values, std::vector<T>& scratch) {
   static_assert(is_host_backend<B>);
   constexpr std::size_t kColumns = 9;  // a fifth of the SH coefficients of degree 3
   if (values.empty()) return;
   const std::size_t width = std::min(stride, kColumns), n = order.size();
-  if (room.empty()) {
-    room = huge_vector<T>(width * n);
+  if (scratch.empty()) {
+    scratch = huge_vector<T>(width * n);
   } else {
-    room.resize(width * n);
+    scratch.resize(width * n);
   }
   for (std::size_t column = 0; column < stride; column += width) {
     const std::size_t columns = std::min(width, stride - column);
-    T *const rows = values.data() + column, *const picked = room.data();
+    T *const rows = values.data() + column, *const picked = scratch.data();
     if (stride == 1) {
       backend.parallel_for(n, [=](std::size_t i) { picked[i] = rows[order[i]]; });
     } else {
@@ -43,14 +43,14 @@ void permute_rows(B& backend, std::span<const std::uint32_t> order, std::size_t 
     });
   }
   backend.synchronize().throw_if_error();
-  if (width == stride) values.swap(room);
+  if (width == stride) values.swap(scratch);
 }
 /// Reorders rows as above, with scratch memory of its own.
 template <Backend B, class T>
 void permute_rows(B& backend, std::span<const std::uint32_t> order, std::size_t stride,
                   std::vector<T>& values) {
-  std::vector<T> room;
-  permute_rows(backend, order, stride, values, room);
+  std::vector<T> scratch;
+  permute_rows(backend, order, stride, values, scratch);
 }
 
 }  // namespace gsnav

@@ -134,7 +134,7 @@ void blend_among(const OracleScene<Model>& scene, View<const std::uint32_t> list
     const OracleSpan<Model> span(scene, r);
     if (x < span.x0 || x >= span.x1) continue;
     Met m{0, &r, r.model.log2_alpha(px, py), 0};
-    if (!(m.log2_alpha >= scene.log2_cut)) continue;
+    if (!(m.log2_alpha >= scene.log2_least)) continue;
     m.depth = r.model.depth(px, py);
     const bool drawn =
         (m.log2_alpha - scene.rules.log2_alpha_min) * std::numbers::ln2 > -kUndecidedRelative;
@@ -182,7 +182,7 @@ void blend_in_order(const OracleScene<Model>& scene, View<const std::uint32_t> l
       OraclePixel& pixel = pixels[column];
       if (pixel.closed || apart[column] != 0) continue;
       const double px = x + 0.5, py = y + 0.5, log2_alpha = r.model.log2_alpha(px, py);
-      if (!(log2_alpha >= scene.log2_cut)) continue;
+      if (!(log2_alpha >= scene.log2_least)) continue;
       pixel.blend(scene.rules, log2_alpha, r.color, r.rank, scene.mesh_depth(x, y),
                   [&] { return r.model.depth(px, py); });
       open -= pixel.closed ? 1 : 0;
@@ -228,7 +228,7 @@ void blend_per_ray(const OracleScene<Model>& scene, View<const std::uint32_t> li
       const OracleSpan<Model> span(scene, r);
       for (int x = std::max(span.x0, strip0); x < std::min(span.x1, strip1); ++x) {
         const double px = x + 0.5, log2_alpha = r.model.log2_alpha(px, py);
-        if (!(log2_alpha >= scene.log2_cut)) continue;
+        if (!(log2_alpha >= scene.log2_least)) continue;
         fragments[end[static_cast<std::size_t>(x - scene.rect.x0)]++] = {r.model.depth(px, py),
                                                                          log2_alpha, list[i], r.id};
       }

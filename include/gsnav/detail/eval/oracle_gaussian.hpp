@@ -232,9 +232,9 @@ struct EwaModel {
   double fx, fy, z, reach;       ///< Focal lengths in pixels; depth of the mean and limit of the depth
                                  ///< offset in metres.
 
-  /// Projects a Gaussian. `box` contains every pixel with alpha >= 2^log2_cut.
+  /// Projects a Gaussian. `box` contains every pixel with alpha >= 2^log2_least.
   /// @return false if it is not drawn.
-  static bool make(const OracleSet& s, std::size_t row, double log2_cut, EwaModel& out,
+  static bool make(const OracleSet& s, std::size_t row, double log2_least, EwaModel& out,
                    PixelRect& box) noexcept {
     const Camera& c = s.camera;
     const Real3 mean = s.center(row);
@@ -266,7 +266,7 @@ struct EwaModel {
     out.log2_opacity = static_cast<double>(std::log2(opacity));
     // Gaussians whose values overflow float32 are not drawn by any backend.
     constexpr double huge = 3e38;
-    if (!(opacity > 0 && out.log2_opacity >= log2_cut && det <= huge && variance_x <= huge &&
+    if (!(opacity > 0 && out.log2_opacity >= log2_least && det <= huge && variance_x <= huge &&
           variance_y <= huge && std::abs(out.mean_x) <= huge && std::abs(out.mean_y) <= huge)) {
       return false;
     }
@@ -285,7 +285,7 @@ struct EwaModel {
 
     // The ellipse q = k^2 touches x = mean +- k sqrt(variance). The margin is a hundred times the
     // rounding error.
-    const double k = reached_sigmas(out.log2_opacity, log2_cut) * (1 + 1e-9);
+    const double k = reached_sigmas(out.log2_opacity, log2_least) * (1 + 1e-9);
     const auto half = [k](Real variance, double at) {
       return k * std::sqrt(static_cast<double>(variance)) + 1e-12 * std::abs(at);
     };

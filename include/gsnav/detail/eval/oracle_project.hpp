@@ -43,7 +43,7 @@ struct OracleScene {
   std::vector<OracleRecord<Model>> records;
   OracleRules rules;
   PixelRect rect;
-  double log2_cut;  ///< Pairs with lower log2 alpha need not be evaluated.
+  double log2_least;  ///< Pairs with lower log2 alpha need not be evaluated.
   bool boxed, per_ray;
   const OracleMesh* mesh;
   std::size_t image_width;
@@ -80,7 +80,7 @@ std::vector<OracleCandidate> oracle_candidates(B& backend, std::span<const Oracl
       for (std::size_t row = c * kOracleChunk; row < std::min(n, (c + 1) * kOracleChunk); ++row) {
         Model model;
         PixelRect box;
-        if (!Model::make(s, row, scene.log2_cut, model, box)) continue;
+        if (!Model::make(s, row, scene.log2_least, model, box)) continue;
         const bool reaches = !box.intersection(scene.rect).empty();
         reaching[c] += reaches ? 1 : 0;
         if (scene.boxed && !reaches) continue;
@@ -125,9 +125,9 @@ OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> ga
   scene.per_ray = config.order == OracleOrder::per_ray ||
                   (config.order == OracleOrder::own && config.kind == OracleKind::ray);
   // Include Gaussians whose alpha is below alpha_min by less than the undecided margin.
-  scene.log2_cut = truncated      ? scene.rules.log2_alpha_min - 3 * kUndecidedRelative
-                   : config.boxed ? kLog2NegligibleAlpha
-                                  : -infinity;
+  scene.log2_least = truncated      ? scene.rules.log2_alpha_min - 3 * kUndecidedRelative
+                     : config.boxed ? kLog2NegligibleAlpha
+                                    : -infinity;
 
   std::vector<OracleSet> sets;
   std::size_t total = 0;
@@ -169,7 +169,7 @@ OracleScene<Model> make_oracle_scene(B& backend, std::span<const GaussianSet> ga
       const OracleSet& s = *std::prev(after);
       const std::size_t row = order[i].row - s.first_row;
       OracleRecord<Model>& record = scene.records[i];
-      Model::make(s, row, scene.log2_cut, record.model, record.box);
+      Model::make(s, row, scene.log2_least, record.model, record.box);
       record.box = record.box.intersection(scene.rect);
       record.color =
           s.color(row, std::min(s.set.gaussians.color.degree, c.quality.max_sh_degree), c.blend_space);

@@ -28,9 +28,9 @@ struct RayModel {
   double fx, fy, cx, cy;
   double log2_opacity, reach;
 
-  /// Projects a Gaussian. `box` contains every pixel with alpha >= 2^log2_cut.
+  /// Projects a Gaussian. `box` contains every pixel with alpha >= 2^log2_least.
   /// @return false if it is not drawn.
-  static bool make(const OracleSet& s, std::size_t row, double log2_cut, RayModel& out,
+  static bool make(const OracleSet& s, std::size_t row, double log2_least, RayModel& out,
                    PixelRect& box) noexcept {
     const Camera& c = s.camera;
     const Real3 mean = s.center(row);
@@ -64,13 +64,13 @@ struct RayModel {
     double opacity = static_cast<double>(StoredShape{s.set.gaussians.shape, row}.opacity());
     if (s.set.filter == Filter::mip) opacity *= static_cast<double>(std::sqrt(area0 / area));
     out.log2_opacity = std::log2(opacity);
-    if (!(opacity > 0 && out.log2_opacity >= log2_cut && out.z > 0 &&
+    if (!(opacity > 0 && out.log2_opacity >= log2_least && out.z > 0 &&
           std::isfinite(static_cast<double>(area)))) {
       return false;
     }
     const Double3 along_z = out.row(&Double3::z);
     out.reach = reached_sigmas(out.log2_opacity, s.log2_alpha_min) * std::sqrt(inner(along_z, along_z));
-    const double k = reached_sigmas(out.log2_opacity, log2_cut);
+    const double k = reached_sigmas(out.log2_opacity, log2_least);
     box = out.outline(c, k * k);
     return true;
   }

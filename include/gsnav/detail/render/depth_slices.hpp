@@ -61,15 +61,15 @@ class DepthSlices {
   /// Number of Gaussians in chunks that may be visible.
   std::size_t candidates() const noexcept { return candidates_; }
 
-  /// Cuts the plan into n slices, or fewer if there are fewer distinct depths.
-  void cut(int n) noexcept {
+  /// Splits the plan into n slices, or fewer if there are fewer distinct depths.
+  void split(int n) noexcept {
     count_ = 0;
-    std::size_t seen = 0, bucket = 0;
+    std::size_t taken = 0, bucket = 0;
     for (int s = 0; s + 1 < n; ++s) {
       const double share = kFirst + (1 - kFirst) * s / n;
       const std::size_t wanted = static_cast<std::size_t>(share * static_cast<double>(candidates_));
-      if (seen >= wanted) continue;  // a slice would be empty
-      while (bucket + 1 < kBuckets && seen < wanted) seen += weights_[bucket++];
+      if (taken >= wanted) continue;  // a slice would be empty
+      while (bucket + 1 < kBuckets && taken < wanted) taken += weights_[bucket++];
       ends_[static_cast<std::size_t>(count_++)] = bucket;
     }
     ends_[static_cast<std::size_t>(count_++)] = kBuckets;

@@ -154,7 +154,7 @@ void place_meshes(MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes,
   ws.host_vertex_chunks.clear();
   ws.host_triangle_chunks.clear();
   std::size_t vertices = 0;
-  const auto cut = [](std::vector<MeshChunk>& chunks, std::size_t placement, std::size_t n) {
+  const auto split = [](std::vector<MeshChunk>& chunks, std::size_t placement, std::size_t n) {
     for (std::size_t i = 0; i < n; i += kMeshChunk) {
       chunks.push_back({static_cast<std::uint32_t>(placement), static_cast<std::uint32_t>(i)});
     }
@@ -163,8 +163,8 @@ void place_meshes(MeshWorkspace<S, B>& ws, std::span<const MeshInstance> meshes,
     MeshPlacement p;
     p.first_vertex = vertices;
     if (!place_mesh(i, camera, lens, through, p)) continue;
-    cut(ws.host_vertex_chunks, ws.host_placements.size(), i.mesh.vertices.size);
-    cut(ws.host_triangle_chunks, ws.host_placements.size(), i.mesh.triangle_count());
+    split(ws.host_vertex_chunks, ws.host_placements.size(), i.mesh.vertices.size);
+    split(ws.host_triangle_chunks, ws.host_placements.size(), i.mesh.triangle_count());
     vertices += i.mesh.vertices.size;
     ws.host_placements.push_back(p);
   }

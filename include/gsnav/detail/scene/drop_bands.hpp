@@ -16,10 +16,10 @@ namespace detail {
 
 /// Cuts n rows of SH bands from degree `from` to degree `to` and frees the memory.
 template <class T>
-void cut_bands(std::vector<T>& bands, std::size_t n, int from, int to) {
+void narrow_bands(std::vector<T>& bands, std::size_t n, int from, int to) {
   if (bands.empty()) return;
   const std::size_t kept = n * sh_band_numbers(to);
-  cut_rows(bands.data(), n, sh_band_numbers(from), sh_band_numbers(to), bands.data());
+  narrow_rows(bands.data(), n, sh_band_numbers(from), sh_band_numbers(to), bands.data());
   discard_pages(bands.data() + kept, (bands.size() - kept) * sizeof(T));
   bands = moved_through<T>(bands, kept, [](T v) { return v; });
 }
@@ -31,8 +31,8 @@ void cut_bands(std::vector<T>& bands, std::size_t n, int from, int to) {
 inline std::size_t limit_sh_degree(GaussianCloud& cloud, int degree) {
   if (degree >= cloud.sh_degree) return 0;
   const std::size_t before = cloud.bytes();
-  detail::cut_bands(cloud.shN, cloud.size(), cloud.sh_degree, degree);
-  detail::cut_bands(cloud.shN_half, cloud.size(), cloud.sh_degree, degree);
+  detail::narrow_bands(cloud.shN, cloud.size(), cloud.sh_degree, degree);
+  detail::narrow_bands(cloud.shN_half, cloud.size(), cloud.sh_degree, degree);
   cloud.sh_degree = degree;
   return before - cloud.bytes();
 }
@@ -41,9 +41,9 @@ inline std::size_t limit_sh_degree(PackedCloud& cloud, int degree) {
   GaussianCloud& rest = cloud.rest;
   if (degree >= rest.sh_degree) return 0;
   const std::size_t before = cloud.bytes();
-  detail::cut_bands(cloud.shN, cloud.size(), rest.sh_degree, degree);
-  detail::cut_bands(rest.shN, cloud.size(), rest.sh_degree, degree);
-  detail::cut_bands(rest.shN_half, cloud.size(), rest.sh_degree, degree);
+  detail::narrow_bands(cloud.shN, cloud.size(), rest.sh_degree, degree);
+  detail::narrow_bands(rest.shN, cloud.size(), rest.sh_degree, degree);
+  detail::narrow_bands(rest.shN_half, cloud.size(), rest.sh_degree, degree);
   rest.sh_degree = degree;
   return before - cloud.bytes();
 }

@@ -97,7 +97,7 @@ class GaussianArrays {
     const auto drop = [&]<class T>(View<const T>& from, std::vector<T>& to) {
       if (from.empty()) return;
       to.resize(sh_band_numbers(most) * size);
-      cut_rows(from.data, size, v.rest(), sh_band_numbers(most), to.data());
+      narrow_rows(from.data, size, v.rest(), sh_band_numbers(most), to.data());
       from = view_of(std::as_const(to));
     };
     drop(v.shN, floats);

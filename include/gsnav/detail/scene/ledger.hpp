@@ -140,7 +140,7 @@ inline std::string ledger_text(const FrameLedger& l) {
     line("rules: %s", "not the contract's (RenderConfig::response, RenderConfig::compat)");
   if (l.clamped != 0) line("clamped: %llu log-scales to [-20, 20]", count(l.clamped));
   if (l.sh_storage_error > 0) line("quantised: SH coefficients, by %.2g at most", l.sh_storage_error);
-  line("cut: alphas below %.4f, a Gaussian and pixel; %.4f of the light behind a closed pixel",
+  line("left out: alphas below %.4f, a Gaussian and pixel; %.4f of the light behind a closed pixel",
        l.alpha_min, l.transmittance_min);
   line("rounded: the exponential of each alpha, by %.1g relative", l.alpha_error);
   return out;

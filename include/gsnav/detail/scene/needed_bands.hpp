@@ -27,7 +27,7 @@ inline int needed_sh_degree(const ColorRows& v) noexcept {
 
 /// Copies the first `to` of the `from` numbers of each of n rows to `out`, which may be `rows` itself.
 template <class T>
-void cut_rows(const T* rows, std::size_t n, std::size_t from, std::size_t to, T* out) noexcept {
+void narrow_rows(const T* rows, std::size_t n, std::size_t from, std::size_t to, T* out) noexcept {
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t k = 0; k < to; ++k) out[to * i + k] = rows[from * i + k];
   }

@@ -181,19 +181,19 @@ void sort_spatially(B& backend, GaussianCloud& cloud) {
                               static_cast<std::uint32_t>(p.z)});
     return code | (largest[i] > large ? std::uint64_t{1} << 63 : 0);
   });
-  std::vector<float> room = std::move(largest);
+  std::vector<float> scratch = std::move(largest);
   const auto move = [&](std::vector<float>& plane, std::size_t stride) {
-    permute_rows(backend, order, stride, plane, room);
+    permute_rows(backend, order, stride, plane, scratch);
   };
   for (auto& plane : cloud.means) move(plane, 1);
   for (auto& plane : cloud.quats) move(plane, 1);
   for (auto& plane : cloud.scales) move(plane, 1);
   move(cloud.opacities, 1);
-  release(room);
+  release(scratch);
   move(cloud.sh0, 3);
-  release(room);
+  release(scratch);
   move(cloud.shN, cloud.shN.size() / n);
-  release(room);
+  release(scratch);
   permute_rows(backend, order, cloud.shN_half.size() / n, cloud.shN_half);
   permute_rows(backend, order, 1, cloud.origin_ids);
   if (cloud.row_ids.empty()) {

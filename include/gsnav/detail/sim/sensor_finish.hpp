@@ -37,7 +37,7 @@ class SensorFinish {
       }
     }
     for_each_on_host(*backend_, views.size(), [&](std::size_t v) {
-      sample_and_cut(plan, requests, v, views[v].row, images);
+      sample_and_limit(plan, requests, v, views[v].row, images);
       add_noise(plan, views[v], images);
     });
     for (const auto& s : requests.shares()) {
@@ -67,8 +67,8 @@ class SensorFinish {
     return backend_->synchronize();
   }
 
-  static void sample_and_cut(const SensorPlan& plan, const SensorRequests<B>& requests, std::size_t view,
-                             std::size_t row, SensorImages<B>& images) {
+  static void sample_and_limit(const SensorPlan& plan, const SensorRequests<B>& requests,
+                               std::size_t view, std::size_t row, SensorImages<B>& images) {
     for (std::size_t g = 0; g < plan.groups().size(); ++g) {
       const SensorPlan::Group& group = plan.groups()[g];
       for (std::size_t k = 0; k < SensorPlan::kSemantic; ++k) {
