@@ -50,6 +50,8 @@ struct RasterArgs {
                       ///< detail/frame/composite.hpp.
 
   GSNAV_HD DepthMode depth_mode() const noexcept { return images.depth_mode(); }
+  /// True if the response is not Response::ewa, or the stop is exclusive.
+  bool general() const noexcept { return !perspectives.empty() || rules.exclusive_stop; }
   GSNAV_HD SplatRecords<S> records(std::size_t splat) const noexcept {
     return {geometry.data + splat, colors.empty() ? nullptr : colors.data + splat,
             depths.empty() ? nullptr : depths.data + splat,
@@ -175,34 +177,36 @@ struct RasterizePixel {
   }
 };
 
+/// Calls f with the compile-time arguments <Color, DepthMode> that fit the images of `args`.
+template <class S, class F>
+void dispatch_images(const RasterArgs<S>& args, const F& f) {
+  const auto with_depth = [&]<bool C>() {
+    switch (args.depth_mode()) {
+      case DepthMode::none:
+        return f.template operator()<C, DepthMode::none>();
+      case DepthMode::median:
+        return f.template operator()<C, DepthMode::median>();
+      case DepthMode::all:
+        return f.template operator()<C, DepthMode::all>();
+    }
+  };
+  args.images.rgb != nullptr ? with_depth.template operator()<true>()
+                             : with_depth.template operator()<false>();
+}
+
 /// Calls f with the compile-time arguments <Color, DepthMode, Exp2, General> that fit `args`. General is
 /// true for a response other than Response::ewa and for an exclusive stop. It excludes the cubic exp2.
 template <class S, class F>
 void dispatch_raster(const RasterArgs<S>& args, const F& f) {
-  const auto with_exp2 = [&]<bool C, DepthMode D>() {
-    if (!args.perspectives.empty() || args.rules.exclusive_stop) {
+  dispatch_images(args, [&]<bool C, DepthMode D>() {
+    if (args.general()) {
       f.template operator()<C, D, Exp2::degree5, true>();
     } else if (std::is_same_v<S, float> && args.exp2_method == Exp2::degree3) {
       f.template operator()<C, D, Exp2::degree3, false>();
     } else {
       f.template operator()<C, D, Exp2::degree5, false>();
     }
-  };
-  const auto with_depth = [&]<bool C>() {
-    switch (args.depth_mode()) {
-      case DepthMode::none:
-        return with_exp2.template operator()<C, DepthMode::none>();
-      case DepthMode::median:
-        return with_exp2.template operator()<C, DepthMode::median>();
-      case DepthMode::all:
-        return with_exp2.template operator()<C, DepthMode::all>();
-    }
-  };
-  if (args.images.rgb != nullptr) {
-    with_depth.template operator()<true>();
-  } else {
-    with_depth.template operator()<false>();
-  }
+  });
 }
 
 }  // namespace gsnav

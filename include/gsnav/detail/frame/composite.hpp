@@ -138,25 +138,9 @@ struct FragmentPixel {
 /// General>. These frames never use the cubic exp2.
 template <class S, class F>
 void dispatch_composite(const RasterArgs<S>& args, const F& f) {
-  const auto with_depth = [&]<bool C, bool G>() {
-    switch (args.depth_mode()) {
-      case DepthMode::none:
-        return f.template operator()<C, DepthMode::none, G>();
-      case DepthMode::median:
-        return f.template operator()<C, DepthMode::median, G>();
-      case DepthMode::all:
-        return f.template operator()<C, DepthMode::all, G>();
-    }
-  };
-  const bool general = !args.perspectives.empty() || args.rules.exclusive_stop,
-             color = args.images.rgb != nullptr;
-  if (color) {
-    general ? with_depth.template operator()<true, true>()
-            : with_depth.template operator()<true, false>();
-  } else {
-    general ? with_depth.template operator()<false, true>()
-            : with_depth.template operator()<false, false>();
-  }
+  dispatch_images(args, [&]<bool C, DepthMode D>() {
+    args.general() ? f.template operator()<C, D, true>() : f.template operator()<C, D, false>();
+  });
 }
 
 /// Kernel of Composite::hard_depth. Converts the images of the Gaussians alone, rendered over black, to
