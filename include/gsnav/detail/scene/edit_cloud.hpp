@@ -30,19 +30,27 @@ inline bool is_finite(const GaussianCloud& cloud) {
   return true;
 }
 
+namespace detail {
+/// Replaces the mean of each row i by f(i).
+template <class F>
+void replace_means(GaussianCloud& cloud, const F& f) {
+  GaussianCloud moved;
+  MeanWriter writer;
+  for (auto& plane : moved.means) plane.reserve(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) writer.push(moved, f(i));
+  cloud.means = std::move(moved.means);
+  cloud.origin_ids = std::move(moved.origin_ids);
+  cloud.origins = std::move(moved.origins);
+}
+}  // namespace detail
+
 /// Moves, rotates and scales a cloud as a rigid body, with its SH bands. Chunk bounds are dropped, so
 /// sort again. `by.rotation` must be a unit quaternion and `by.scale` positive. The bands of a compact
 /// cloud are rounded once more.
 inline void transform(GaussianCloud& cloud, const Similarity& by) {
   const bool compact = cloud.compact();
   expand_sh(cloud);
-  GaussianCloud moved;
-  MeanWriter writer;
-  for (auto& plane : moved.means) plane.reserve(cloud.size());
-  for (std::size_t i = 0; i < cloud.size(); ++i) writer.push(moved, by * cloud.mean(i));
-  cloud.means = std::move(moved.means);
-  cloud.origin_ids = std::move(moved.origin_ids);
-  cloud.origins = std::move(moved.origins);
+  detail::replace_means(cloud, [&](std::size_t i) { return by * cloud.mean(i); });
   cloud.chunk_bounds.clear();
   cloud.part_bounds.clear();
   const ShRotation bands(by.rotation);
@@ -149,12 +157,9 @@ inline Status transform(GaussianCloud& cloud, const Affine3<double>& by) {
               stretch = transpose(turn) * m * sign;
   const bool compact = cloud.compact();
   expand_sh(cloud);
-  GaussianCloud moved;
-  MeanWriter writer;
-  for (auto& plane : moved.means) plane.reserve(cloud.size());
+  detail::replace_means(cloud, [&](std::size_t i) { return (stretch * cloud.mean(i)) * sign; });
   const std::size_t rest = cloud.size() == 0 ? 0 : cloud.shN.size() / cloud.size();
   for (std::size_t i = 0; i < cloud.size(); ++i) {
-    writer.push(moved, (stretch * cloud.mean(i)) * sign);
     const auto part = [&](std::size_t k) { return static_cast<double>(cloud.quats[k][i]); };
     Mat3d shape = stretch * rotation_matrix(Quatd{part(0), part(1), part(2), part(3)}), rotation;
     for (int k = 0; k < 3; ++k) {
@@ -175,9 +180,6 @@ inline Status transform(GaussianCloud& cloud, const Affine3<double>& by) {
       for (std::size_t c = 0; c < 3; ++c) cloud.shN[i * rest + 3 * k + c] *= -1.0f;
     }
   }
-  cloud.means = std::move(moved.means);
-  cloud.origin_ids = std::move(moved.origin_ids);
-  cloud.origins = std::move(moved.origins);
   Quatd rotation = quat_from_matrix(turn);
   normalize(rotation);
   transform(cloud, Similarity{rotation, by.translation, 1});

@@ -36,16 +36,13 @@ inline void sort_spatially(TemporalCloud& scene) {
 /// are left out. Not sorted.
 inline GaussianCloud cloud_at(const TemporalCloud& scene, double t) {
   const TemporalView view = scene.view();
-  GaussianCloud out = scene.cloud, moved;
-  MeanWriter writer;
-  for (std::size_t i = 0; i < scene.size(); ++i) {
+  GaussianCloud out = scene.cloud;
+  detail::replace_means(out, [&](std::size_t i) {
     double opacity = 0;
-    writer.push(moved, scene.cloud.mean(i) + temporal_state<double>(view, i, t, opacity));
+    const Vec3d moved = scene.cloud.mean(i) + temporal_state<double>(view, i, t, opacity);
     out.opacities[i] = static_cast<float>(opacity);
-  }
-  out.means = std::move(moved.means);
-  out.origin_ids = std::move(moved.origin_ids);
-  out.origins = std::move(moved.origins);
+    return moved;
+  });
   filter_rows(out, [&](std::size_t i) { return out.opacities[i] > 0; });
   return out;
 }
