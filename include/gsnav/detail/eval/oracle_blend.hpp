@@ -46,49 +46,35 @@ struct OraclePixel {
     if (!(alpha > 0)) return;
     if (blended++ > 0 && rank < last_rank) order_flip = true;
     last_rank = rank;
-    const double z = depth(), before = transmittance, weight = alpha * before;
-    transmittance = before * (1 - alpha);
-    color = color + weight * c;
-    weights += weight;
-    accumulated += weight * z;
-    const double open = 1 - rules.first_hit_tau;
-    if (before > 0.5 && transmittance <= 0.5) median = z;
-    if (before > open && transmittance <= open) first_hit = z;
-    if (std::abs(transmittance - 0.5) < kUndecidedCrossing ||
-        std::abs(transmittance - open) < kUndecidedCrossing) {
-      undecided_depth = true;
-    }
-    const double stop = rules.transmittance_min;
-    if (std::abs(transmittance - stop) < kUndecidedRelative * stop) undecided = true;
-    closed = transmittance < stop;
-  }
-
-  /// Blends an opaque mesh at depth z, which takes the remaining transmittance.
-  void close(const OracleRules& rules, double z, const Double3& c) noexcept {
-    const double weight = transmittance;
-    color = color + weight * c;
-    weights += weight;
-    accumulated += weight * z;
-    if (weight > 0.5) median = z;
-    if (weight > 1 - rules.first_hit_tau) first_hit = z;
-    transmittance = 0;
+    take(rules, alpha, c, depth());
+    settle(rules);
   }
 
   /// Blends a transparent fragment of a mesh.
   void pass(const OracleRules& rules, const OracleFragment& f) noexcept {
-    const double before = transmittance, weight = f.alpha * before, open = 1 - rules.first_hit_tau;
-    const double stop = rules.transmittance_min;
-    transmittance = before * (1 - f.alpha);
-    color = color + weight * Double3{f.rgb.x, f.rgb.y, f.rgb.z};
+    take(rules, f.alpha, {f.rgb.x, f.rgb.y, f.rgb.z}, f.depth);
+    settle(rules);
+    last_rank = 0;  // Another list begins.
+  }
+
+  /// Takes a share of the light at depth z. An opaque mesh takes all of it.
+  void take(const OracleRules& rules, double alpha, const Double3& c, double z) noexcept {
+    const double before = transmittance, weight = alpha * before, open = 1 - rules.first_hit_tau;
+    transmittance = before * (1 - alpha);
+    color = color + weight * c;
     weights += weight;
-    accumulated += weight * f.depth;
-    if (before > 0.5 && transmittance <= 0.5) median = f.depth;
-    if (before > open && transmittance <= open) first_hit = f.depth;
-    for (const double at : {0.5, open})
+    accumulated += weight * z;
+    if (before > 0.5 && transmittance <= 0.5) median = z;
+    if (before > open && transmittance <= open) first_hit = z;
+  }
+
+  /// Closes the pixel below the stop, and marks a transmittance that float32 may decide differently.
+  void settle(const OracleRules& rules) noexcept {
+    const double stop = rules.transmittance_min;
+    for (const double at : {0.5, 1 - rules.first_hit_tau})
       undecided_depth = undecided_depth || std::abs(transmittance - at) < kUndecidedCrossing;
     undecided = undecided || std::abs(transmittance - stop) < kUndecidedRelative * stop;
     closed = closed || transmittance < stop;
-    last_rank = 0;  // Another list begins.
   }
 
   void write(const OracleRules& rules, OracleFrames& out, std::size_t pixel) const noexcept {
@@ -268,7 +254,7 @@ OracleCounts blend_row(const OracleScene<Model>& scene, View<const std::uint32_t
     const int column = scene.rect.x0 + static_cast<int>(x);
     if (const double z = scene.mesh_depth(column, y); std::isfinite(z)) {
       const double* const c = scene.mesh->rgb.data() + 3 * scene.pixel(column, y);
-      pixels[x].close(scene.rules, z, {c[0], c[1], c[2]});
+      pixels[x].take(scene.rules, 1, {c[0], c[1], c[2]}, z);
     }
     pixels[x].write(scene.rules, out, to * out.width + x);
     counts.evaluations += pixels[x].blended;
