@@ -14,7 +14,8 @@ import time
 
 import numpy as np
 from pointnav_policy import Policy, load, save
-from pointnav_worlds import ACTIONS, CHANNELS, HELD_OUT_SEEDS, METRICS, Worlds, device_of, goals, world_arguments
+from pointnav_worlds import (ACTIONS, CHANNELS, HELD_OUT_SEEDS, METRICS, Worlds, device_of, goals, sensors_of,
+                             world_arguments)
 
 import gsnav
 
@@ -34,8 +35,8 @@ def evaluate(args: argparse.Namespace, worlds: Worlds, name: str, policy: Policy
         given[environment] += 1
         return worlds.episodes[playing[environment] % int(args.episodes)]
 
-    simulator = worlds.simulator(args, n, policy is not None and policy.channels > 0, next_episode,
-                                 memory=gsnav.ImageMemory.host)
+    blind = policy is None or not policy.channels
+    simulator = worlds.simulator(args, n, sensors_of(args, blind), next_episode, memory=gsnav.ImageMemory.host)
     follower, rng = gsnav.GeodesicFollower(), np.random.default_rng(args.seed)
     seen, ended, start = simulator.reset(), np.zeros(n, np.bool_), np.ones(n, np.bool_)
     hidden, actions = np.zeros((n, 256), np.float32), np.zeros(n, np.int64)

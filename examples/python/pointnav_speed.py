@@ -14,7 +14,7 @@ import time
 import numpy as np
 
 import gsnav
-from pointnav_worlds import TRAIN_SEEDS, Draw, Worlds, device_of, sensor_arguments, world_arguments
+from pointnav_worlds import TRAIN_SEEDS, Draw, Worlds, device_of, sensor_arguments, sensors_of, world_arguments
 
 
 def main() -> None:
@@ -33,7 +33,7 @@ def main() -> None:
 
     print(f"{args.flats} flats ...", flush=True)
     worlds = Worlds(TRAIN_SEEDS[:args.flats], args, episodes=100)
-    simulator = worlds.simulator(args, args.environments, not args.blind, Draw(worlds, args.seed, 0))
+    simulator = worlds.simulator(args, args.environments, sensors_of(args, args.blind), Draw(worlds, args.seed, 0))
     # Mostly forward, never stop.
     actions = np.random.default_rng(args.seed).choice(
         [int(gsnav.Action.move_forward)] * 2 + [int(gsnav.Action.turn_left), int(gsnav.Action.turn_right)],

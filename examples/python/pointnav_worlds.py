@@ -49,15 +49,13 @@ class Worlds:
         self.episodes = [gsnav.BatchEpisode(scene=s, episode=made[s][1][k])
                          for k in range(episodes) for s in range(len(made))]
 
-    def simulator(self, args: argparse.Namespace, environments: int, images: bool,
+    def simulator(self, args: argparse.Namespace, environments: int, sensors: list[gsnav.SensorSpec],
                   next_episode: Callable[[int, int], gsnav.BatchEpisode],
                   image_source: Callable[[int, int], Any] | None = None,
                   memory: gsnav.ImageMemory = gsnav.ImageMemory.backend) -> gsnav.BatchSimulator:
-        """Environments with one sensor, or with none. After an episode, a step without effect begins the next."""
-        sensor = gsnav.SensorSpec(uuid=args.sensor, kind=gsnav.SensorKind[args.sensor],
-                                  resolution=[args.size, args.size])
+        """Environments with the sensors. After an episode, a step without effect begins the next."""
         # With as many slots as environments, one pass draws all images.
-        config = gsnav.BatchConfig(task=self.task, sensors=[sensor] if images else [], pose_slots=environments,
+        config = gsnav.BatchConfig(task=self.task, sensors=sensors, pose_slots=environments,
                                    render=gsnav.RenderConfig(quality=self.quality), lod=self.lod,
                                    images=memory, auto_reset=gsnav.AutoReset.next_step)
         return gsnav.BatchSimulator(args.device, self.scenes, config, environments, next_episode,
@@ -84,6 +82,12 @@ class Draw:
         self.given[environment] += 1
         at = mixed(self.seed, self.epoch, self.first + environment, self.given[environment])
         return self.episodes[at % len(self.episodes)]
+
+
+def sensors_of(args: argparse.Namespace, blind: bool) -> list[gsnav.SensorSpec]:
+    """The sensor of an agent, none if it is blind."""
+    spec = gsnav.SensorSpec(uuid=args.sensor, kind=gsnav.SensorKind[args.sensor], resolution=[args.size, args.size])
+    return [] if blind else [spec]
 
 
 def goals(seen: gsnav.BatchStep) -> np.ndarray:

@@ -29,7 +29,7 @@ import numpy as np
 import torch.distributed as dist
 from pointnav_agent import Agent, Mirror, Reorder, Rows, clear, devices_of, hash_of, pieces, progress, write_log
 from pointnav_worlds import (ACTIONS, CHANNELS, METRICS, TRAIN_SEEDS, Draw, Worlds, goals, mixed, sensor_arguments,
-                             world_arguments)
+                             sensors_of, world_arguments)
 from torch import Tensor, nn
 from torch.nn.utils.rnn import PackedSequence
 
@@ -60,7 +60,7 @@ class Learner:
 
         self.images = made(t + 1, n, size, size, CHANNELS[args.sensor])
         self.rows, self.mirror = Rows(self.images), Mirror(args.mirror, self.rank * n, n, self.device)
-        self.simulator = worlds.simulator(args, n, not args.blind, self.draw, self.rows)
+        self.simulator = worlds.simulator(args, n, sensors_of(args, args.blind), self.draw, self.rows)
         self.goal, self.start = made(t + 1, n, 3), made(t + 1, n)
         self.action, self.log_p, self.values = made(t, n, dtype=torch.int64), made(t, n), made(t + 1, n)
         self.last, self.hidden, self.noise = made(t + 1, n, dtype=torch.int64), made(n, 256), made(t + 1, n, ACTIONS)
