@@ -22,7 +22,7 @@ HELP = "docs/reference/command_lines.md"
 # Programs that pass options on to another, or whose sources are in two places.
 ALSO = {"tools/run_demo.sh": ["nav_loop"], "nav_eval_mpi": ["gsnav-eval"],
         **{f"examples/python/{name}.py": ["examples/python/pointnav_worlds.py"]
-           for name in ("train_pointnav", "play_pointnav", "pointnav_speed")}}
+           for name in ("train_pointnav", "play_pointnav", "pointnav_speed", "pointnav_replay")}}
 OPTION = re.compile(r"(?<![\w-])--[a-z][\w-]*")
 BLOCK = re.compile(r"^( *)```(\w*)\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
 INDENTED = re.compile(r"(?:(?<=\n\n)|\A)(?: {4}.*\n(?:\n(?= {4}))?)+", re.MULTILINE)

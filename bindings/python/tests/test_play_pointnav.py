@@ -5,12 +5,14 @@ import pathlib
 import subprocess
 import sys
 
+import numpy as np
+import pytest
+
 FOLDER = pathlib.Path(__file__).parents[3] / "examples" / "python"
 
 
-def play(*words):
-    return subprocess.run([sys.executable, FOLDER / "play_pointnav.py", "--device", "cpu", *words],
-                          capture_output=True, text=True)
+def play(*words, script="play_pointnav.py"):
+    return subprocess.run([sys.executable, FOLDER / script, "--device", "cpu", *words], capture_output=True, text=True)
 
 
 def test_the_trained_agent_reaches_goals_in_flats_it_has_never_seen():
@@ -25,3 +27,25 @@ def test_errors_say_what_to_do(tmp_path):
     assert "Train first" in play("--weights", tmp_path / "checkpoint.pt").stderr
     assert "1 or more" in play("--episodes", "0").stderr
     assert "there are" in play("--device", "tpu").stderr
+
+
+def test_a_replay_shows_the_path_step_by_step(tmp_path):
+    pytest.importorskip("matplotlib")
+    from PIL import Image, ImageSequence
+
+    out = tmp_path / "replay.webp"
+    run = play("--episodes", "33", "--steps", "6", "--every", "2", "--out", out, script="pointnav_replay.py")
+    assert run.returncode == 0, run.stderr
+    assert "episode 33, flat 65: 6 steps, success 0" in run.stdout
+    with Image.open(out) as replay:
+        pictures = [np.asarray(p.convert("RGB"), np.float64) for p in ImageSequence.Iterator(replay)]
+    assert len(pictures) == 4 and pictures[0].shape == (306, 800, 3)  # after 0, 2, 4 and 6 steps
+    for part in (slice(10, 202), slice(260, 452), slice(470, 790)):  # depth, colours, map
+        changes = [np.abs(a[26:218, part] - b[26:218, part]).max() for a, b in zip(pictures, pictures[1:])]
+        assert min(changes) > 50, (part, changes)
+
+
+def test_errors_of_the_replay_say_what_to_do():
+    pytest.importorskip("matplotlib")
+    assert "must end in .webp" in play("--out", "replay.mp4", script="pointnav_replay.py").stderr
+    assert "0 or more" in play("--episodes", "-1", script="pointnav_replay.py").stderr
