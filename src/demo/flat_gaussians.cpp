@@ -6,9 +6,8 @@
 #include <thread>
 #include <utility>
 
-#include "flat_painter.hpp"
+#include "flat_patch.hpp"
 #include "gsnav/detail/core/run_guarded.hpp"
-#include "gsnav/detail/math/curves.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/frame/sh.hpp"
 
@@ -19,45 +18,6 @@ constexpr double kSigmaPerSpacing = 0.70;  // neighbours overlap until only abou
 constexpr double kThickness = 0.0012;      // metres, one sigma
 constexpr double kOpacityLogit = 6.0;
 
-struct Tangents {
-  Vec3d ds, dt, normal;
-};
-
-/// Derivatives by central differences, inside the patch. At a pole, where they vanish, that of a
-/// neighbouring point is used.
-Tangents tangents(const Field& position, double s, double t) {
-  constexpr double h = 1e-3;
-  const auto difference = [&](double s0, double t0, double s1, double t1) {
-    return position(s1, t1) - position(s0, t0);
-  };
-  const double s0 = std::max(s - h, 0.0), s1 = std::min(s + h, 1.0);
-  const double t0 = std::max(t - h, 0.0), t1 = std::min(t + h, 1.0);
-  Tangents out{
-      difference(s0, t, s1, t) * (1.0 / (s1 - s0)), difference(s, t0, s, t1) * (1.0 / (t1 - t0)), {}};
-  out.normal = normalized(cross(out.ds, out.dt));
-  return out;
-}
-
-double row_length(const Field& position, double t, bool flat) {
-  const int pieces = flat ? 1 : 16;
-  double sum = 0;
-  Vec3d last = position(0, t);
-  for (int i = 1; i <= pieces; ++i) {
-    const Vec3d p = position(static_cast<double>(i) / pieces, t);
-    sum += norm(p - last);
-    last = p;
-  }
-  return sum;
-}
-
-double column_length(const Field& position, double s, bool flat) {
-  return row_length([&](double a, double) { return position(s, a); }, 0, flat);
-}
-
-int count_for(double length, double spacing) {
-  return std::max(1, static_cast<int>(std::lround(length / spacing)));
-}
-
 bool hidden(const std::vector<Box>& covers, const Vec3d& p) noexcept {
   return std::any_of(covers.begin(), covers.end(), [&](const Box& b) {
     return p.x >= b.low.x && p.x <= b.high.x && p.y >= b.low.y && p.y <= b.high.y && p.z >= b.low.z &&
@@ -65,45 +25,7 @@ bool hidden(const std::vector<Box>& covers, const Vec3d& p) noexcept {
   });
 }
 
-/// Tone mapping with a filmic shoulder, then sRGB encoding.
-double display(double x) noexcept { return srgb_from_linear(1.0 - std::exp(-x)); }
-
 }  // namespace
-
-/// Light over a patch. It varies slowly, so it is computed on a coarse grid and interpolated.
-class Painter::PatchLight {
- public:
-  PatchLight(const Painter& painter, const Patch& patch, double length_s, double length_t) {
-    const double cell = patch.flat && length_t * length_s > 3.0 ? 0.20 : 0.12;
-    const auto cells = [cell](double length) { return length < 0.08 ? 0 : count_for(length, cell); };
-    cells_s_ = cells(length_s);
-    cells_t_ = cells(length_t);
-    // Keep the grid a little inside, clear of things that touch the border of the patch.
-    const auto grid = [](int i, int n) { return n == 0 ? 0.5 : 0.02 + 0.96 * i / n; };
-    for (int j = 0; j <= cells_t_; ++j) {
-      for (int i = 0; i <= cells_s_; ++i) {
-        const double s = grid(i, cells_s_), t = grid(j, cells_t_);
-        light_.push_back(painter.light_at(painter.rooms_[patch.room], patch.position(s, t),
-                                          tangents(patch.position, s, t).normal));
-      }
-    }
-  }
-
-  Vec3d at(double s, double t) const {
-    const double x = std::clamp((s - 0.02) / 0.96, 0.0, 1.0) * cells_s_;
-    const double y = std::clamp((t - 0.02) / 0.96, 0.0, 1.0) * cells_t_;
-    const int i = std::clamp(static_cast<int>(x), 0, std::max(cells_s_ - 1, 0));
-    const int j = std::clamp(static_cast<int>(y), 0, std::max(cells_t_ - 1, 0));
-    const Vec3d* row = light_.data() + j * (cells_s_ + 1) + i;
-    const Vec3d* next = row + (cells_t_ > 0 ? cells_s_ + 1 : 0);
-    const int right = cells_s_ > 0 ? 1 : 0;
-    return lerp(lerp(row[0], row[right], x - i), lerp(next[0], next[right], x - i), y - j);
-  }
-
- private:
-  int cells_s_ = 0, cells_t_ = 0;
-  std::vector<Vec3d> light_;
-};
 
 /// Boxes of the room that may cover points of the patch.
 std::vector<Box> Painter::covers_of(const Patch& patch) const {
@@ -153,14 +75,9 @@ void Painter::emit_gaussians(const Patch& patch, const Cut& cut, std::size_t fir
       raw.quat = quat_from_matrix(axes);
       raw.log_scales = {std::log(kSigmaPerSpacing * norm(f.ds) / columns),
                         std::log(kSigmaPerSpacing * norm(f.dt) / rows), std::log(kThickness)};
-      Vec3d color = patch.color(s, t);
-      if (!patch.glows) {
-        Vec3d incoming = light->at(s, t);
-        if (sun_at(rooms_[patch.room], p, f.normal)) incoming += Vec3d{2.3, 2.0, 1.5} * 0.8;
-        color = {color.x * incoming.x, color.y * incoming.y, color.z * incoming.z};
-      }
+      const Vec3d color = shown(patch, light ? &*light : nullptr, s, t, f.normal);
       for (int k = 0; k < 3; ++k) {
-        raw.sh0[static_cast<std::size_t>(k)] = static_cast<float>((display(color[k]) - 0.5) / kSh0);
+        raw.sh0[static_cast<std::size_t>(k)] = static_cast<float>((color[k] - 0.5) / kSh0);
       }
       out.rows.push_back(raw);
       if (bands == 0) continue;
@@ -312,10 +229,11 @@ Result<DefaultScene> Painter::finish(const SceneSampling& sampling) const {
     const Result<Cut> cut = sampling.gaussians > 0 ? cut_into(sampling.gaussians, pool)
                                                    : cut_at(1.07 / std::sqrt(sampling.density), pool);
     if (!cut) return cut.status();
+    for (const Patch& p : patches_) emit_triangles(p, scene);
+    if (sampling.kind == SurfaceKind::mesh) return emit_painted(*cut, sampling, pool, scene);
     GaussianCloudBuilder builder(sampling.sh_degree, "default scene");
     builder.reserve(cut->gaussians);
     if (Status made = emit(*cut, sampling, pool, builder); !made) return made;
-    for (const Patch& p : patches_) emit_triangles(p, scene);
     scene.bounds = builder.report().bounds;
     scene.cloud = std::move(builder.cloud());
     sort_spatially(scene.cloud);

@@ -146,6 +146,13 @@ class Painter {
   void write_sheen(const Room& room, const Vec3d& p, const Vec3d& normal, int sh_degree,
                    float* shN) const noexcept;
   static void emit_triangles(const Patch& patch, DefaultScene& scene);
+  /// Display-referred colour of a point of the patch. `light` is null if it glows.
+  Vec3d shown(const Patch& patch, const PatchLight* light, double s, double t,
+              const Vec3d& normal) const;
+  /// Appends the patch as a grid of triangles, whose vertices are as far apart as Gaussians.
+  void emit_painted(const Patch& patch, double stretch, TexturedPart& out) const;
+  Status emit_painted(const Cut& cut, const SceneSampling& sampling, ThreadPool& pool,
+                      DefaultScene& scene) const;
 
   std::vector<Room> rooms_;
   std::vector<Patch> patches_;

@@ -12,6 +12,7 @@
 #include "gsnav/detail/avatar/trajectory.hpp"
 #include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/detail/demo/humanoid.hpp"
+#include "gsnav/detail/scene/placed_meshes.hpp"
 
 namespace gsnav {
 namespace {
@@ -79,7 +80,16 @@ Result<SimulatorScene> inhabited(Result<DefaultScene> flat, std::size_t people, 
   auto mesh = build(task.agent_radius, task.agent_height);
   if (!mesh) return mesh.status();
   SimulatorScene scene;
-  scene.assets.push_back({std::make_shared<const GaussianCloud>(std::move(flat->cloud)), {}});
+  if (flat->painted.geometry.triangles.empty()) {
+    scene.assets.push_back({std::make_shared<const GaussianCloud>(std::move(flat->cloud)), {}});
+  } else {
+    TexturedScene surface;
+    surface.parts.push_back(std::move(flat->painted));
+    surface.instances.push_back({});
+    auto placed = placed_meshes(std::move(surface));
+    if (!placed) return placed.status();
+    scene.meshes.push_back({std::make_shared<const PlacedMeshes>(std::move(*placed)), {}});
+  }
   scene.navmesh = std::make_shared<const NavMesh>(std::move(*mesh));
   if (people == 0) return scene;
   const auto walkways = build(0.3, 1.8);
@@ -143,11 +153,12 @@ Result<SimulatorScene> default_simulator_scene(std::size_t people, std::uint64_t
 
 Result<SimulatorScene> planned_simulator_scene(const FloorPlanOptions& plan, std::size_t people,
                                                std::uint64_t seed, double density,
-                                               const TaskConfig& task) {
+                                               const TaskConfig& task, SurfaceKind kind) {
   const auto drawn = make_floor_plan(plan);
   if (!drawn) return drawn.status();
   SceneSampling sampling;
   sampling.density = density;
+  sampling.kind = kind;
   return inhabited(make_planned_scene(*drawn, sampling), people, seed, density, task);
 }
 

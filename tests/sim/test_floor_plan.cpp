@@ -10,6 +10,8 @@
 
 #include "gsnav/demo.hpp"
 #include "gsnav/detail/core/pool_backend.hpp"
+#include "gsnav/detail/math/curves.hpp"
+#include "gsnav/frame/sh.hpp"
 #include "gsnav/nav.hpp"
 #include "sim/plan_floor.hpp"
 #include "support/random_cases.hpp"
@@ -162,6 +164,61 @@ TEST_CASE("floor plans: a seed gives one scene on any number of threads, another
   CHECK(a.cloud.sh0 == b.cloud.sh0);
   CHECK(a.vertices == b.vertices);
   CHECK(a.vertices != make_planned_scene(plan_of(6, 2), sampling).value().vertices);
+}
+
+TEST_CASE("floor plans: the mesh has the area of the surfaces and the colours of the Gaussians") {
+  SceneSampling sampling;
+  sampling.density = 0.3;
+  const DefaultScene splats = make_planned_scene(plan_of(5, 2), sampling).value();
+  CHECK(splats.painted.geometry.triangles.empty());
+  sampling.kind = SurfaceKind::mesh;
+  sampling.threads = 1;
+  const DefaultScene mesh = make_planned_scene(plan_of(5, 2), sampling).value();
+  CHECK(mesh.cloud.size() == 0);
+  CHECK(mesh.vertices == splats.vertices);
+  const TriangleMesh& fine = mesh.painted.geometry;
+  REQUIRE(fine.vertices.size() == mesh.painted.colors.size());
+
+  const auto area = [](const auto& vertices, const auto& triangles) {
+    double sum = 0;
+    for (const auto& [i, j, k] : triangles) {
+      const auto a = vec_cast<double>(vertices[i]), b = vec_cast<double>(vertices[j]),
+                 c = vec_cast<double>(vertices[k]);
+      sum += 0.5 * norm(cross(b - a, c - a));
+    }
+    return sum;
+  };
+  const double coarse = area(mesh.vertices, mesh.triangles);
+  CHECK(area(fine.vertices, fine.triangles) > 0.999 * coarse);
+  CHECK(area(fine.vertices, fine.triangles) < 1.02 * coarse);  // round things are rounder
+
+  std::vector<double> differences;
+  double bias = 0, farthest = 0;
+  for (std::size_t i = 0; i < splats.cloud.size(); i += 101) {
+    const Vec3d mean = splats.cloud.mean(i);
+    std::size_t nearest = 0;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t v = 0; v < fine.vertices.size(); ++v) {
+      const Vec3d d = vec_cast<double>(fine.vertices[v]) - mean;
+      if (dot(d, d) < least) least = dot(d, d), nearest = v;
+    }
+    farthest = std::max(farthest, std::sqrt(least));
+    const double red = 0.5 + kSh0 * splats.cloud.sh0[3 * i];
+    differences.push_back(srgb_from_linear(double{mesh.painted.colors[nearest].x}) - red);
+    bias += differences.back();
+    differences.back() = std::abs(differences.back());
+  }
+  std::sort(differences.begin(), differences.end());
+  REQUIRE(differences.size() > 500);
+  CHECK(farthest < 0.15);
+  // Vertices lie between Gaussians, where wood and cloth have other colours.
+  CHECK(differences[differences.size() / 2] < 0.05);
+  CHECK(std::abs(bias) < 0.01 * static_cast<double>(differences.size()));
+
+  sampling.threads = 4;
+  const DefaultScene again = make_planned_scene(plan_of(5, 2), sampling).value();
+  CHECK(again.painted.geometry.vertices == fine.vertices);
+  CHECK(again.painted.colors == mesh.painted.colors);
 }
 
 TEST_CASE("floor plans: what is built stays on the footprints and within the walls") {

@@ -174,7 +174,10 @@ void bind_scene(nb::module_& m) {
           "avatar_count", [](const SimulatorScene& s) { return s.avatars.size(); }, "Number of people.")
       .def_prop_ro(
           "asset_count", [](const SimulatorScene& s) { return s.assets.size(); },
-          "Number of sets of static Gaussians.");
+          "Number of sets of static Gaussians.")
+      .def_prop_ro(
+          "mesh_count", [](const SimulatorScene& s) { return s.meshes.size(); },
+          "Number of triangle meshes.");
   bind_options(m);
 
   bind_opened_scene(m);

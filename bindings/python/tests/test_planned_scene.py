@@ -29,6 +29,22 @@ def test_people_walk_on_the_floor_of_the_flat():
         assert path.length == pytest.approx(episode.geodesic_distance) and path.length >= 2
 
 
+def test_a_flat_of_triangles_looks_like_that_of_gaussians():
+    plan, kinds = gsnav.FloorPlanOptions(seed=5, rooms=2), (gsnav.SurfaceKind.gaussians, gsnav.SurfaceKind.mesh)
+    scenes = [gsnav.planned_simulator_scene(plan, kind=kind) for kind in kinds]
+    assert [(s.asset_count, s.mesh_count) for s in scenes] == [(1, 0), (0, 1)]
+    surfaces = [s.navmesh.surface() for s in scenes]
+    assert all(np.array_equal(a, b) for a, b in zip(*surfaces))
+    # Both in one batch, with the same poses.
+    episodes = gsnav.generate_episodes(scenes[0].navmesh, 8, 1)
+    config = gsnav.BatchConfig(sensors=gsnav.rgbd_sensors(64, 64))
+    seen = gsnav.BatchSimulator("cpu", scenes, config, 16,
+                                lambda e, n: gsnav.BatchEpisode(scene=e % 2, episode=episodes[e // 2])).reset()
+    apart = {name: np.abs(image[::2] - image[1::2]) for name, image in seen.images.items()}
+    assert np.median(apart["depth"]) < 0.005 and np.mean(apart["depth"] > 0.1) < 0.1
+    assert apart["rgb"].mean() < 0.06
+
+
 def test_wrong_options_are_named():
     with pytest.raises(gsnav.InvalidArgument, match="rooms = 13"):
         gsnav.planned_simulator_scene(gsnav.FloorPlanOptions(rooms=13))

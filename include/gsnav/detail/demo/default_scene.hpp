@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
+#include "gsnav/detail/scene/textured_scene.hpp"
 #include "gsnav/math/aabb.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
@@ -21,7 +22,10 @@ struct DefaultScene {
   GaussianCloud cloud;                                  ///< The Gaussians, with baked light.
   std::vector<Vec3d> vertices;                          ///< The same surfaces as a mesh, metres.
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< Counter-clockwise seen from the front.
-  Aabb<double> bounds{};                                ///< Box of the Gaussians' means.
+  Aabb<double> bounds{};  ///< Box of the Gaussians' means, or of the vertices of `painted`.
+  /// The same surfaces in finer triangles, in place of `cloud`, with SurfaceKind::mesh. Its vertices
+  /// have the colours of Gaussians, with baked light.
+  TexturedPart painted{};
 };
 
 /// A viewpoint in the flat that shows a room.
@@ -37,6 +41,12 @@ std::array<DefaultView, 4> default_scene_views() noexcept;
 /// degree 3.
 inline constexpr std::size_t kMostSceneGaussians = 50'000'000;
 
+/// Material of a generated scene.
+enum class SurfaceKind {
+  gaussians,  ///< Gaussians: DefaultScene::cloud.
+  mesh,       ///< Triangles: DefaultScene::painted.
+};
+
 /// How densely the surfaces of a generated scene are covered with Gaussians. Gaussians are as wide as
 /// their spacing requires, so surfaces stay closed; the mesh does not change. Images look alike from a
 /// density of 0.3 on; below that, edges blur.
@@ -49,6 +59,8 @@ struct SceneSampling {
   /// SH degree of the colours, 0 to 3. Above 0, surfaces have a sheen: they are brighter in directions
   /// that mirror the light of windows and lamps. The average over all directions is as with degree 0.
   int sh_degree = 0;
+  SurfaceKind kind = SurfaceKind::gaussians;  ///< Whether Gaussians or painted triangles are made. The
+                                              ///< vertices are as far apart as the Gaussians would be.
   int threads = 0;  ///< Number of threads; 0: one for each core, at most 16. Does not change the scene.
   std::function<void(double)> progress;  ///< Called with the share of work that is done, in (0, 1], by
                                          ///< one thread.

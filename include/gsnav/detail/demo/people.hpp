@@ -30,9 +30,12 @@ Result<SimulatorScene> default_simulator_scene(std::size_t people = 3, std::uint
                                                double density = 1.0, const TaskConfig& task = {});
 
 /// The flat of make_floor_plan(`plan`) with its NavMesh for the body of `task`, and people who walk in
-/// it. `density` is that of the Gaussians of the flat and of the people. Errors: those of the parts.
+/// it. `density` is that of the Gaussians of the flat and of the people. With SurfaceKind::mesh the flat
+/// has triangles in place of Gaussians, with an equal NavMesh and equal people. Errors: those of the
+/// parts.
 Result<SimulatorScene> planned_simulator_scene(const FloorPlanOptions& plan, std::size_t people = 0,
                                                std::uint64_t seed = 1, double density = 1.0,
-                                               const TaskConfig& task = {});
+                                               const TaskConfig& task = {},
+                                               SurfaceKind kind = SurfaceKind::gaussians);
 
 }  // namespace gsnav
