@@ -14,12 +14,17 @@ import time
 
 import numpy as np
 from pointnav_policy import Policy, load, save
-from pointnav_worlds import (ACTIONS, CHANNELS, HELD_OUT_SEEDS, METRICS, Worlds, device_of, goals, sensors_of,
-                             world_arguments)
+from pointnav_worlds import (ACTIONS, CHANNELS, HELD_OUT_SEEDS, METRICS, Worlds, device_of, goals, images_of,
+                             sensors_of, world_arguments)
 
 import gsnav
 
 WEIGHTS = pathlib.Path(__file__).with_name("pointnav_depth.npz")
+
+
+def sensor_of(policy: Policy | None) -> str:
+    """Name of the policy's sensor."""
+    return next((name for name, c in CHANNELS.items() if policy is not None and c == policy.channels), "depth")
 
 
 def evaluate(args: argparse.Namespace, worlds: Worlds, name: str, policy: Policy | None) -> dict[str, float]:
@@ -44,7 +49,7 @@ def evaluate(args: argparse.Namespace, worlds: Worlds, name: str, policy: Policy
     shown = time.monotonic()
     while len(rows) < args.episodes:
         if policy is not None:
-            log_p, hidden = policy.act(seen.images.get(args.sensor), goals(seen), actions, start, hidden)
+            log_p, hidden = policy.act(images_of(seen, args, blind), goals(seen), actions, start, hidden)
             noise = rng.gumbel(size=log_p.shape) if name == "agent" else 0
             actions = (log_p + noise).argmax(-1)
         elif name == "random":
@@ -84,7 +89,7 @@ def main() -> None:
     if policy is not None and args.save_weights:
         return save(policy, args.save_weights)
     args.size = policy.size if policy is not None else 64
-    args.sensor = "rgb" if policy is not None and policy.channels == CHANNELS["rgb"] else "depth"
+    args.sensor = sensor_of(policy)
     worlds = Worlds(HELD_OUT_SEEDS, args, -(-args.episodes // len(HELD_OUT_SEEDS)))
     print("| policy | " + " | ".join(METRICS) + " |\n" + "|---" * (len(METRICS) + 1) + "|")
     for name in args.policies:

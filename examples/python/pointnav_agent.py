@@ -19,13 +19,13 @@ import gsnav
 
 # [snippet: rows]
 class Rows:
-    """Memory of a rollout's images, [T + 1][N][H][W][C]. The simulator draws into row `at`."""
+    """Memory of a rollout's images, [T + 1][N][H][W][C] per sensor. The simulator draws into row `at`."""
 
-    def __init__(self, images: Tensor) -> None:
+    def __init__(self, images: list[Tensor]) -> None:
         self.images, self.at = images, 0
 
     def __call__(self, sensor: int, floats: int) -> Tensor:
-        return self.images[self.at]
+        return self.images[sensor][self.at]
 # [/snippet]
 
 
@@ -36,9 +36,10 @@ class Mirror:
         self.of = on & ((first + np.arange(environments)) % 2 == 1)
         self.where = torch.from_numpy(self.of)[:, None, None, None].to(device) if on else None
 
-    def images(self, images: Tensor) -> Tensor:
-        """Images [...][N][H][W][C], as the agent sees them."""
-        return images if self.where is None else torch.where(self.where, images.flip(-2), images)
+    def images(self, images: list[Tensor]) -> list[Tensor]:
+        """Images [...][N][H][W][C] of each sensor, as the agent sees them."""
+        where = self.where
+        return images if where is None else [torch.where(where, i.flip(-2), i) for i in images]
 
     def goals(self, goals: np.ndarray) -> np.ndarray:
         """Goals [N][3] as the agent sees them: their sines, the last numbers, are negated in place."""
@@ -60,8 +61,8 @@ class Agent(nn.Module):
             layers = [nn.Conv2d(channels, 32, 8, 4), nn.Conv2d(32, 64, 4, 2), nn.Conv2d(64, 32, 3, 1)]
             self.cnn = nn.Sequential(*(part for layer in layers for part in (layer, nn.ReLU())), nn.Flatten())
             with torch.no_grad():
-                if channels == 1:
-                    layers[0].weight.div_(10.0)  # depth in units of 10 m, without a pass over the images
+                if channels != 3:
+                    layers[0].weight[:, -1].div_(10.0)  # depth in units of 10 m, without a pass over the images
                 length = self.cnn(torch.zeros(1, *self.shape)).shape[1]
             self.image = nn.Sequential(nn.Linear(length, 256), nn.ReLU())
         self.goal, self.last = nn.Linear(3, 32), nn.Embedding(ACTIONS + 1, 32)
@@ -70,12 +71,13 @@ class Agent(nn.Module):
         with torch.no_grad():
             self.policy.weight.mul_(0.01)
 
-    def features(self, images: Tensor, goal: Tensor, last: Tensor) -> Tensor:
-        """Inputs of the GRU for images [B][H][W][C], goals [B][3] and last actions [B]."""
+    def features(self, images: list[Tensor], goal: Tensor, last: Tensor) -> Tensor:
+        """Inputs of the GRU for images [B][H][W][C] of each sensor, goals [B][3] and last actions [B]."""
         parts = [self.goal(goal), self.last(last)]
         if self.cnn is not None:
             c, h, w = self.shape
-            rows = images.view(-1, c, h, w) if c == 1 else images.view(-1, h, w, c).movedim(-1, 1)
+            seen = images[0] if len(images) == 1 else torch.cat(images, -1)
+            rows = seen.view(-1, c, h, w) if c == 1 else seen.view(-1, h, w, c).movedim(-1, 1)
             parts.append(self.image(self.cnn(rows)))
         return torch.cat(parts, -1)
 
@@ -83,7 +85,7 @@ class Agent(nn.Module):
         """Logarithms of the actions' probabilities, [B][4], and values, [B]."""
         return torch.log_softmax(self.policy(y), -1), self.value(y)[:, 0]
 
-    def act(self, images: Tensor, goal: Tensor, last: Tensor, start: Tensor, hidden: Tensor,
+    def act(self, images: list[Tensor], goal: Tensor, last: Tensor, start: Tensor, hidden: Tensor,
             noise: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Samples actions: actions, their log-probabilities, values and hidden states."""
         last = torch.where(start > 0, ACTIONS, last)

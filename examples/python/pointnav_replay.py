@@ -15,9 +15,9 @@ from collections.abc import Iterator
 import matplotlib
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
-from play_pointnav import WEIGHTS
+from play_pointnav import WEIGHTS, sensor_of
 from pointnav_policy import Policy, load
-from pointnav_worlds import CHANNELS, HELD_OUT_SEEDS, Worlds, device_of, goals, sensors_of, world_arguments
+from pointnav_worlds import HELD_OUT_SEEDS, Worlds, device_of, goals, images_of, sensors_of, world_arguments
 
 import gsnav
 
@@ -47,10 +47,11 @@ def play(args: argparse.Namespace, policy: Policy, number: int) -> tuple[Worlds,
     simulator = worlds.simulator(args, 1, [*sensors_of(args, not policy.channels), VIEW],
                                  lambda environment, count: worlds.episodes[k], memory=gsnav.ImageMemory.host)
     seen, start = simulator.reset(), np.ones(1, np.bool_)
-    hidden, action, moments = np.zeros((1, 256), np.float32), np.zeros(1, np.int64), []
+    hidden, action = np.zeros((1, 256), np.float32), np.zeros(1, np.int64)
+    moments: list[Moment] = []
     world = simulator.world(0)
     while not moments or moments[-1].end is None:
-        agent, images = world.agent, seen.images.get(args.sensor)
+        agent, images = world.agent, images_of(seen, args, not policy.channels)
         moments.append(Moment(seen.images["view"][0].copy() if images is None else images[0].copy(),
                               seen.images["view"][0].copy(), agent.position, agent.forward(), world.distance_to_goal,
                               world.metrics() if world.done else None))
@@ -181,7 +182,7 @@ def main() -> None:
         p.error(f"--out {args.out}: the name must end in .webp")
     args.device = device_of(args.device).name
     policy = load(args.weights)
-    args.size, args.sensor = policy.size, "rgb" if policy.channels == CHANNELS["rgb"] else "depth"
+    args.size, args.sensor = policy.size, sensor_of(policy)
     pictures, times = zip(*frames(args, policy))
     pictures[0].save(args.out, save_all=True, append_images=pictures[1:], duration=list(times), loop=0,
                      quality=args.compression, method=6)

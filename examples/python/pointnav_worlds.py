@@ -18,7 +18,8 @@ import gsnav
 
 ACTIONS = 4  # stop, forward, left, right
 LEFT, RIGHT = int(gsnav.Action.turn_left), int(gsnav.Action.turn_right)
-CHANNELS = {"depth": 1, "rgb": 3}  # numbers per pixel of a sensor
+SENSORS = {"depth": ("depth",), "rgb": ("rgb",), "rgbd": ("rgb", "depth")}  # images of an agent's sensor, in order
+CHANNELS = {"depth": 1, "rgb": 3, "rgbd": 4}  # numbers per pixel
 TRAIN_SEEDS, HELD_OUT_SEEDS = range(64), range(64, 80)
 METRICS = ("success", "spl", "soft_spl", "collision_rate", "psi", "steps")
 
@@ -34,11 +35,14 @@ class Worlds:
 
         def make(seed: int) -> tuple[gsnav.SimulatorScene, list[gsnav.PointNavEpisode]]:
             plan = gsnav.FloorPlanOptions(seed=seed, rooms=args.rooms)
-            scene = gsnav.planned_simulator_scene(plan, args.people, seed, args.density, self.task)
+            mesh = args.worlds == "meshes" or args.worlds == "both" and seed % 2 == 1
+            kind = gsnav.SurfaceKind.mesh if mesh else gsnav.SurfaceKind.gaussians
+            scene = gsnav.planned_simulator_scene(plan, args.people, seed, args.density, self.task, kind)
             assert scene.navmesh is not None
             if self.lod is not None:
                 assets = scene.assets
                 for asset in assets:
+                    assert asset.cloud is not None
                     asset.lod = gsnav.build_lod("cpu:1", asset.cloud)
                 scene = gsnav.SimulatorScene(scene, assets=assets)
             return scene, list(gsnav.generate_episodes(scene.navmesh, episodes, seed))
@@ -85,9 +89,15 @@ class Draw:
 
 
 def sensors_of(args: argparse.Namespace, blind: bool) -> list[gsnav.SensorSpec]:
-    """The sensor of an agent, none if it is blind."""
-    spec = gsnav.SensorSpec(uuid=args.sensor, kind=gsnav.SensorKind[args.sensor], resolution=[args.size, args.size])
-    return [] if blind else [spec]
+    """The sensors of an agent, none if it is blind."""
+    return [gsnav.SensorSpec(uuid=name, kind=gsnav.SensorKind[name], resolution=[args.size, args.size])
+            for name in SENSORS[args.sensor] if not blind]
+
+
+def images_of(seen: gsnav.BatchStep, args: argparse.Namespace, blind: bool) -> np.ndarray | None:
+    """Images as the agent sees them, [N][H][W][C], or None if it is blind."""
+    images = [seen.images[name] for name in SENSORS[args.sensor] if not blind]
+    return (images[0] if len(images) == 1 else np.concatenate(images, -1)) if images else None
 
 
 def goals(seen: gsnav.BatchStep) -> np.ndarray:
@@ -102,6 +112,8 @@ def world_arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--people", type=int, default=0, help="people in each flat")
     p.add_argument("--density", type=float, default=0.05, help="factor on the number of Gaussians")
     p.add_argument("--rooms", type=int, default=4, help="rooms of a flat")
+    p.add_argument("--worlds", default="gaussians", choices=["gaussians", "meshes", "both"],
+                   help="what flats are made of; both: every other flat is a mesh")
     p.add_argument("--quality", default="exact", choices=["exact", "fast", "lod"],
                    help="error budget of the images, or levels of detail")
 

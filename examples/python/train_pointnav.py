@@ -39,7 +39,7 @@ GAMMA, LAMBDA, CLIP, VALUE_COEF, ENTROPY_COEF, MAX_NORM = 0.99, 0.95, 0.2, 0.5, 
 # Arguments that a checkpoint keeps: with others, training would not go on as it began.
 KEPT = ("seed", "flats", "episodes_per_flat", "people", "blind", "size", "density", "rooms", "environments",
         "rollout", "chunks", "epochs", "lr", "horizon", "every", "cut_off", "ranks", "quality", "success",
-        "critic_updates", "sensor", "mirror")
+        "critic_updates", "sensor", "mirror", "worlds")
 
 
 class Learner:
@@ -52,15 +52,15 @@ class Learner:
         self.optimizer = torch.optim.Adam(agent.parameters(), args.lr, eps=1e-5, fused=self.device.type == "cuda")
         self.update_count, self.digest = 0, b""
         self.draw = Draw(worlds, args.seed, self.rank * n)
-        size = 0 if args.blind else args.size
+        sensors = sensors_of(args, args.blind)
 
         def made(*shape: int, dtype: torch.dtype = torch.float32, host: bool = False) -> Tensor:
             pinned = host and self.device.type == "cuda"
             return torch.zeros(*shape, dtype=dtype, device="cpu" if host else self.device, pin_memory=pinned)
 
-        self.images = made(t + 1, n, size, size, CHANNELS[args.sensor])
+        self.images = [made(t + 1, n, *spec.resolution, CHANNELS[spec.uuid]) for spec in sensors]
         self.rows, self.mirror = Rows(self.images), Mirror(args.mirror, self.rank * n, n, self.device)
-        self.simulator = worlds.simulator(args, n, sensors_of(args, args.blind), self.draw, self.rows)
+        self.simulator = worlds.simulator(args, n, sensors, self.draw, self.rows)
         self.goal, self.start = made(t + 1, n, 3), made(t + 1, n)
         self.action, self.log_p, self.values = made(t, n, dtype=torch.int64), made(t, n), made(t + 1, n)
         self.last, self.hidden, self.noise = made(t + 1, n, dtype=torch.int64), made(n, 256), made(t + 1, n, ACTIONS)
@@ -119,8 +119,9 @@ class Learner:
         self.start[t].copy_(self.host_start[t], non_blocking=True)
         if t < steps and t % (steps // self.args.chunks) == 0:
             self.first_hidden[t * self.args.chunks // steps].copy_(self.hidden)
-        action, log_p, value, hidden = self.agent.act(self.mirror.images(self.images[t]), self.goal[t], self.last[t],
-                                                      self.start[t], self.hidden, self.noise[t])
+        images = self.mirror.images([i[t] for i in self.images])
+        action, log_p, value, hidden = self.agent.act(images, self.goal[t], self.last[t], self.start[t], self.hidden,
+                                                      self.noise[t])
         self.values[t].copy_(value)
         if t < steps:
             self.action[t].copy_(action), self.log_p[t].copy_(log_p), self.last[t + 1].copy_(action)
@@ -202,7 +203,7 @@ class Learner:
             return values[rows].reshape(-1)[order]
 
         last = torch.where(self.start[rows] > 0, ACTIONS, self.last[rows])
-        images = self.mirror.images(self.images[rows])
+        images = self.mirror.images([i[rows] for i in self.images])
         x = self.agent.features(images, self.goal[rows].reshape(-1, 3), last.reshape(-1))
         x = Reorder.apply(x, order, inverse)  # type: ignore[no-untyped-call]
         hidden = self.first_hidden[chunk][env] * (1 - fresh)[:, None]
@@ -251,7 +252,8 @@ class Learner:
                 nn.utils.clip_grad_norm_(parameters, MAX_NORM)
                 self.optimizer.step()
         self.last[0].copy_(self.last[self.used])
-        self.images[0].copy_(self.images[self.used])
+        for images in self.images:
+            images[0].copy_(images[self.used])
         self.observe(0, self.starts)
         self.update_count += 1
         self.losses /= self.args.epochs * self.args.chunks

@@ -89,27 +89,55 @@ def test_errors_say_what_to_do(first, tmp_path):
     assert "multiple of --chunks" in refused("--chunks", "3")
 
 
-def test_the_policy_in_numpy_is_the_agent(first, monkeypatch, tmp_path):
+@pytest.fixture(scope="module")
+def mixture(tmp_path_factory):
+    """Folder of three updates from colours and depth, in a flat of Gaussians and one of triangles."""
+    out = tmp_path_factory.mktemp("mixture")
+    trained(out, *RGBD, "--worlds", "both", updates=3, every=3)
+    return out
+
+
+RGBD = ["--sensor", "rgbd", "--size", "48", "--quality", "fast"]
+
+
+def test_flats_of_gaussians_and_of_triangles_train_an_agent(mixture, tmp_path):
+    for worlds in ("gaussians", "meshes"):
+        trained(tmp_path / worlds, *RGBD, "--worlds", worlds, updates=3, every=3)
+    made = [weights(folder)["cnn.0.weight"] for folder in (mixture, tmp_path / "gaussians", tmp_path / "meshes")]
+    assert all(w.shape == (32, 4, 8, 8) for w in made)
+    assert not torch.equal(made[0], made[1]) and not torch.equal(made[1], made[2])
+    run = subprocess.run([sys.executable, FOLDER / "play_pointnav.py", "--device", "cpu:1", "--worlds", "meshes",
+                          "--quality", "fast", "--weights", mixture / "checkpoint.pt", "--episodes", "2",
+                          "--policies", "agent", "follower"], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert [line.split("|")[1].strip() for line in run.stdout.splitlines()[2:]] == ["agent", "follower"]
+
+
+@pytest.mark.parametrize("name,size,channels", [("first", 64, 1), ("mixture", 48, 4)])
+def test_the_policy_in_numpy_is_the_agent(name, size, channels, request, monkeypatch, tmp_path):
     monkeypatch.syspath_prepend(FOLDER)
     from pointnav_agent import Agent
     from pointnav_policy import load, save
 
-    state = torch.load(first[0] / "checkpoint.pt", weights_only=True)
-    agent = Agent(64, channels=1)
+    folder = request.getfixturevalue(name)
+    path = (folder if channels == 4 else folder[0]) / "checkpoint.pt"
+    state = torch.load(path, weights_only=True)
+    agent = Agent(size, channels)
     agent.load_state_dict(state["agent"])
-    policy = load(first[0] / "checkpoint.pt")
+    policy = load(path)
     rng = np.random.default_rng(1)
-    depth, goal = rng.uniform(0, 8, (5, 64, 64, 1)), rng.normal(size=(5, 3))
+    seen, goal = rng.uniform(0, 8, (5, size, size, channels)), rng.normal(size=(5, 3))
     last, start, hidden = rng.integers(0, 4, 5), np.arange(5) % 3 == 0, rng.normal(size=(5, 256))
-    depth, goal, hidden = (x.astype(np.float32) for x in (depth, goal, hidden))
-    log_p, next_hidden = policy.act(depth, goal, last, start, hidden)
+    seen, goal, hidden = (x.astype(np.float32) for x in (seen, goal, hidden))
+    log_p, next_hidden = policy.act(seen, goal, last, start, hidden)
     with torch.no_grad():
-        inputs = agent.features(*(torch.from_numpy(x) for x in (depth, goal, np.where(start, 4, last))))
+        images = [torch.from_numpy(x) for x in np.split(seen, [3] if channels == 4 else [], -1)]
+        inputs = agent.features(images, torch.from_numpy(goal), torch.from_numpy(np.where(start, 4, last)))
         y, state = agent.gru(inputs[None], torch.from_numpy(hidden * ~start[:, None])[None])
         expected, _ = agent.heads(y[0])
     assert np.abs(log_p - expected.numpy()).max() < 1e-5 and np.abs(next_hidden - state[0].numpy()).max() < 1e-5
     save(policy, tmp_path / "policy.npz")
-    assert np.abs(load(tmp_path / "policy.npz").act(depth, goal, last, start, hidden)[0] - log_p).max() < 0.01
+    assert np.abs(load(tmp_path / "policy.npz").act(seen, goal, last, start, hidden)[0] - log_p).max() < 0.01
 
 
 def test_the_speed_of_the_environments_is_printed():
@@ -137,7 +165,7 @@ def test_turns_of_a_mirrored_environment_are_seen_mirrored(monkeypatch):
         return np.degrees(np.arctan2(sine, cosine))
 
     def images(step):
-        return mirror.images(torch.from_numpy(step.images["depth"].copy())).numpy()[..., 0]
+        return mirror.images([torch.from_numpy(step.images["depth"].copy())])[0].numpy()[..., 0]
 
     before = simulator.reset()
     first = angles(before)
