@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import os
 import pathlib
 import sys
 from typing import Any
@@ -150,6 +151,15 @@ def devices_of(name: str) -> tuple[str, torch.device]:
         sys.exit(f"--device {device.name}: this torch has no CUDA. Install one that has, or use --device cpu.")
     torch.cuda.set_device(device.index)
     return device.name, torch.device("cuda", device.index)
+
+
+def set_determinism(on: bool) -> None:
+    """Settings of torch, before its first use of a GPU: the same bits in each run, or its fastest algorithms."""
+    if on:
+        os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # cuBLAS is deterministic with it only
+    torch.use_deterministic_algorithms(on)  # also fills new memory
+    torch.backends.cudnn.benchmark = not on
+    torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = True
 
 
 def progress(log: list[dict[str, float]], updates: int, rate: float) -> None:

@@ -19,15 +19,14 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # cuBLAS is deterministic with it only
-
 try:
     import torch
 except ImportError:
     sys.exit("train_pointnav.py needs PyTorch: pip install torch")
 import numpy as np
 import torch.distributed as dist
-from pointnav_agent import Agent, Mirror, Reorder, Rows, clear, devices_of, hash_of, pieces, progress, write_log
+from pointnav_agent import (Agent, Mirror, Reorder, Rows, clear, devices_of, hash_of, pieces, progress,
+                            set_determinism, write_log)
 from pointnav_worlds import (ACTIONS, CHANNELS, METRICS, TRAIN_SEEDS, Draw, Worlds, goals, mixed, sensor_arguments,
                              sensors_of, world_arguments)
 from torch import Tensor, nn
@@ -39,7 +38,7 @@ GAMMA, LAMBDA, CLIP, VALUE_COEF, ENTROPY_COEF, MAX_NORM = 0.99, 0.95, 0.2, 0.5, 
 # Arguments that a checkpoint keeps: with others, training would not go on as it began.
 KEPT = ("seed", "flats", "episodes_per_flat", "people", "blind", "size", "density", "rooms", "environments",
         "rollout", "chunks", "epochs", "lr", "horizon", "every", "cut_off", "ranks", "quality", "success",
-        "critic_updates", "sensor", "mirror", "worlds")
+        "critic_updates", "sensor", "mirror", "worlds", "not_deterministic")
 
 
 class Learner:
@@ -362,6 +361,7 @@ def arguments() -> argparse.Namespace:
     p.add_argument("--cut-off", type=float, default=1.0, help="fraction of ranks whose end ends the rollouts of the "
                    "others. DD-PPO has 0.6; below 1, runs on several ranks are not reproducible")
     p.add_argument("--mirror", action="store_true", help="swap left and right in every other environment")
+    p.add_argument("--not-deterministic", action="store_true", help="let PyTorch choose algorithms by speed alone")
     p.add_argument("--success", type=float, default=2.5, help="reward for a success")
     world_arguments(p)
     sensor_arguments(p)
@@ -381,8 +381,7 @@ def main() -> None:
         args.device = f"cuda:{local}"
     args.device, args.torch_device = devices_of(args.device)
     cuda = args.torch_device.type == "cuda"
-    torch.use_deterministic_algorithms(True)
-    torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = True
+    set_determinism(not args.not_deterministic)
     if local >= 0:
         dist.init_process_group("nccl" if cuda else "gloo")
     args.ranks = dist.get_world_size() if local >= 0 else 1

@@ -85,6 +85,8 @@ def test_errors_say_what_to_do(first, tmp_path):
         return run.stderr
 
     assert "another folder" in refused(*TINY, "--out", first[0], "--people", "1")
+    same = [*TINY, "--environments", "4", "--every", "5", "--out", first[0]]
+    assert "--not-deterministic True" in refused(*same, "--not-deterministic")
     assert "there are" in refused("--device", "tpu", "--out", tmp_path)
     assert "multiple of --chunks" in refused("--chunks", "3")
 
@@ -138,6 +140,22 @@ def test_the_policy_in_numpy_is_the_agent(name, size, channels, request, monkeyp
     assert np.abs(log_p - expected.numpy()).max() < 1e-5 and np.abs(next_hidden - state[0].numpy()).max() < 1e-5
     save(policy, tmp_path / "policy.npz")
     assert np.abs(load(tmp_path / "policy.npz").act(seen, goal, last, start, hidden)[0] - log_p).max() < 0.01
+
+
+def test_determinism_is_left_out_if_asked(monkeypatch):
+    monkeypatch.syspath_prepend(FOLDER)
+    from pointnav_agent import set_determinism
+
+    name = "CUBLAS_WORKSPACE_CONFIG"
+    monkeypatch.setenv(name, "")  # so that the end of the test restores it
+    monkeypatch.delenv(name)
+    try:
+        for on in (False, True):
+            set_determinism(on)
+            assert torch.are_deterministic_algorithms_enabled() == on != torch.backends.cudnn.benchmark
+            assert os.environ.get(name) == (":4096:8" if on else None)
+    finally:
+        torch.use_deterministic_algorithms(False)
 
 
 def test_the_speed_of_the_environments_is_printed():
