@@ -243,7 +243,7 @@ class ListedRanks {
   const BatchArgs& a_;
   const RegionArgs& r_;
   std::uint32_t camera_;
-  const ViewedSet<float>* only_ = nullptr;  ///< Of a camera with one set.
+  const ViewedSet<float>* only_ = nullptr;  ///< The camera's set, if it has one only.
 };
 
 /// Puts rows of equal keys in order of rank, among n <= kHeld rows in order of key. They are sorted once

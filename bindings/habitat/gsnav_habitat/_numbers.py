@@ -34,7 +34,7 @@ def _address() -> int:
 
 @functools.lru_cache(maxsize=None)
 def _plain() -> bool:
-    """Whether the bytes behind the header of a random.Random are its whole state but for `gauss_next`."""
+    """Whether the bytes behind the header of a random.Random are its state, apart from `gauss_next`."""
     if sys.implementation.name != "cpython" or random.Random.__basicsize__ < object.__basicsize__ + _BYTES:
         return False
     numbers = random.Random(5)

@@ -106,7 +106,7 @@ class Turns:
                     key, request = asked
                     request.greenlet, request.who = greenlet, who
                     waiting.setdefault(key, []).append(request)
-                # When nobody else can ask, groups need not wait for more.
+                # When no other participant can ask, groups need not wait for more.
                 for key in [k for k, g in waiting.items() if not ready or len(g) >= min(self._together, g[0].most)]:
                     self._threads.submit(self._draw, waiting.pop(key))
                     drawing += 1
