@@ -29,6 +29,7 @@ from ._spaces import AutoresetMode, BaseVectorEnv, batch_space, make_generator
 Observation = dict[str, Any]
 
 BOOLS = {bool, np.bool_}
+MARKED_FIELDS = tuple((name, "_" + name) for name in _task.INFO_FIELDS)
 AUTO_RESETS = {"NextStep": AutoReset.next_step, "SameStep": AutoReset.same_step, "Disabled": AutoReset.disabled}
 
 
@@ -112,6 +113,8 @@ class VectorEnv(BaseVectorEnv):
         self._copy = copy
         self._all = np.ones(self.num_envs, np.bool_)
         self._all.flags.writeable = False
+        # Views of each step, made once: the simulator writes all steps to the same memory.
+        self._views: tuple[npt.NDArray[Any], ...] | None = None
         self._simulator: BatchSimulator | None = BatchSimulator(
             device, self.scenes, batch_config(config, AUTO_RESETS[mode.value]), self.num_envs, self._source, copy)
 
@@ -152,11 +155,14 @@ class VectorEnv(BaseVectorEnv):
         before any environment moves.
         """
         step = self.simulator.step(self._checked(actions))
+        if self._views is None:
+            self._views = step.infos, step.point_goals, step.rewards, step.terminated, step.truncated
+        rows, _, rewards, terminated, truncated = self._views
         infos: dict[str, Any] = {}
-        self._add_step_info(infos, step.infos, self._all)
+        self._add_step_info(infos, rows, self._all)
         if len(step.finished):
             self._add_ends(infos, step)
-        return (self._observation(step), step.rewards.copy(), step.terminated.copy(), step.truncated.copy(), infos)
+        return self._observation(step), rewards.copy(), terminated.copy(), truncated.copy(), infos
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
         """The last image of each environment's first RGB sensor, uint8 [H][W][3]. None without a render mode."""
@@ -170,7 +176,7 @@ class VectorEnv(BaseVectorEnv):
 
     def close_extras(self, **kwargs: Any) -> None:
         """Frees the simulator. Observations stay valid."""
-        self._simulator = None
+        self._simulator = self._views = None
         self._last = None
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
@@ -196,6 +202,16 @@ class VectorEnv(BaseVectorEnv):
         return mask
 
     def _checked(self, actions: Any) -> npt.NDArray[np.integer[Any]]:
+        array = actions
+        if type(array) is not np.ndarray or array.dtype.kind not in "iu" or array.shape != (self.num_envs,):
+            array = self._integers(actions)
+        if (array >> 2).any():  # 0 to 3 have two bits, and no negative number has.
+            e = int(np.argmax((array < 0) | (array >= _task.ACTIONS)))
+            raise InvalidArgument(f"VectorEnv.step: environment {e}: action {array[e]}: "
+                                  "use 0 (stop) to 3 (turn right)")
+        return array
+
+    def _integers(self, actions: Any) -> npt.NDArray[np.integer[Any]]:
         if isinstance(actions, (list, tuple)) and not BOOLS.isdisjoint(map(type, actions)):
             raise TypeError(f"VectorEnv.step: actions = {actions!r}: a bool is no action; use integers")
         if isinstance(actions, np.ma.MaskedArray):
@@ -208,16 +224,11 @@ class VectorEnv(BaseVectorEnv):
             raise TypeError(f"VectorEnv.step: actions have dtype {array.dtype}: use integers")
         if array.shape != (self.num_envs,):
             raise InvalidArgument(f"VectorEnv.step: actions have shape {array.shape}: it must be ({self.num_envs},)")
-        wrong = (array < 0) | (array >= _task.ACTIONS)
-        if wrong.any():
-            e = int(np.argmax(wrong))
-            raise InvalidArgument(f"VectorEnv.step: environment {e}: action {array[e]}: "
-                                  "use 0 (stop) to 3 (turn right)")
         return array
 
     def _observation(self, step: BatchStep) -> Observation:
         made: Observation = {**step.images, **step.on_backend}
-        made[_task.POINT_GOAL] = step.point_goals.astype(np.float32)
+        made[_task.POINT_GOAL] = (step.point_goals if self._views is None else self._views[1]).astype(np.float32)
         if self.render_mode is not None:
             self._show(made[self._rgb])
         return made
@@ -242,8 +253,8 @@ class VectorEnv(BaseVectorEnv):
                 self._add(infos, name, np.where(mask, rows[name], False), mask)
             return
         rows = rows.copy()  # one copy of all fields, and one read-only mask
-        for name in _task.INFO_FIELDS:
-            infos[name], infos["_" + name] = rows[name], mask
+        for name, mark in MARKED_FIELDS:
+            infos[name], infos[mark] = rows[name], mask
 
     def _add_ends(self, infos: dict[str, Any], step: BatchStep) -> None:
         """Adds metrics and, with SAME_STEP, the last observations and infos of the episodes that ended."""

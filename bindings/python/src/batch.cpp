@@ -16,10 +16,9 @@
 namespace gsnav::python {
 namespace {
 
-/// dtypes of structured arrays, and the arrays of a step that ends no episode. They live as long as the
-/// process.
+/// dtype of metrics, and the arrays of a step that ends no episode. They live as long as the process.
 struct Types {
-  nb::object infos = step_info_dtype(), metrics = metrics_dtype();
+  nb::object metrics = metrics_dtype();
   nb::object no_goals = array_copy(std::span<const double>(), {0, 2});
   nb::object no_metrics = structured_copy(std::span<const EpisodeMetrics>(), metrics);
 };
@@ -54,22 +53,10 @@ nb::dict step_images(std::span<const BatchObservation> images, const BatchCore& 
   });
 }
 
-nb::object bool_view(std::span<const std::uint8_t> values, nb::handle owner) {
-  return array_view(values.data(), {values.size()}, owner).attr("view")("?");
-}
-
-/// Arrays of a step. Those with a row per environment are views; others are copies, because their sizes
-/// change from step to step.
+/// Arrays of a step. Those of the episodes that ended are copies, because their sizes change from step
+/// to step.
 PythonStep step_arrays(const BatchStep& s, const BatchCore& b, nb::handle self) {
-  static_assert(sizeof(PointGoal) == 2 * sizeof(double));
-  PythonStep out;
-  const std::size_t n = s.rewards.size();
-  out.rewards = array_view(s.rewards.data(), {n}, self);
-  out.terminated = bool_view(s.terminated, self);
-  out.truncated = bool_view(s.truncated, self);
-  out.infos = structured_view(s.infos, types().infos, self);
-  out.point_goals = array_view(reinterpret_cast<const double*>(s.point_goals.data()), {n, 2}, self);
-  out.times = array_view(s.times.data(), {n}, self);
+  PythonStep out{s, nb::borrow(self), {}, {}, {}, {}, {}, {}, {}};
   std::vector<std::int64_t> finished(s.finished.begin(), s.finished.end());
   const std::size_t ended = finished.size();
   out.finished = array_from(std::move(finished), {ended});

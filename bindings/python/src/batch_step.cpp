@@ -6,8 +6,28 @@
 #include <string>
 
 #include "fields.hpp"
+#include "structured.hpp"
 
 namespace gsnav::python {
+
+namespace {
+
+nb::object bool_view(std::span<const std::uint8_t> values, nb::handle owner) {
+  return array_view(values.data(), {values.size()}, owner).attr("view")("?");
+}
+
+nb::object info_view(const PythonStep& s) {
+  static const auto* const dtype = new nb::object(step_info_dtype());  // lives as long as the process
+  return structured_view(s.info.infos, *dtype, s.owner);
+}
+
+nb::object goal_view(const PythonStep& s) {
+  static_assert(sizeof(PointGoal) == 2 * sizeof(double));
+  const auto* const goals = reinterpret_cast<const double*>(s.info.point_goals.data());
+  return array_view(goals, {s.info.point_goals.size(), 2}, s.owner);
+}
+
+}  // namespace
 
 void bind_step(nb::module_& m) {
   using S = PythonStep;
@@ -15,16 +35,22 @@ void bind_step(nb::module_& m) {
                   "Result of a batch step in the form of Gymnasium's VectorEnv. Arrays with one row per "
                   "environment are read-only views; the simulator's next call overwrites them. "
                   "With BatchSimulator(copy=True), images are new arrays.");
+  const auto view = [&](const char* name, const char* type, const char* doc, const auto& get) {
+    array_property(c, name, type, doc, [get](const S& s) -> nb::object { return get(s); });
+  };
+  view("rewards", "float64", "Reward of the action, [N].",
+       [](const S& s) { return array_view(s.info.rewards.data(), {s.info.rewards.size()}, s.owner); });
+  view("terminated", "bool_", "True if `stop` ended the episode, [N].",
+       [](const S& s) { return bool_view(s.info.terminated, s.owner); });
+  view("truncated", "bool_", "True if the episode reached its limit of actions, [N].",
+       [](const S& s) { return bool_view(s.info.truncated, s.owner); });
+  view("infos", "void", "Outcome of the action, structured [N] with the fields of StepInfo.", info_view);
+  view("point_goals", "float64", "Distance (metres) and angle (radians), [N][2].", goal_view);
+  view("times", "float64", "Time on the clock of the environment's scene, seconds, [N].",
+       [](const S& s) { return array_view(s.info.times.data(), {s.info.times.size()}, s.owner); });
   const auto array = [&](const char* name, nb::object S::*member, const char* type, const char* doc) {
     array_property(c, name, type, doc, [member](const S& s) { return s.*member; });
   };
-  array("rewards", &S::rewards, "float64", "Reward of the action, [N].");
-  array("terminated", &S::terminated, "bool_", "True if `stop` ended the episode, [N].");
-  array("truncated", &S::truncated, "bool_", "True if the episode reached its limit of actions, [N].");
-  array("infos", &S::infos, "void",
-        "Outcome of the action, structured [N] with the fields of StepInfo.");
-  array("point_goals", &S::point_goals, "float64", "Distance (metres) and angle (radians), [N][2].");
-  array("times", &S::times, "float64", "Time on the clock of the environment's scene, seconds, [N].");
   array("finished", &S::finished, "int64", "Environments whose episode ended in this step. A copy.");
   array("final_metrics", &S::final_metrics, "void",
         "Metrics of those episodes, structured with the fields of EpisodeMetrics. A copy.");
