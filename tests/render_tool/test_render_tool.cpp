@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -80,6 +81,25 @@ TEST_CASE("render tool: without cameras, views around the scene with its own gro
     }
     CHECK(left == doctest::Approx(right).epsilon(0.2));
   }
+}
+
+TEST_CASE(
+    "render tool: without its scene it makes no folder, and a folder that cannot be made comes first") {
+  const TempFolder folder("render_no_scene");
+  const Outcome missing = run(folder, "--scene none.ply --out o/p");
+  CHECK_FALSE(missing.ok);
+  CHECK(missing.says("none.ply"));
+  CHECK_FALSE(std::filesystem::exists(folder / "o"));
+  write_file(folder / "file", "");
+  const Outcome refused = run(folder, "--scene none.ply --out file/p");
+  CHECK_FALSE(refused.ok);
+  CHECK(refused.says("--out file/p: the folder cannot be made"));
+  CHECK_FALSE(refused.says("none.ply"));
+  const Outcome made =
+      run(folder, "default --density 0.05 --orbit 1 --width 32 --height 32 --png --out o/p");
+  CAPTURE(made.text);
+  CHECK(made.ok);
+  CHECK(std::filesystem::exists(folder / "o/p/0000.rgb.png"));
 }
 
 TEST_CASE("render tool: the first line names the device and the instruction set in use") {

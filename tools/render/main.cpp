@@ -35,8 +35,16 @@ using gsnav_render::Scene;
 constexpr const char *kRgbNpy = ".rgb.npy", *kDepthNpy = ".depth.npy", *kAlphaNpy = ".alpha.npy",
                      *kRgbPng = ".rgb.png", *kDepthPng = ".depth.png";
 
-/// Makes the folder of the images, and checks that they can be written.
-Status make_room(const Options& o) {
+/// Checks that the images can be written, and makes their folder. Before the scene is there, a folder
+/// that could be made is left for later.
+Status make_room(const Options& o, bool before_scene) {
+  std::filesystem::path there = std::filesystem::absolute(o.out);
+  std::error_code error;
+  while (!std::filesystem::exists(there, error) && there.has_relative_path())
+    there = there.parent_path();
+  const bool can_be_made =
+      std::filesystem::is_directory(there, error) && ::access(there.c_str(), W_OK | X_OK) == 0;
+  if (before_scene && can_be_made && !std::filesystem::exists(o.out, error)) return {};
   Status s = make_output_folder(o.out);
   if (s && o.npy) s = gsnav_tools::check_files_in(o.out, {kRgbNpy, kDepthNpy, kAlphaNpy});
   if (s && o.png) s = gsnav_tools::check_files_in(o.out, {kRgbPng, kDepthPng});
@@ -183,13 +191,14 @@ int run(const Options& o, const Scene& scene, HostView& host, const Draw& draw) 
 int main(int argc, char** argv) {
   Options o;
   if (const auto status = gsnav_render::parse_options(argc, argv, o)) return *status;
-  if (Status s = make_room(o); !s) return fail(s.message());
+  if (Status s = make_room(o, true); !s) return fail(s.message());
   const auto scene = gsnav_render::load_scene(o);
   if (!scene) return fail(scene.message());
   if (scene->cameras.empty())
     return fail(o.scene + " has nothing that views could surround: choose views by --cameras or --eye");
   if (o.ledger && scene->opened.scene->assets.empty())
     return fail("--ledger: " + o.scene + " has no Gaussians");
+  if (Status s = make_room(o, false); !s) return fail(s.message());
   const RenderOptions how = how_to_draw(o, scene->opened);
   HostView host(scene->opened.scene, how);
   if (o.float64) {
