@@ -79,6 +79,9 @@ USAGE = {
         ("none.ply --docs page.html", "--docs: page.html: unknown kind of file to write: use .md"),
         ("=none.ply", "--scene =none.ply: use [NAME=]SCENE"),
         ("none.ply --knob-values foo", "--knob-values foo: no knob has this value"),
+        ("none.ply --sizes 64x64,", "--sizes: 64x64,: an element is empty"),
+        ("none.ply --sizes=64x64,,32x32 --views 1", "--sizes: 64x64,,32x32: an element is empty"),
+        ("none.ply --kinds ,render", "--kinds: ,render: an element is empty"),
     ],
     "gsnav-avatar": [
         ("from-gltf none.glb --out a.ply", "--out: a.ply: unknown kind of file to write: use .npz"),
@@ -147,6 +150,8 @@ def main():
             for option, kind, count in options_with_numbers(program, command):
                 for value in WRONG_NUMBERS[kind]:
                     check(program, [*command, option, *[value] * count], 2, f"{option}: ")
+            for words in (["--help"], ["--version"]):
+                check(program, [*command, *words], 0, "", {**os.environ, "GSNAV_ISA": "sse9"})
         if name in DRAWS:
             check(program, DRAWS[name], 2, "GSNAV_ISA=sse9: must be", {**os.environ, "GSNAV_ISA": "sse9"})
         if os.listdir(folder):

@@ -12,8 +12,10 @@
 #include <cstring>
 #include <filesystem>
 #include <functional>
+#include <initializer_list>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <vector>
 
@@ -137,6 +139,33 @@ std::string missing_value(int argc, const char* const* argv) {
   return {};
 }
 
+/// Error message for a list such as "--sizes 64x64,", whose empty element CLI11 would drop. Else empty.
+std::string empty_element(const CLI::App& app, int argc, const char* const* argv) {
+  const CLI::Option* option = nullptr;
+  for (int i = 1; i < argc; ++i) {
+    std::string word = argv[i], name = word.substr(0, word.find('='));
+    if (word == "--") break;
+    if (word.starts_with("--")) {
+      option = app.get_option_no_throw(name);
+      if (name == word) continue;
+      word.erase(0, name.size() + 1);
+    }
+    if (option == nullptr || option->get_delimiter() == '\0') continue;
+    const std::string mark(1, option->get_delimiter());
+    if (word.starts_with(mark) || word.ends_with(mark) || word.find(mark + mark) != std::string::npos)
+      return option->get_name() + ": " + word + ": an element is empty";
+  }
+  return {};
+}
+
+/// Whether one of the words asks for help (-h, --help) or the version.
+bool asks_for(std::initializer_list<std::string_view> options, int argc, const char* const* argv) {
+  for (int i = 1; i < argc && std::string_view(argv[i]) != "--"; ++i) {
+    if (std::find(options.begin(), options.end(), argv[i]) != options.end()) return true;
+  }
+  return false;
+}
+
 /// Column at which the lines that continue `line` begin: that of its description, or of its text.
 std::size_t description_column(const std::string& line) {
   const std::size_t text = line.find_first_not_of(' ');
@@ -179,9 +208,19 @@ std::optional<int> parse_options(CLI::App& app, int argc, const char* const* arg
   try {
     if (const std::string missing = missing_value(argc, argv); !missing.empty())
       throw CLI::ValidationError(missing);
+    if (const std::string empty = empty_element(app, argc, argv); !empty.empty())
+      throw CLI::ValidationError(empty);
     app.parse(argc, argv);
     if (check) check();
   } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() != 0 && asks_for({"-h", "--help"}, argc, argv)) {
+      std::fputs(gsnav::printable(wrapped(app.help())).c_str(), stdout);  // whatever else is wrong
+      return 0;
+    }
+    if (error.get_exit_code() != 0 && asks_for({"--version"}, argc, argv)) {
+      std::printf("%s %s\n", name.c_str(), version().c_str());
+      return 0;
+    }
     std::string unknown = unknown_command(app);
     if (unknown.empty()) unknown = unknown_option(app);
     if (!unknown.empty() && error.get_exit_code() != 0) {

@@ -15,7 +15,8 @@ namespace gsnav_tools {
 inline constexpr int kFailed = 1;  ///< The task failed.
 inline constexpr int kUsage = 2;   ///< The command line is invalid.
 
-/// Reads the command line and adds --version. Prints help, the version or an error. Control characters
+/// Reads the command line and adds --version. Prints help, the version or an error. Help and version are
+/// printed whatever else the command line says, and whatever GSNAV_ISA is. Control characters
 /// of arguments are printed as \xHH, so that a file name cannot control the terminal. From now on the
 /// program ends with kFailed if text could not be written to stdout. Numbers of options must be finite
 /// and fit their types.
