@@ -202,7 +202,7 @@ class VectorEnv(BaseVectorEnv):
         return mask
 
     def _checked(self, actions: Any) -> npt.NDArray[np.integer[Any]]:
-        array = actions
+        array: npt.NDArray[np.integer[Any]] = actions
         if type(array) is not np.ndarray or array.dtype.kind not in "iu" or array.shape != (self.num_envs,):
             array = self._integers(actions)
         if (array >> 2).any():  # 0 to 3 have two bits, and no negative number has.
