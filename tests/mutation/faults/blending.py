@@ -110,7 +110,7 @@ FAULTS = [
     fault("open_pixel_normalized", "finished", "select(open, t, L(S(0)))", "L(S(0))", STACK_TEST,
           "normalize_closed: a closed pixel is divided by its alpha, an open one is not"),
     fault("blue_written_as_green", "write_pixel", "image[3 * pixel + 1] = value.y;", "image[3 * pixel + 1] = value.z;",
-          ORDER_TEST, "N21_depth_tie_stack", on=("serial",)),
+          ORDER_TEST, "N21_depth_tie_stack", on=("serial", "cuda float")),
     fault("blue_written_as_green_in_lanes", "write_color", "y[i] = v.y;", "y[i] = v.z;",
           ORDER_TEST, "N21_depth_tie_stack", on=("openmp",)),
     fault("empty_pixel_divided", "pixel_expected_depth", RETURNED, "const mask_of<L> returned(true);",
