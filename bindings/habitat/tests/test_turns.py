@@ -94,8 +94,12 @@ def test_ctrl_c_waits_for_the_participants():
         _turns.draw_alone(lambda: time.sleep(0.1))
         ended.append(i)
 
-    with pytest.raises(KeyboardInterrupt):
-        play(turns, work, 2)
+    usual = signal.signal(signal.SIGINT, signal.default_int_handler)  # A shell's background jobs ignore it.
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            play(turns, work, 2)
+    finally:
+        signal.signal(signal.SIGINT, usual)
     assert ended == [0, 1]
 
 
