@@ -52,3 +52,36 @@ def test_images_do_not_depend_on_the_other_sensors(opened):
     for sensor in SENSORS:  # Only the images that sensors show are drawn.
         one.set_sensors([sensor])
         assert np.array_equal(one.render(place(0, 0.5)[:1])[sensor.uuid], every[sensor.uuid])
+
+
+def test_images_belong_to_the_caller_and_dead_memory_is_used_again(opened):
+    sensors = gsnav.FreeSensors("cpu:1", opened, SENSORS)
+    first = sensors.render(place(0, 0))
+    kept = {name: image.copy() for name, image in first.items()}
+    view = first["rgb"][..., :3]
+    for i in range(4):
+        sensors.render(place(0.2 * i, 0.5))
+        assert equal(first, kept)
+    del first
+    sensors.set_sensors(SENSORS[:1])
+    other = sensors.render(place(0.2, 0.5)[:1])["rgb"]
+    assert np.array_equal(view, kept["rgb"][..., :3]) and not np.shares_memory(view, other)
+    del sensors  # Images outlive their sensors.
+    assert np.array_equal(view, kept["rgb"][..., :3])
+    other[...] = 7  # They can be written.
+
+
+@pytest.mark.parametrize("part", [np.s_[:, :, :3], np.s_[::-1, 1::2, :3], np.s_[:, :, 2::-1], np.s_[:0, :, :3]])
+def test_packed_colours_are_a_contiguous_copy(part):
+    image = np.random.default_rng(1).integers(0, 256, (9, 14, 4), np.uint8)[part]
+    packed = gsnav.FreeSensors.packed(image)
+    assert np.array_equal(packed, image) and packed.flags.c_contiguous and not np.shares_memory(packed, image)
+    image.flags.writeable = False
+    assert np.array_equal(gsnav.FreeSensors.packed(image), image)
+
+
+@pytest.mark.parametrize("wrong", [np.zeros((4, 4, 4), np.uint8), np.zeros((4, 4, 3), np.int8),
+                                   np.zeros((4, 3), np.uint8), [[[1, 2, 3]]], None])
+def test_packed_takes_colours_only(wrong):
+    with pytest.raises(TypeError):
+        gsnav.FreeSensors.packed(wrong)
