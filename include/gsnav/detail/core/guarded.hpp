@@ -16,7 +16,7 @@ namespace gsnav::detail {
 /// is one. Used in parallel regions, which no exception may leave, and in functions that promise a
 /// Status.
 template <class F>
-auto guarded(const F& f, std::string_view name = {}) noexcept -> decltype(f()) {
+auto guarded(const F& f, [[maybe_unused]] std::string_view name = {}) noexcept -> decltype(f()) {
 #if defined(__cpp_exceptions)
   const auto no_memory = [name](const char* why) {
     return Status(Errc::out_of_memory, name.empty() ? why : std::string(name) + ": " + why);
