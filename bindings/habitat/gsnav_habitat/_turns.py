@@ -13,7 +13,7 @@ _here = threading.local()
 
 
 class _Request:
-    """A value to draw for a participant."""
+    """A value to draw for a participant, in one call with at most `most` values."""
 
     def __init__(self, value: Any, draw: Callable[[list[Any]], list[Any]], most: int) -> None:
         self.value, self.draw, self.most = value, draw, most
@@ -81,8 +81,11 @@ class Turns:
         while (asked := self._rounds.get()) is not None:
             works, done = asked
             errors: list[BaseException] = []
-            self._round(works, errors, greenlet.greenlet)
-            self._swap(None)
+            try:
+                self._round(works, errors, greenlet.greenlet)
+                self._swap(None)
+            except BaseException as error:  # At exit no drawing can begin. `run` must not wait for it.
+                errors.append(error)
             done.put(errors[0] if errors else None)
 
     def _round(self, works: list[Any], errors: list[BaseException], new: Any) -> None:
@@ -107,7 +110,7 @@ class Turns:
                     request.greenlet, request.who = greenlet, who
                     waiting.setdefault(key, []).append(request)
                 # When no other participant can ask, groups need not wait for more.
-                for key in [k for k, g in waiting.items() if not ready or len(g) >= min(self._together, g[0].most)]:
+                for key in [k for k, g in waiting.items() if not ready or len(g) >= g[0].most]:
                     self._threads.submit(self._draw, waiting.pop(key))
                     drawing += 1
             if drawing:

@@ -113,3 +113,13 @@ def test_closing_ends_the_threads():
     while threading.active_count() > before and time.monotonic() < deadline:
         time.sleep(0.01)
     assert threading.active_count() == before
+
+
+def test_an_error_of_the_threads_is_raised():
+    turns = _turns.Turns(drawers=1, share=1)
+    turns._threads.shutdown()  # As at the exit of Python.
+    with pytest.raises(RuntimeError, match="shutdown"):
+        play(turns, lambda i: _turns.draw_alone(lambda: None), 2)
+    ended = []
+    play(turns, ended.append, 2)  # They need no drawing.
+    assert ended == [0, 1]
