@@ -23,8 +23,8 @@ struct DefaultScene {
   std::vector<Vec3d> vertices;                          ///< The same surfaces as a mesh, metres.
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< Counter-clockwise seen from the front.
   Aabb<double> bounds{};  ///< Box of the Gaussians' means, or of the vertices of `painted`.
-  /// The same surfaces in finer triangles, in place of `cloud`, with SurfaceKind::mesh. Its vertices
-  /// have the colours of Gaussians, with baked light.
+  /// With SurfaceKind::mesh: the same surfaces as fine triangles. `cloud` is then empty. Vertices have
+  /// the colours that Gaussians would have, with baked light.
   TexturedPart painted{};
 };
 
