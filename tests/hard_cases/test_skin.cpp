@@ -98,6 +98,15 @@ SkinnedMeans skinned_means(B& backend, const AvatarActor& actor) {
   return out;
 }
 
+/// An avatar with three joints in a chain, without Gaussians.
+AvatarAsset chain_of_three() {
+  AvatarAsset asset;
+  asset.skeleton.names = {"a", "b", "c"};
+  asset.skeleton.parents = {-1, 0, 1};
+  asset.skeleton.rest_local.resize(3);
+  return asset;
+}
+
 }  // namespace
 
 TEST_CASE("N54_lbs_identity") {
@@ -126,10 +135,7 @@ TEST_CASE("N54_lbs_identity") {
 TEST_CASE("N55_lbs_rigid_far") {
   // Weights off by 1e-3 in their sum, a root 1000 m away: renormalised at load, skinned relative to the
   // root.
-  AvatarAsset asset;
-  asset.skeleton.names = {"a", "b", "c"};
-  asset.skeleton.parents = {-1, 0, 1};
-  asset.skeleton.rest_local.resize(3);
+  AvatarAsset asset = chain_of_three();
   Rng rng(55);
   GaussianCloudBuilder builder(0);
   std::vector<std::uint16_t> indices;
@@ -183,10 +189,7 @@ TEST_CASE("N55_lbs_rigid_far") {
 }
 
 TEST_CASE("joints that turn carry what hangs on them, from the last to the first") {
-  AvatarAsset asset;
-  asset.skeleton.names = {"a", "b", "c"};
-  asset.skeleton.parents = {-1, 0, 1};
-  asset.skeleton.rest_local.resize(3);
+  AvatarAsset asset = chain_of_three();
   Rng rng(59);
   const auto point = [&] { return Vec3d{rng.uniform(-1, 1), rng.uniform(0, 2), rng.uniform(-1, 1)}; };
   GaussianCloudBuilder builder(0);
