@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import copy
 import dataclasses
+import os
 import pathlib
 from collections.abc import Iterator
 
@@ -180,12 +181,16 @@ def main() -> None:
         p.error("--episodes must be 0 or more; --steps, --every and --milliseconds 1 or more")
     if args.out.suffix != ".webp":
         p.error(f"--out {args.out}: the name must end in .webp")
+    if not args.out.absolute().parent.is_dir():
+        p.error(f"--out {args.out}: there is no folder {args.out.parent}")
     args.device = device_of(args.device).name
     policy = load(args.weights)
     args.size, args.sensor = policy.size, sensor_of(policy)
     pictures, times = zip(*frames(args, policy))
-    pictures[0].save(args.out, save_all=True, append_images=pictures[1:], duration=list(times), loop=0,
+    aside = args.out.with_suffix(".part")  # A program that is stopped leaves an older picture as it was.
+    pictures[0].save(aside, "WEBP", save_all=True, append_images=pictures[1:], duration=list(times), loop=0,
                      quality=args.compression, method=6)
+    os.replace(aside, args.out)
     print(f"{args.out}: {len(pictures)} pictures, {args.out.stat().st_size:,} bytes")
 
 
