@@ -200,14 +200,20 @@ const World& BatchSimulator::world(std::size_t environment) const noexcept {
 std::size_t BatchSimulator::scene_of(std::size_t environment) const noexcept {
   return engine_->scene_of(environment);
 }
-Result<BatchStep> BatchSimulator::reset(std::span<const std::uint8_t> mask) & {
-  return on_engine(engine_, "BatchSimulator", [&](auto& engine) { return engine.reset(mask); });
+Result<BatchStep> BatchSimulator::reset(std::span<const std::uint8_t> mask,
+                                        const WhileDrawing& meanwhile) & {
+  return on_engine(engine_, "BatchSimulator",
+                   [&](auto& engine) { return engine.reset(mask, meanwhile); });
 }
-Result<BatchStep> BatchSimulator::step(std::span<const Action> actions) & {
-  return on_engine(engine_, "BatchSimulator", [&](auto& engine) { return engine.step(actions); });
+Result<BatchStep> BatchSimulator::step(std::span<const Action> actions,
+                                       const WhileDrawing& meanwhile) & {
+  return on_engine(engine_, "BatchSimulator",
+                   [&](auto& engine) { return engine.step(actions, meanwhile); });
 }
-Result<BatchStep> BatchSimulator::step(std::span<const VelocityCommand> commands) & {
-  return on_engine(engine_, "BatchSimulator", [&](auto& engine) { return engine.step(commands); });
+Result<BatchStep> BatchSimulator::step(std::span<const VelocityCommand> commands,
+                                       const WhileDrawing& meanwhile) & {
+  return on_engine(engine_, "BatchSimulator",
+                   [&](auto& engine) { return engine.step(commands, meanwhile); });
 }
 std::size_t BatchSimulator::render_count() const noexcept { return engine_->render_count(); }
 std::size_t BatchSimulator::pose_count() const noexcept { return engine_->pose_count(); }

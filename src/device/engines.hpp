@@ -49,9 +49,9 @@ class BatchEngine {
   virtual std::size_t environments() const noexcept = 0;
   virtual const World& world(std::size_t environment) const noexcept = 0;
   virtual std::size_t scene_of(std::size_t environment) const noexcept = 0;
-  virtual Result<BatchStep> reset(std::span<const std::uint8_t> mask) = 0;
-  virtual Result<BatchStep> step(std::span<const Action> actions) = 0;
-  virtual Result<BatchStep> step(std::span<const VelocityCommand> commands) = 0;
+  virtual Result<BatchStep> reset(std::span<const std::uint8_t> mask, const WhileDrawing& f) = 0;
+  virtual Result<BatchStep> step(std::span<const Action> actions, const WhileDrawing& f) = 0;
+  virtual Result<BatchStep> step(std::span<const VelocityCommand> commands, const WhileDrawing& f) = 0;
   virtual std::size_t render_count() const noexcept = 0;
   virtual std::size_t pose_count() const noexcept = 0;
   virtual void set_rendering(bool on) noexcept = 0;

@@ -106,10 +106,14 @@ class BatchOn final : public BatchEngine {
   std::size_t scene_of(std::size_t environment) const noexcept override {
     return sim_.scene_of(environment);
   }
-  Result<BatchStep> reset(std::span<const std::uint8_t> mask) override { return sim_.reset(mask); }
-  Result<BatchStep> step(std::span<const Action> actions) override { return sim_.step(actions); }
-  Result<BatchStep> step(std::span<const VelocityCommand> commands) override {
-    return sim_.step(commands);
+  Result<BatchStep> reset(std::span<const std::uint8_t> mask, const WhileDrawing& f) override {
+    return sim_.reset(mask, f);
+  }
+  Result<BatchStep> step(std::span<const Action> actions, const WhileDrawing& f) override {
+    return sim_.step(actions, f);
+  }
+  Result<BatchStep> step(std::span<const VelocityCommand> commands, const WhileDrawing& f) override {
+    return sim_.step(commands, f);
   }
   std::size_t render_count() const noexcept override { return sim_.render_count(); }
   std::size_t pose_count() const noexcept override { return sim_.pose_count(); }

@@ -223,7 +223,13 @@ TEST_CASE("cuda: a batch sees what the OpenMP one sees, in host memory and on th
   config.images = ImageMemory::backend;
   auto on_gpu = make_batch_simulator(other, scenes, config, kEnvironments, wandering).value();
   std::vector<Difference> differences(2);
-  std::size_t wrong = 0, finals = 0;
+  std::size_t wrong = 0, finals = 0, told = 0;
+  BatchStep early;
+  const WhileDrawing meanwhile = [&](const BatchStep& step) -> Status {
+    early = step;
+    ++told;
+    return {};
+  };
   const auto compare = [&](const Result<BatchStep>& a, const Result<BatchStep>& b,
                            const Result<BatchStep>& c) {
     const BatchStep host = a.value(), gpu = b.value(), cpu = c.value();
@@ -239,19 +245,23 @@ TEST_CASE("cuda: a batch sees what the OpenMP one sees, in host memory and on th
     images(host.images, gpu.images, cpu.images);
     images(host.final_images, gpu.final_images, cpu.final_images);
     finals += host.finished.size();
+    CHECK(early.images.data() == gpu.images.data());
+    CHECK(early.images[0].on_backend == gpu.images[0].on_backend);
     for (std::size_t e = 0; e < kEnvironments; ++e) {
+      wrong += early.rewards[e] == cpu.rewards[e] ? 0 : 1;
       wrong += host.rewards[e] == cpu.rewards[e] && gpu.rewards[e] == cpu.rewards[e] ? 0 : 1;
     }
   };
-  compare(to_host.reset(), on_gpu.reset(), on_cpu.reset());
+  compare(to_host.reset(), on_gpu.reset({}, meanwhile), on_cpu.reset());
   Rng rng(6);
   for (int i = 0; i < steps; ++i) {
     std::vector<Action> actions;
     for (std::size_t e = 0; e < kEnvironments; ++e) actions.push_back(wandering_action(rng));
-    compare(to_host.step(actions), on_gpu.step(actions), on_cpu.step(actions));
+    compare(to_host.step(actions), on_gpu.step(actions, meanwhile), on_cpu.step(actions));
   }
   const std::vector<std::uint8_t> some{1, 0, 0, 1, 1, 0, 1, 0, 0, 0, 0, 1};
-  compare(to_host.reset(some), on_gpu.reset(some), on_cpu.reset(some));
+  compare(to_host.reset(some), on_gpu.reset(some, meanwhile), on_cpu.reset(some));
+  CHECK(told == static_cast<std::size_t>(steps + 2));
   CHECK(wrong == 0);
   CHECK(finals >= 2 * kEnvironments);
   differences[0].check(SensorKind::rgb);

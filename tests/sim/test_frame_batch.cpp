@@ -145,6 +145,32 @@ class RedrawingBackend : public ToyBackend {
 static_assert(BatchBackend<RedrawingBackend> && HasHostMemory<RedrawingBackend> &&
               !HasHostMemory<BatchingBackend>);
 
+/// One whose images are complete only after finish(), as those of a GPU.
+class BatchOfLateToys : public BatchOfToys {
+ public:
+  using BatchOfToys::BatchOfToys;
+  Status render(std::span<const GaussianSet> sets, std::span<const camera_type> cameras,
+                const images_type& images) {
+    sets_ = sets;
+    cameras_ = cameras;
+    images_ = images;
+    return {};
+  }
+  Status finish() { return fails ? broken() : BatchOfToys::render(sets_, cameras_, images_); }
+  static Status broken() { return {Errc::backend_failure, "the device fell off"}; }
+  static inline bool fails = false;
+
+ private:
+  std::span<const GaussianSet> sets_;
+  std::span<const camera_type> cameras_;
+  images_type images_;
+};
+class LateBackend : public ToyBackend {
+ public:
+  using batch_renderer = BatchOfLateToys;
+};
+static_assert(BatchBackend<LateBackend>);
+
 std::vector<std::shared_ptr<const SimulatorScene>> two_scenes() {
   SimulatorScene far = flat_scene();  // another sort order: frames of a call of its own
   auto cloud = std::make_shared<GaussianCloud>(*far.assets[0].cloud);
@@ -250,6 +276,104 @@ TEST_CASE(
     CHECK(host_bytes <= 20000);
   }
   CHECK(host_arrays == 0);
+}
+
+TEST_CASE("the caller works once per call while a batch is drawn, with everything but its pixels") {
+  for (const ImageMemory memory : {ImageMemory::host, ImageMemory::backend}) {
+    BatchConfig config;
+    config.sensors = rgbd_sensors(12, 18);
+    config.task.max_steps = 3;
+    config.auto_reset = AutoReset::same_step;
+    config.pose_slots = 2;  // several rounds of drawing
+    SerialBackend serial;
+    LateBackend late;
+    auto expected = make_batch_simulator(serial, two_scenes(), config, 7, spread).value();
+    config.images = memory;
+    auto sim = make_batch_simulator(late, two_scenes(), config, 7, spread).value();
+    int told = 0, drawn_before = 0;
+    BatchStep seen;
+    const WhileDrawing meanwhile = [&](const BatchStep& step) -> Status {
+      seen = step;
+      ++told;
+      drawn_before = batch_calls;
+      return {};
+    };
+    const auto same = [&](const BatchStep& got, const BatchStep& want) {
+      CHECK(std::ranges::equal(seen.rewards, want.rewards));
+      CHECK(std::ranges::equal(seen.truncated, want.truncated));
+      CHECK(std::ranges::equal(seen.finished, want.finished));
+      REQUIRE(seen.images.size() == 2);
+      CHECK(seen.images.data() == got.images.data());
+      CHECK(images_of(seen.images) == images_of(want.images));
+      CHECK(images_of(seen.final_images) == images_of(want.final_images));
+    };
+    batch_calls = 0;
+    const BatchStep first = sim.reset({}, meanwhile).value();
+    same(first, expected.reset().value());
+    CHECK(told == 1);
+    CHECK(drawn_before == 0);
+    CHECK(batch_calls > 1);
+    const std::vector<Action> actions(7, Action::turn_left);
+    const std::vector<VelocityCommand> commands(7, VelocityCommand{0.1, 0.2});
+    bool ended = false;
+    for (int i = 0; i < 6; ++i) {
+      batch_calls = 0;
+      const BatchStep got =
+          (i % 2 == 0 ? sim.step(actions, meanwhile) : sim.step(commands, meanwhile)).value();
+      same(got, (i % 2 == 0 ? expected.step(actions) : expected.step(commands)).value());
+      CHECK(told == i + 2);
+      // The last images of an episode are drawn before its next one begins.
+      CHECK((drawn_before > 0) == !got.finished.empty());
+      CHECK(batch_calls > drawn_before);
+      ended = ended || !got.finished.empty();
+    }
+    CHECK(ended);
+    sim.set_rendering(false);  // There is nothing to draw, and it is called nevertheless.
+    CHECK(sim.step(actions, meanwhile).value().images.empty());
+    CHECK(told == 8);
+  }
+}
+
+TEST_CASE("errors of the caller's work and of drawing reach the caller, and the batch goes on") {
+  BatchConfig config;
+  config.sensors = rgbd_sensors(12, 18);
+  SerialBackend serial;
+  LateBackend late;
+  auto expected = make_batch_simulator(serial, two_scenes(), config, 5, spread).value();
+  auto sim = make_batch_simulator(late, two_scenes(), config, 5, spread).value();
+  auto unthreaded = make_batch_simulator(serial, two_scenes(), config, 5, spread).value();
+  const std::vector<Action> actions(5, Action::turn_left), few(4, Action::turn_left);
+  int told = 0;
+  const WhileDrawing refuses = [&](const BatchStep&) -> Status {
+    ++told;
+    return {Errc::write_failed, "no room for rewards"};
+  };
+  const WhileDrawing throws = [&](const BatchStep&) -> Status {
+    ++told;
+    throw Error(Errc::unsupported, "thrown");
+  };
+  const auto go_on = [&](auto& batch) {
+    CHECK(batch.step(few, refuses).code() == Errc::invalid_argument);  // before any environment moves
+    CHECK(std::exchange(told, 0) == 0);
+    CHECK(batch.step(actions, refuses).message() == "no room for rewards");
+    CHECK(batch.step(actions, throws).message() == "thrown");
+    CHECK(std::exchange(told, 0) == 2);
+  };
+  sim.reset().value();
+  unthreaded.reset().value();
+  expected.reset().value();
+  go_on(sim);
+  go_on(unthreaded);
+  for (int i = 0; i < 2; ++i) expected.step(actions).value();
+  const auto want = images_of(expected.step(actions).value().images);
+  CHECK(images_of(sim.step(actions).value().images) == want);
+  CHECK(images_of(unthreaded.step(actions).value().images) == want);
+  BatchOfLateToys::fails = true;
+  CHECK(sim.step(actions, refuses).message() == "the device fell off");
+  CHECK(told == 1);
+  BatchOfLateToys::fails = false;
+  CHECK(sim.reset({}, refuses).code() == Errc::write_failed);
+  CHECK(sim.step(actions).ok());
 }
 
 TEST_CASE("depths are cut at the far plane as doubles compare, whether or not a float is there") {

@@ -164,16 +164,20 @@ class BatchSimulator {
 
   /// Starts the next episode in all environments, or only in those whose mask is not 0.
   /// @param mask [N], or empty for all
-  /// @return the errors of the episode source and World::reset, or a rendering error.
-  Result<BatchStep> reset(std::span<const std::uint8_t> mask = {}) &;
+  /// @param meanwhile called while a GPU draws, or after drawing on a CPU; see WhileDrawing
+  /// @return the errors of the episode source and World::reset, a rendering error, or that of
+  ///   `meanwhile`.
+  Result<BatchStep> reset(std::span<const std::uint8_t> mask = {}, const WhileDrawing& meanwhile = {}) &;
   /// Performs one action per environment and renders.
   /// @param actions [N]
+  /// @param meanwhile called while a GPU draws, or after drawing on a CPU; see WhileDrawing
   /// @return invalid_argument naming the environment's index: for a wrong number of actions, before the
   ///   first reset, or in an environment that is done with AutoReset::disabled. Also the errors of
-  ///   World::step, or a rendering error.
-  Result<BatchStep> step(std::span<const Action> actions) &;
+  ///   World::step, a rendering error, or that of `meanwhile`.
+  Result<BatchStep> step(std::span<const Action> actions, const WhileDrawing& meanwhile = {}) &;
   /// Moves each environment's agent at the given velocities, [N], and renders. Errors as above.
-  Result<BatchStep> step(std::span<const VelocityCommand> commands) &;
+  Result<BatchStep> step(std::span<const VelocityCommand> commands,
+                         const WhileDrawing& meanwhile = {}) &;
 
   /// Number of renders so far.
   std::size_t render_count() const noexcept;

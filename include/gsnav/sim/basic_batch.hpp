@@ -86,24 +86,33 @@ class BasicBatchSimulator {
 
   /// Begins the next episode in every environment.
   /// @param mask Shape [N]. If given, only environments with a nonzero value are reset.
-  /// @return the errors of the episode source, of World::reset, or of rendering.
-  Result<BatchStep> reset(std::span<const std::uint8_t> mask = {}) & {
+  /// @param meanwhile See WhileDrawing.
+  /// @return the errors of the episode source, of World::reset, of rendering, or of `meanwhile`.
+  Result<BatchStep> reset(std::span<const std::uint8_t> mask = {},
+                          const WhileDrawing& meanwhile = {}) & {
     if (environments() == 0) return moved_away();
     if (Status s = ask_for_memory(); !s) return s;
     if (Status s = worlds_.reset(parallel(), mask); !s) return s;
     free_scenes();
-    return observe(mask.empty());
+    return observe(mask.empty(), meanwhile);
   }
 
   /// Performs one action per environment.
   /// @param actions Shape [N].
+  /// @param meanwhile See WhileDrawing.
   /// @return invalid_argument for a wrong number of actions, before reset(), or, with
   /// AutoReset::disabled, for an environment that is done (the message names it); the errors of
-  /// World::step and of rendering.
-  Result<BatchStep> step(std::span<const Action> actions) & { return act(actions); }
+  /// World::step, of rendering and of `meanwhile`.
+  Result<BatchStep> step(std::span<const Action> actions, const WhileDrawing& meanwhile = {}) & {
+    return act(actions, meanwhile);
+  }
   /// Drives each environment by a velocity for one control period. See BasicSimulator::step.
   /// @param commands Shape [N].
-  Result<BatchStep> step(std::span<const VelocityCommand> commands) & { return act(commands); }
+  /// @param meanwhile See WhileDrawing.
+  Result<BatchStep> step(std::span<const VelocityCommand> commands,
+                         const WhileDrawing& meanwhile = {}) & {
+    return act(commands, meanwhile);
+  }
 
   /// Number of images rendered so far. Sensors with the same position and field of view share one.
   std::size_t render_count() const noexcept { return rig_.render_count(); }
@@ -205,50 +214,40 @@ class BasicBatchSimulator {
   }
 
   template <class A>
-  Result<BatchStep> act(std::span<const A> actions) {
+  Result<BatchStep> act(std::span<const A> actions, const WhileDrawing& meanwhile) {
     if (environments() == 0) return moved_away();
     if (Status s = ask_for_memory(); !s) return s;
     const auto draw_final = [this] { return observe_finished(); };
     if (Status s = worlds_.step(parallel(), actions, draw_final); !s) return s;
     free_scenes();
-    return observe(false);
+    return observe(false, meanwhile);
   }
 
   /// Asks BatchConfig::image_source for memory for the next images.
   Status ask_for_memory() {
     if (!config_.image_source || !config_.rendering) return {};
-    const SensorPlan& plan = rig_.plan();
-    std::vector<float*>& given = buffers_.given;
-    given.assign(plan.buffers(), nullptr);
-    for (std::size_t i = 0; i < plan.sensors().size(); ++i) {
-      const std::size_t buffer = plan.output(i).noisy, floats = environments() * plan.size(buffer);
-      if (given[buffer] != nullptr) continue;
-      const auto memory = detail::guarded([&] { return config_.image_source(i, floats); });
-      if (!memory) return memory.status();
-      const std::size_t there = memory->data() == nullptr ? 0 : memory->size();
-      if (there < floats) {
-        return {Errc::invalid_argument, "BatchConfig.image_source: " + std::to_string(there) +
-                                            " floats for the sensor \"" + plan.sensors()[i].uuid +
-                                            "\", which needs " + std::to_string(floats)};
-      }
-      if (reinterpret_cast<std::uintptr_t>(memory->data()) % alignof(float) != 0) {
-        return {Errc::invalid_argument, "BatchConfig.image_source: the memory for the sensor \"" +
-                                            plan.sensors()[i].uuid + "\" is not aligned to " +
-                                            std::to_string(alignof(float)) + " bytes"};
-      }
-      given[buffer] = memory->data();
-    }
-    return {};
+    return buffers_.ask(rig_.plan(), environments(), config_.image_source);
   }
 
-  Result<BatchStep> observe(bool all) {
+  Result<BatchStep> observe(bool all, const WhileDrawing& meanwhile) {
     BatchStep out;
     static_cast<BatchInfo&>(out) = worlds_.info();
+    Status told;
+    bool untold = bool(meanwhile);
+    const auto tell = [&] {
+      if (std::exchange(untold, false)) told = detail::guarded([&] { return meanwhile(out); });
+    };
     if (!config_.rendering || images_.empty()) {
       drawn_ = false;
+      tell();
+      if (!told) return told;
       return out;
     }
     rig_.resize(buffers_, environments());
+    fill(images_, buffers_);
+    out.images = images_;
+    if (worlds_.auto_reset() == AutoReset::same_step && !worlds_.info().finished.empty())
+      out.final_images = final_images_;
     views_.clear();
     // Environments that have not moved need an image too if the last call did not render, or drew
     // into memory of the caller.
@@ -256,12 +255,10 @@ class BasicBatchSimulator {
     for (std::size_t e = 0; e < environments(); ++e) {
       if (every || worlds_.moved(e)) add_view(e, e);
     }
-    if (Status s = draw(buffers_); !s) return s;
+    if (Status s = draw(buffers_, std::ref(tell)); !s) return s;
     drawn_ = true;
-    fill(images_, buffers_);
-    out.images = images_;
-    if (worlds_.auto_reset() == AutoReset::same_step && !worlds_.info().finished.empty())
-      out.final_images = final_images_;
+    tell();
+    if (!told) return told;
     return out;
   }
 
@@ -297,9 +294,10 @@ class BasicBatchSimulator {
     v.view.noise = noise_seed(config_.seed + e, world(e).state());
     v.view.row = row;
   }
-  Status draw(SensorImages<B>& images) {
-    return scenes_.draw(views_, rig_.plan(), parallel(),
-                        [&](std::span<const SensorView> views) { return rig_.render(views, images); });
+  Status draw(SensorImages<B>& images, const std::function<void()>& idle = {}) {
+    return scenes_.draw(views_, rig_.plan(), parallel(), [&](std::span<const SensorView> views) {
+      return rig_.render(views, images, idle);
+    });
   }
 
   B* backend_;

@@ -204,4 +204,13 @@ struct BatchStep : BatchInfo {
   }
 };
 
+/// Work of the caller during a call of a batch. The function is called once, after the environments have
+/// moved, and while a GPU draws the images, so that the work takes no time of its own. Backends that
+/// draw one image after the other call it when the images are complete. If the environments cannot move,
+/// it is not called.
+/// @param step Result of the call. On a GPU, only the pixels of `images` are not written yet.
+/// @return an error, which the call returns when the images are complete. The batch needs no reset after
+/// it. The function must not call the batch, and must leave the current GPU as it was.
+using WhileDrawing = std::function<Status(const BatchStep& step)>;
+
 }  // namespace gsnav

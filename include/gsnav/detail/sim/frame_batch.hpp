@@ -64,9 +64,10 @@ class FrameBatch {
   }
 
   /// Draws frames, all of which must be supported. `to` says whether their images are in host memory or
-  /// in backend memory. Waits for the backend. Errors: those of rendering. Throws gsnav::Error
-  /// (out_of_memory).
-  Status render(std::span<const FrameJob<float>> jobs, CopyKind to) {
+  /// in backend memory. Waits for the backend, and calls `idle` before each wait while it draws, if
+  /// given. Errors: those of rendering. Throws gsnav::Error (out_of_memory).
+  Status render(std::span<const FrameJob<float>> jobs, CopyKind to,
+                const std::function<void()>& idle = {}) {
     for (Known& k : known_) k.jobs.clear();
     for (std::size_t j = 0; j < jobs.size(); ++j) group(kind_of(jobs[j])).jobs.push_back(j);
     for (Known& k : known_) {
@@ -85,7 +86,7 @@ class FrameBatch {
       for (std::size_t begin = 0, count = 0; begin < k.jobs.size(); begin += count) {
         count = k.batch->capacity(sets_, cameras.subspan(begin));
         count = std::clamp(count, std::size_t{1}, k.jobs.size() - begin);
-        if (Status s = draw(k, begin, count, jobs, to); !s) return s;
+        if (Status s = draw(k, begin, count, jobs, to, idle); !s) return s;
       }
     }
     return backend_->synchronize();
@@ -127,7 +128,7 @@ class FrameBatch {
   /// Draws the frames [begin, begin + count) of a group by one call. Call list_sets() first, which lists
   /// the group's sets and cameras.
   Status draw(Known& known, std::size_t begin, std::size_t count, std::span<const FrameJob<float>> jobs,
-              CopyKind to) {
+              CopyKind to, const std::function<void()>& idle) {
     const std::span<const std::size_t> which = std::span(known.jobs).subspan(begin, count);
     const std::size_t pixels =
         static_cast<std::size_t>(known.kind.width) * static_cast<std::size_t>(known.kind.height);
@@ -140,6 +141,8 @@ class FrameBatch {
     }
     if (Status s = known.batch->render(sets_, std::span(cameras_).subspan(begin, count), images); !s)
       return s;
+    // Before the copies: those to memory that is not page-locked wait for the images.
+    if (idle) idle();
     const auto hand_out = [&] {
       if (in_place) return;
       for (const ImageKind<float>& k : kImages<float>) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -32,19 +33,18 @@ class ImageRenderer {
 
   /// Renders all requests into images in `memory`. Replaces the sets and rules in the requests by those
   /// that were drawn; they are valid until the next call. Throws gsnav::Error (out_of_memory).
+  /// @param idle Called before each wait for a batch (FrameBatch::render).
   /// @return an error of rendering.
-  Status render(std::span<ImageRequest> requests, ImageMemory memory) {
+  Status render(std::span<ImageRequest> requests, ImageMemory memory,
+                [[maybe_unused]] const std::function<void()>& idle = {}) {
     choose_detail(requests);
     jobs_.clear();
     if constexpr (BatchBackend<B>) {
       single_.clear();
       for (const ImageRequest& r : requests) (batches_.supports(r) ? jobs_ : single_).push_back(r);
       const bool there = memory == ImageMemory::backend;
-      if (Status s =
-              batches_.render(jobs_, there ? CopyKind::device_to_device : CopyKind::device_to_host);
-          !s) {
-        return s;
-      }
+      const CopyKind to = there ? CopyKind::device_to_device : CopyKind::device_to_host;
+      if (Status s = batches_.render(jobs_, to, idle); !s) return s;
       return there ? render_on_backend(single_) : render_by_one(single_);
     } else {
       jobs_.assign(requests.begin(), requests.end());

@@ -2,14 +2,18 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
+#include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/detail/core/host_array.hpp"
 #include "gsnav/detail/sim/image_renderer.hpp"
 #include "gsnav/detail/sim/sensor_plan.hpp"
+#include "gsnav/sim/config.hpp"
 
 namespace gsnav {
 
@@ -35,6 +39,32 @@ struct SensorImages {
     }
     buffers.resize(plan.buffers());
     for (std::size_t b = 0; b < plan.buffers(); ++b) buffers[b].resize(size(b));
+  }
+  /// Asks `source` for memory for the next images of `count` views, as BatchConfig::image_source says.
+  /// @return the error of `source`; invalid_argument, with the sensor, for memory that does not fit.
+  Status ask(const SensorPlan& plan, std::size_t count, const ImageSource& source) {
+    const auto bad = [](const std::string& what) {
+      return Status(Errc::invalid_argument, "BatchConfig.image_source: " + what);
+    };
+    given.assign(plan.buffers(), nullptr);
+    for (std::size_t i = 0; i < plan.sensors().size(); ++i) {
+      const std::size_t buffer = plan.output(i).noisy, floats = count * plan.size(buffer);
+      if (given[buffer] != nullptr) continue;
+      const auto made = detail::guarded([&] { return source(i, floats); });
+      if (!made) return made.status();
+      const std::string sensor = "the sensor \"" + plan.sensors()[i].uuid + "\"";
+      const std::size_t there = made->data() == nullptr ? 0 : made->size();
+      if (there < floats) {
+        return bad(std::to_string(there) + " floats for " + sensor + ", which needs " +
+                   std::to_string(floats));
+      }
+      if (reinterpret_cast<std::uintptr_t>(made->data()) % alignof(float) != 0) {
+        return bad("the memory for " + sensor + " is not aligned to " + std::to_string(alignof(float)) +
+                   " bytes");
+      }
+      given[buffer] = made->data();
+    }
+    return {};
   }
   /// One row of a buffer, in whichever memory it is.
   std::span<float> row(const SensorPlan& plan, std::size_t buffer, std::size_t r) noexcept {

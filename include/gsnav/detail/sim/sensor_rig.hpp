@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -50,13 +51,16 @@ class SensorRig {
   void resize(SensorImages<B>& images, std::size_t rows) const { images.resize(*backend_, plan_, rows); }
 
   /// Renders all sensors of all views into their rows.
+  /// @param idle Called before each wait for a batch (FrameBatch::render).
   /// @return an error of rendering.
-  Status render(std::span<const SensorView> views, SensorImages<B>& images) {
+  Status render(std::span<const SensorView> views, SensorImages<B>& images,
+                const std::function<void()>& idle = {}) {
     // Process a limited number of views at a time to keep scratch memory small.
     const std::size_t most = plan_.needs_scratch() ? kScratchViews : views.size();
     for (std::size_t first = 0; first < views.size(); first += most) {
       const auto some = views.subspan(first, std::min(most, views.size() - first));
-      if (Status s = renderer_.render(requests_.make(plan_, some, images), images.memory); !s) return s;
+      const auto requests = requests_.make(plan_, some, images);
+      if (Status s = renderer_.render(requests, images.memory, idle); !s) return s;
       if (Status s = finish_.run(plan_, requests_, some, images); !s) return s;
     }
     return {};
