@@ -34,10 +34,11 @@ def processor_seconds():
     return total / os.sysconf("SC_CLK_TCK")
 
 
-def memory():
-    """Megabytes of this process and its children. Shared memory is divided by the number of its processes."""
+def memory(root=None):
+    """Megabytes of a process (None: this one) and its children. Shared memory is divided by the number of its
+    processes."""
     total = 0
-    for pid in processes(os.getpid()):
+    for pid in processes(root or os.getpid()):
         with open(f"/proc/{pid}/smaps_rollup") as file:
             total += next(int(line.split()[1]) for line in file if line.startswith("Pss:"))
     return total / 1024
