@@ -83,3 +83,20 @@ def test_ddppo_in_one_process_learns_the_weights_of_workers(pack, tmp_path):
     assert wanted.keys() == got.keys() and all(torch.equal(wanted[k], got[k]) for k in wanted)
     for name in ("reward", "distance_to_goal", "spl"):
         assert windows(first, name) == windows(second, name) and len(windows(first, name)) == 3
+
+
+def test_the_benchmark_of_two_ranks_accounts_for_the_time(tmp_path):
+    text = run_module(
+        [CONFIGS.parents[3] / "bench/habitat/steps_per_second.py", "--ranks=2", "--environments=2", "--updates=2",
+         "--steps=6", f"--side={SIDE}", "--gaussians=20000", "--episodes=12", "--device=cpu", "--seconds=300",
+         "--config=pointnav/ppo_pointnav_example.yaml", "habitat_baselines.rl.ppo.hidden_size=32"],
+        tmp_path,
+    )  # fmt: skip
+    row = [x.strip() for x in re.search(r"^\| 2 \| 2 \|.*$", text, re.MULTILINE)[0].split("|")]
+    rate, (least, most), mb = float(row[4]), map(float, row[5].split(", ")), float(row[6])
+    ms = {name: float(x) for name, x in re.findall(r"^\| (\S.*?) \| (-?\d+\.\d) \|$", text, re.MULTILINE)}
+    assert sum(x for name, x in ms.items() if name != "all") == pytest.approx(ms["all"], abs=0.5)
+    # Rank 0 makes half of the steps, four per step of all environments.
+    assert rate * ms["all"] == pytest.approx(4 * 1e3, rel=0.05) and least <= rate <= most
+    assert ms["environments"] > 0 and ms["trainer: learning"] > 0 and mb > 100
+    assert 0 < float(re.search(r"Drawing ran (\S+) ms", text)[1]) < ms["all"]
