@@ -14,9 +14,9 @@
 #include "cases.hpp"
 #include "eval/oracle_support.hpp"
 #include "gsnav/detail/render/draw_fragments.hpp"
-#include "gsnav/detail/sim/semantic_frame.hpp"
 #include "support/fragment_truth.hpp"
 #include "support/scenes.hpp"
+#include "support/semantic_labels.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -440,11 +440,10 @@ TEST_CASE("semantic ids by weight: a pane is who covers most of a pixel, or nobo
     Panes panes;
     panes.add(wall(4, 9, {1, 1, 1}));
     panes.add(pane(2, 9, {1, 1, 1}, alpha));
-    SemanticFrames<double, SerialBackend> frames(serial);
-    SemanticFrame out;
-    frames.render(std::span(&set, 1), panes.instances, axis_camera(9), {}, out).throw_if_error();
+    const SemanticLabels out =
+        semantic_labels<double>(serial, std::span(&set, 1), panes.instances, axis_camera(9));
     const double of_pane = static_cast<double>(alpha), of_cloud = 0.9 * (1 - of_pane);
-    CHECK(out.labels[40] == (of_pane > of_cloud ? 3u : 1u));
+    CHECK(out.labels[40] == (of_pane > of_cloud ? 3.0f : 1.0f));
     CHECK(std::abs(static_cast<double>(out.weights[40]) - std::max(of_pane, of_cloud)) < 1e-6);
   }
 }
