@@ -160,11 +160,11 @@ __device__ inline bool order_by(uint2* rows, std::uint32_t n, const Number& numb
 #pragma unroll
     for (int e = 0; e < E; ++e) {
       const std::uint32_t i = v[e] & (kRows - 1);
-      whole[e] = lane * E + static_cast<std::uint32_t>(e) < n ? full(i) << 8 | i : ~0ull;
+      whole[e] = lane * E + static_cast<std::uint32_t>(e) < n ? full(i) << kPlaceBits | i : ~0ull;
     }
     order_neighbors<E>(whole);
 #pragma unroll
-    for (int e = 0; e < E; ++e) v[e] = static_cast<std::uint32_t>(whole[e]) & 255u;
+    for (int e = 0; e < E; ++e) v[e] = static_cast<std::uint32_t>(whole[e]) & (kRows - 1);
   }
   uint2 row[E];
 #pragma unroll
