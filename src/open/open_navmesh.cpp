@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <functional>
 #include <map>
@@ -236,22 +237,22 @@ Status open_visible_sets(OpeningScene& s) {
   const auto find = [&] {
     return build_visible_sets(o.device, *asset.cloud, *viewpoints, settings, asset.world_from_asset);
   };
-  Result<io::CachedVisibleSets> made = Status(Errc::unsupported, "");
+  const auto use = [&](VisibleSets&& sets) {
+    if (sets.refused_share == 0) return take(std::move(sets), "");
+    s.warn("visible sets gain nothing here, because a cell sees " +
+           std::to_string(std::lround(100 * sets.refused_share)) +
+           " % of the Gaussians on average: drawn without them");
+    return Status();
+  };
   if (s.source.embedded) {
     auto found = find();
-    made = found ? Result<io::CachedVisibleSets>(io::CachedVisibleSets{std::move(*found), true, {}})
-                 : Result<io::CachedVisibleSets>(found.status());
-  } else {
-    made = io::cached_visible_sets(s.source.gaussians, *asset.cloud, *viewpoints, settings,
-                                   asset.world_from_asset, find);
+    return found ? use(std::move(*found)) : found.status();
   }
-  if (made.code() == Errc::unsupported) {  // nearly everything is seen from everywhere
-    s.warn(made.message() + ": drawn without them");
-    return {};
-  }
+  auto made = io::cached_visible_sets(s.source.gaussians, *asset.cloud, *viewpoints, settings,
+                                      asset.world_from_asset, find);
   if (!made) return made.status();
   if (!made->warning.empty()) s.warn(made->warning);
-  return take(std::move(made->sets), "");
+  return use(std::move(made->sets));
 }
 
 }  // namespace gsnav::detail

@@ -174,4 +174,14 @@ TEST_CASE("visible sets file: cached beside the asset, by all that they are made
   CHECK(repaired.built);
   CHECK(contains(repaired.warning, "bytes"));
   CHECK_FALSE(io::cached_visible_sets(asset, rooms(), eyes, coarse(), {}, build).value().built);
+  std::filesystem::remove(path);
+  const auto refuse = [] {
+    VisibleSets sets;
+    sets.refused_share = 0.95;
+    return Result<VisibleSets>(std::move(sets));
+  };
+  const auto refused = io::cached_visible_sets(asset, rooms(), eyes, coarse(), {}, refuse).value();
+  CHECK(refused.sets.refused_share == 0.95);
+  CHECK(refused.warning.empty());
+  CHECK_FALSE(std::filesystem::exists(path));
 }

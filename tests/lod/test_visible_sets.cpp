@@ -354,14 +354,16 @@ TEST_CASE(
     VisibleSettings s = coarse();
     double done = 0;
     s.progress = [&](double share) { done = share; };
-    const auto stopped = build_visible_sets(backend, ring, eyes, s);
-    CHECK(stopped.code() == Errc::unsupported);
-    CHECK(contains(stopped.message(), "most_share"));
+    const VisibleSets stopped = build_visible_sets(backend, ring, eyes, s).value();
+    CHECK(stopped.cells() == 0);
+    CHECK(stopped.refused_share > s.most_share);
+    CHECK(stopped.refused_share <= 1);
     CHECK(done > 0);
     CHECK(done < 0.5);  // most of the viewpoints are not looked from
     s.most_share = 1;
     const VisibleSets all = build_visible_sets(backend, ring, eyes, s).value();
     CHECK(all.mean_row_share(ring.size()) > 0.9);
+    CHECK(all.refused_share == 0);
     CHECK(done == 1.0);
     // Behind walls: far more cells than the sample, most of the cloud hidden from each.
     const VisibleSets asked = build_visible_sets(backend, rooms(), indoors, coarse()).value();
@@ -369,6 +371,7 @@ TEST_CASE(
     never.most_share = 1;
     const VisibleSets unasked = build_visible_sets(backend, rooms(), indoors, never).value();
     CHECK(asked.cells() >= 64);
+    CHECK(asked.refused_share == 0);
     CHECK(asked.keys == unasked.keys);
     CHECK(asked.ends == unasked.ends);
     CHECK(asked.bits == unasked.bits);

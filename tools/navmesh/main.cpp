@@ -78,12 +78,14 @@ Status write_visible_sets(const Options& o, const GaussianCloud& cloud, const Na
   };
   OpenMPBackend backend(o.threads);
   const auto sets = build_visible_sets(backend, cloud, *viewpoints, settings, placed);
-  if (sets.code() == Errc::unsupported) {
-    std::fprintf(stderr, "%s (--visible-most 1). %s is not written.\n", sets.message().c_str(),
-                 printable(o.visible_sets).c_str());
+  if (!sets) return sets.status();
+  if (sets->refused_share > 0) {
+    std::fprintf(stderr,
+                 "visible sets gain nothing here, because a cell sees %.0f %% of the Gaussians on "
+                 "average, more than --visible-most. %s is not written.\n",
+                 100 * sets->refused_share, printable(o.visible_sets).c_str());
     return {};
   }
-  if (!sets) return sets.status();
   if (Status s = io::save_visible_sets(o.visible_sets, *sets, cloud); !s) return s;
   std::printf(
       "%s: %zu cells, from %zu viewpoints; a cell sees %.1f %% of %zu chunks, %.1f %% of the "

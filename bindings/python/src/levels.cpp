@@ -128,6 +128,10 @@ void bind_visible_sets(nb::module_& m) {
       .def_ro("min_weight", &V::min_weight, "VisibleSettings.min_weight.")
       .def_ro("viewpoints", &V::viewpoints, "Number of viewpoints that were used.")
       .def_ro("cloud_chunks", &V::cloud_chunks, "Number of chunks of the cloud.")
+      .def_ro("refused_share", &V::refused_share,
+              "If the sets would gain nothing: mean share of the Gaussians that the sampled cells see. "
+              "There "
+              "are no cells then, and everything is drawn. Otherwise 0.")
       .def_prop_ro("cells", &V::cells, "Number of cells.")
       .def_prop_ro("bytes", &V::bytes, "Bytes of the sets.")
       .def_prop_ro(
@@ -174,8 +178,9 @@ void bind_levels(nb::module_& m) {
         "Finds the Gaussians that are seen from each cell. Each of the viewpoints, [V][3] in metres in "
         "the world, costs six frames.\n\n"
         "`progress(share)` is called after each viewpoint. Its exceptions and Ctrl-C end the call. "
-        "Raises InvalidArgument naming the setting or viewpoint, and Unsupported if the sets would gain "
-        "nothing.");
+        "Raises InvalidArgument naming the setting or viewpoint. If the sets would gain nothing, they "
+        "have "
+        "no cells, and `refused_share` says why.");
   bind_viewpoints(m);
   // The module gsnav.io has these four.
   m.def(

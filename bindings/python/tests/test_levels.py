@@ -164,6 +164,15 @@ def test_visible_sets_are_written_and_read(cloud, cells, opened, tmp_path):
         gsnav.io.load_visible_sets(tmp_path / "none.vis", cloud)
 
 
+def test_sets_that_gain_nothing_have_no_cells(scene, cloud, cells):
+    settings = gsnav.VisibleSettings(face=32, most_share=0.01)
+    places = gsnav.navmesh_viewpoints(scene.navmesh, [1.5], settings.spacing())
+    refused = gsnav.build_visible_sets("cpu", cloud, places, settings)
+    assert refused.cells == 0 and 0.01 < refused.refused_share <= 1
+    camera = gsnav.Camera.look_at((2, 1.5, 2), (3, 1.5, 2), (0, 1, 0), 32, 32, 90)
+    assert refused.cell_of(camera) is None and cells[1].refused_share == 0
+
+
 def test_wrong_settings_are_named(scene, cloud):
     with pytest.raises(gsnav.InvalidArgument, match=r"LodSettings\.neighbours = 17"):
         gsnav.build_lod("cpu", cloud, gsnav.LodSettings(neighbours=17))

@@ -71,10 +71,10 @@ void add_near_chunks(B& backend, const VisibleSets& sets, const GaussianCloud& c
 /// @param cloud a sorted cloud (sort_spatially).
 /// @param viewpoints world frame, metres; navmesh_viewpoints makes them.
 /// @param world_from_asset placement of the cloud in the world.
-/// @return the sets, or one of these errors:
+/// @return the sets, without cells if they would gain nothing (VisibleSets::refused_share); or one of
+///   these errors:
 /// - invalid_argument: a setting out of range, no viewpoint, a viewpoint that is not finite, or a cloud
 ///   that is not sorted.
-/// - unsupported: the sets would gain nothing (VisibleSettings::most_share). Draw without them.
 /// - those of rendering.
 template <Backend B>
 requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
@@ -115,8 +115,12 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
   for (std::size_t done = 0; done < order.size(); ++done) {
     const std::size_t v = order[done];
     if (done == sampled && !sample.empty()) {
-      if (Status s = detail::check_sample(found, sample, cloud.size(), settings.most_share); !s)
-        return s;
+      const double share = detail::sampled_share(found, sample, cloud.size());
+      if (share > settings.most_share) {
+        out.keys.clear();
+        out.refused_share = share;
+        return out;
+      }
     }
     std::fill(most.begin(), most.end(), 0.0f);
     for (const Camera& camera : detail::cube_cameras(viewpoints[v], v, settings.face,

@@ -45,9 +45,9 @@ struct CachedVisibleSets {
 };
 
 /// The visible sets of a scene. They are read from visible_sets_path(), or else built by `build`, which
-/// returns a Result<VisibleSets>, and written there. Writing removes those of an earlier content of the
-/// scene's file, if they are older than it. A file that cannot be used and a folder that cannot be
-/// written only give a warning. Errors: those of `build`.
+/// returns a Result<VisibleSets>, and written there unless they would gain nothing. Writing removes
+/// those of an earlier content of the scene's file, if they are older than it. A file that cannot be
+/// used and a folder that cannot be written only give a warning. Errors: those of `build`.
 template <class Build>
 Result<CachedVisibleSets> cached_visible_sets(const std::string& spec, const GaussianCloud& cloud,
                                               std::span<const Vec3d> viewpoints,
@@ -57,7 +57,7 @@ Result<CachedVisibleSets> cached_visible_sets(const std::string& spec, const Gau
       visible_sets_path(spec, cloud, viewpoints, settings, world_from_asset), &CachedVisibleSets::sets,
       [&](const std::filesystem::path& path) { return load_visible_sets(path, cloud); }, build,
       [&](const std::filesystem::path& path, const VisibleSets& sets) {
-        return save_visible_sets(path, sets, cloud);
+        return sets.refused_share > 0 ? Status() : save_visible_sets(path, sets, cloud);
       });
 }
 

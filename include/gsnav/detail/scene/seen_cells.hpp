@@ -8,10 +8,8 @@
 #include <cstdint>
 #include <numeric>
 #include <span>
-#include <string>
 #include <vector>
 
-#include "gsnav/core/status.hpp"
 #include "gsnav/frame/gaussians.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/math/functions.hpp"
@@ -156,20 +154,13 @@ ViewpointOrder order_viewpoints(std::size_t cells, std::size_t viewpoints, bool 
   return out;
 }
 
-/// Checks VisibleSettings::most_share: unsupported if the sampled cells see on average more than that
-/// share of `size` Gaussians.
-inline Status check_sample(const std::vector<SeenOfCell>& found, const std::vector<std::size_t>& sample,
-                           std::size_t size, double most_share) {
-  double share = 0;
-  for (const std::size_t c : sample) share += static_cast<double>(found[c].count());
-  share /= static_cast<double>(sample.size()) * static_cast<double>(std::max<std::size_t>(size, 1));
-  if (!(share > most_share)) return {};
-  return {Errc::unsupported, "visible sets gain nothing here: " + std::to_string(sample.size()) +
-                                 " of " + std::to_string(found.size()) + " cells see " +
-                                 std::to_string(std::lround(100 * share)) +
-                                 " % of the Gaussians on average, more than most_share = " +
-                                 std::to_string(std::lround(100 * most_share)) +
-                                 " %. Draw without them, or set most_share = 1"};
+/// Mean share of `size` Gaussians that the sampled cells see.
+inline double sampled_share(const std::vector<SeenOfCell>& found, const std::vector<std::size_t>& sample,
+                            std::size_t size) {
+  double sum = 0;
+  for (const std::size_t c : sample) sum += static_cast<double>(found[c].count());
+  return sum /
+         (static_cast<double>(sample.size()) * static_cast<double>(std::max<std::size_t>(size, 1)));
 }
 
 /// Cameras for the six faces of a cube around `eye`. The cube is turned about the world's up axis (Y) by

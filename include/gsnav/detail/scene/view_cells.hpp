@@ -37,7 +37,11 @@ struct VisibleSets {
   double min_weight = 0;         ///< VisibleSettings::min_weight.
   std::size_t cloud_chunks = 0;  ///< Number of chunks of the cloud.
   std::size_t viewpoints = 0;    ///< Number of viewpoints that were used.
-  std::vector<Key> keys;         ///< The cells, ascending.
+  /// If the sets would gain nothing (VisibleSettings::most_share): mean share of the Gaussians that the
+  /// sampled cells see. There are no cells then, and everything is drawn. Otherwise 0. Files do not have
+  /// it.
+  double refused_share = 0;
+  std::vector<Key> keys;  ///< The cells, ascending.
   std::vector<std::uint64_t>
       ends;  ///< [cells] end of each cell's words in `bits`. Those of the first cell begin at 0.
   std::vector<std::uint32_t> bits;  ///< Selection::seen of each cell, one after another.

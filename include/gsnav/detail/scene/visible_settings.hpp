@@ -23,8 +23,9 @@ struct VisibleSettings {
       0.2;  ///< Near plane of these images. Chunks nearer to a cell than this are always in its set.
   double near_sigma = 0;  ///< Camera::near_sigma of these images.
   /// Largest mean share of the Gaussians that a cell may see, in (0, 1]. Above it, as in the open, sets
-  /// gain nothing and build_visible_sets returns unsupported. It decides early, on 16 cells spread
-  /// evenly that are finished first. 1: never refuse. With fewer than 64 cells it never refuses either.
+  /// gain nothing and build_visible_sets returns VisibleSets::refused_share and no cells. It decides
+  /// early, on 16 cells spread evenly that are finished first. It never refuses at 1, nor with fewer
+  /// than 64 cells.
   double most_share = 0.9;
 
   /// Recommended distance between viewpoints (navmesh_viewpoints). Each cell then has several, each with
