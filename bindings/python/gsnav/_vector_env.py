@@ -27,6 +27,8 @@ from ._spaces import AutoresetMode, BaseVectorEnv, batch_space, make_generator
 
 # An array per sensor: float32 of numpy, or a DeviceArray.
 Observation = dict[str, Any]
+# Observations, rewards, terminations, truncations and infos.
+StepResults = tuple[Observation, npt.NDArray[np.float64], npt.NDArray[np.bool_], npt.NDArray[np.bool_], dict[str, Any]]
 
 BOOLS = {bool, np.bool_}
 MARKED_FIELDS = tuple((name, "_" + name) for name in _task.INFO_FIELDS)
@@ -116,6 +118,8 @@ class VectorEnv(BaseVectorEnv):
         self._all.flags.writeable = False
         # Views of each step, made once: the simulator writes all steps to the same memory.
         self._views: tuple[npt.NDArray[Any], ...] | None = None
+        # Results of the step that runs, and the environments whose episode ended in it.
+        self._results: tuple[StepResults, list[int]] | None = None
         self._simulator: BatchSimulator | None = BatchSimulator(
             device, self.scenes, batch_config(config, AUTO_RESETS[mode.value]), self.num_envs, self._source, copy)
 
@@ -146,7 +150,10 @@ class VectorEnv(BaseVectorEnv):
             step = simulator.reset(mask)
         infos: dict[str, Any] = {}
         self._add_step_info(infos, step.infos, self._all if mask is None else mask)
-        return self._observation(step), infos
+        observation = self._observation(step)
+        if self.render_mode is not None:
+            self._show(observation[self._rgb])
+        return observation, infos
 
     def step(self, actions: Any) -> tuple[Observation, npt.NDArray[np.float64], npt.NDArray[np.bool_],
                                           npt.NDArray[np.bool_], dict[str, Any]]:
@@ -155,15 +162,32 @@ class VectorEnv(BaseVectorEnv):
         Returns observations, rewards, terminations, truncations and infos. Wrong actions raise an exception
         before any environment moves.
         """
-        step = self.simulator.step(self._checked(actions))
+        simulator: Any = self.simulator  # _step_plain is no function for users
+        # After a step, whose images filled the caches, functions of numpy take ten times as long. C++ checks the most.
+        if type(actions) is not np.ndarray or not simulator._step_plain(actions, _task.ACTIONS, self._prepare):
+            simulator.step(self._checked(actions), self._prepare)
+        prepared = self._results
+        assert prepared is not None
+        self._results = None
+        results, ended = prepared
+        if self.render_mode is not None:
+            self._show(results[0][self._rgb])
+        if ended and self._same_step:
+            self._add_begun(results[4], ended)
+        return results
+
+    def _prepare(self, step: BatchStep) -> None:
+        """Makes the results of a step. It runs while a GPU draws, so that images are not complete."""
         if self._views is None:
             self._views = step.infos, step.point_goals, step.rewards, step.terminated, step.truncated
         rows, _, rewards, terminated, truncated = self._views
         infos: dict[str, Any] = {}
         self._add_step_info(infos, rows, self._all)
-        if len(step.finished):
+        ended = step.finished.tolist()
+        if ended:
             self._add_ends(infos, step)
-        return self._observation(step), rewards.copy(), terminated.copy(), truncated.copy(), infos
+        results = self._observation(step), rewards.copy(), terminated.copy(), truncated.copy(), infos
+        self._results = results, ended
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
         """The last image of each environment's first RGB sensor, uint8 [H][W][3]. None without a render mode."""
@@ -178,7 +202,7 @@ class VectorEnv(BaseVectorEnv):
     def close_extras(self, **kwargs: Any) -> None:
         """Frees the simulator. Observations stay valid."""
         self._simulator = self._views = None
-        self._last = None
+        self._last = self._results = None
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
         many: Any = seed
@@ -208,7 +232,6 @@ class VectorEnv(BaseVectorEnv):
             raise TypeError(f"VectorEnv.step: actions have dtype {array.dtype}: use integers")
         if array.shape != (self.num_envs,):
             raise InvalidArgument(f"VectorEnv.step: actions have shape {array.shape}: it must be ({self.num_envs},)")
-        # After a step, whose images filled the caches, three operations of numpy take ten times as long.
         if not VALID.issuperset(array.tolist()):
             e = int(np.argmax((array < 0) | (array >= _task.ACTIONS)))
             raise InvalidArgument(f"VectorEnv.step: environment {e}: action {array[e]}: "
@@ -229,8 +252,6 @@ class VectorEnv(BaseVectorEnv):
     def _observation(self, step: BatchStep) -> Observation:
         made: Observation = {**step.images, **step.on_backend}
         made[_task.POINT_GOAL] = (step.point_goals if self._views is None else self._views[1]).astype(np.float32)
-        if self.render_mode is not None:
-            self._show(made[self._rgb])
         return made
 
     def _show(self, image: Any) -> None:
@@ -279,7 +300,11 @@ class VectorEnv(BaseVectorEnv):
             images: dict[str, Any] = {**step.final_images, **step.final_on_backend}
             observations[e] = {name: image[i] for name, image in images.items()}
             observations[e][_task.POINT_GOAL] = goals[i]
-            fresh = self.simulator.world(int(e)).last_step  # of the episode that has begun
+        self._add(infos, "final_obs", observations, ended)
+
+    def _add_begun(self, infos: dict[str, Any], ended: list[int]) -> None:
+        """With SAME_STEP, the infos of the episodes that have begun."""
+        for e in ended:
+            fresh = self.simulator.world(e).last_step
             for name in _task.INFO_FIELDS:
                 infos[name][e] = getattr(fresh, name)
-        self._add(infos, "final_obs", observations, ended)

@@ -2,7 +2,9 @@
 #include "actions.hpp"
 
 #include <cmath>
+#include <cstring>
 #include <string>
+#include <string_view>
 
 #include "device_array.hpp"
 #include "fields.hpp"
@@ -49,6 +51,19 @@ std::vector<Action> from_array(const Array& array, std::size_t environments) {
   if (array.dtype() == nb::dtype<std::uint32_t>()) return read<std::uint32_t>(array);
   if (array.dtype() == nb::dtype<std::uint64_t>()) return read<std::uint64_t>(array);
   throw nb::type_error("actions: the array must have a dtype of integers, such as int64");
+}
+
+/// Numbers of a buffer as actions. Returns nothing if one is not below `count`.
+template <class T>
+std::optional<std::vector<Action>> below(const Py_buffer& buffer, std::size_t count) {
+  std::vector<Action> actions(static_cast<std::size_t>(buffer.shape[0]));
+  for (std::size_t i = 0; i < actions.size(); ++i) {
+    T value;
+    std::memcpy(&value, static_cast<const char*>(buffer.buf) + i * sizeof(T), sizeof(T));
+    if (value < 0 || static_cast<std::size_t>(value) >= count) return {};
+    actions[i] = static_cast<Action>(value);
+  }
+  return actions;
 }
 
 void check(const VelocityCommand& c, std::size_t environment) {
@@ -123,6 +138,24 @@ BatchActions batch_actions(nb::handle source, std::size_t environments) {
   if (commands.empty()) return actions;
   if (!actions.empty()) throw nb::type_error("actions: mix no velocities with discrete actions");
   return commands;
+}
+
+std::optional<std::vector<Action>> plain_actions(nb::handle source, std::size_t environments,
+                                                 std::size_t count) noexcept {
+  Py_buffer buffer;
+  if (PyObject_GetBuffer(source.ptr(), &buffer, PyBUF_ND | PyBUF_FORMAT) != 0) {
+    PyErr_Clear();
+    return {};
+  }
+  std::optional<std::vector<Action>> actions;
+  const std::string_view format = buffer.format == nullptr ? "" : buffer.format;
+  if (buffer.ndim == 1 && static_cast<std::size_t>(buffer.shape[0]) == environments) {
+    static_assert(sizeof(long) == 8 && sizeof(int) == 4);
+    if (format == "l" || format == "q") actions = below<std::int64_t>(buffer, count);
+    if (format == "i") actions = below<std::int32_t>(buffer, count);
+  }
+  PyBuffer_Release(&buffer);
+  return actions;
 }
 
 std::vector<std::uint8_t> reset_mask(nb::handle source, std::size_t environments) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <chrono>
+#include <exception>
 #include <optional>
+#include <utility>
 #include <variant>
 
 #include "actions.hpp"
@@ -10,75 +12,15 @@
 #include "episode_source.hpp"
 #include "fields.hpp"
 #include "image_source.hpp"
-#include "structured.hpp"
 #include "world.hpp"
 
 namespace gsnav::python {
 namespace {
 
-/// dtype of metrics, and the arrays of a step that ends no episode. They live as long as the process.
-struct Types {
-  nb::object metrics = metrics_dtype();
-  nb::object no_goals = array_copy(std::span<const double>(), {0, 2});
-  nb::object no_metrics = structured_copy(std::span<const EpisodeMetrics>(), metrics);
-};
-const Types& types() {
-  static const Types* const made = new Types;
-  return *made;
-}
-
-std::vector<std::size_t> shape_of(const BatchObservation& o) {
-  return {o.environments, static_cast<std::size_t>(o.height), static_cast<std::size_t>(o.width),
-          static_cast<std::size_t>(o.channels)};
-}
-
-/// Arrays by the names of their sensors. `array` makes that of one image.
+/// Runs f(simulator) -> Result<BatchStep> without the GIL. Exceptions of Python's functions go on:
+/// `raised`, and those of the sources.
 template <class F>
-nb::dict image_arrays(std::span<const BatchObservation> images, const F& array) {
-  nb::dict out;
-  for (const BatchObservation& o : images) {
-    if (o.on_backend == nullptr) out[nb::str(o.uuid.data(), o.uuid.size())] = array(o);
-  }
-  return out;
-}
-
-nb::object copied(const BatchObservation& o) { return array_copy(o.data, shape_of(o)); }
-
-nb::dict step_images(std::span<const BatchObservation> images, const BatchCore& b, nb::handle self) {
-  return image_arrays(images, [&](const BatchObservation& o) {
-    if (!b.copy) return array_view(o.data.data(), shape_of(o), self);
-    // Sensors may share an image, but each has an array of its own.
-    nb::object own = b.pool != nullptr ? b.pool->array<float>(o.data.data(), shape_of(o)) : nb::object();
-    return own.is_valid() ? own : copied(o);
-  });
-}
-
-/// Arrays of a step. Those of the episodes that ended are copies, because their sizes change from step
-/// to step.
-PythonStep step_arrays(const BatchStep& s, const BatchCore& b, nb::handle self) {
-  PythonStep out{s, nb::borrow(self), {}, {}, {}, {}, {}, {}, {}};
-  std::vector<std::int64_t> finished(s.finished.begin(), s.finished.end());
-  const std::size_t ended = finished.size();
-  out.finished = array_from(std::move(finished), {ended});
-  const auto* const goals = reinterpret_cast<const double*>(s.final_point_goals.data());
-  const Types& t = types();
-  out.final_point_goals = ended == 0 ? t.no_goals : array_copy(std::span(goals, 2 * ended), {ended, 2});
-  out.final_metrics = ended == 0 ? t.no_metrics : structured_copy(s.final_metrics, t.metrics);
-  // Images are views of memory that belongs to the simulator, or to the arrays of the source.
-  const nb::object owner = b.images->given.size() == 0
-                               ? nb::borrow(self)
-                               : nb::object(nb::make_tuple(nb::borrow(self), b.images->given));
-  out.images = step_images(s.images, b, owner);
-  out.final_images = image_arrays(s.final_images, copied);
-  out.on_backend = device_images(s.images, b.sim.device(), b.consumers, owner);
-  out.final_on_backend = device_images(s.final_images, b.sim.device(), b.consumers, self);
-  return out;
-}
-
-/// Runs f(simulator) -> Result<BatchStep> without the GIL. An exception of the episode source goes on.
-template <class F>
-PythonStep observe(PythonBatch& batch, const char* what, const F& f) {
-  BatchCore& b = *batch.core;
+void run(BatchCore& b, const char* what, const std::exception_ptr& raised, const F& f) {
   check_fork(b.sim.device(), what);
   b.source->error.reset();
   b.images->error.reset();
@@ -90,16 +32,44 @@ PythonStep observe(PythonBatch& batch, const char* what, const F& f) {
     b.consumers->wait();
     result.emplace(f(b.sim));
   }
-  if (!result->ok()) {
-    for (std::optional<nb::python_error>* raised : {&b.source->error, &b.images->error}) {
-      if (!*raised) continue;
-      nb::python_error error = std::move(**raised);
-      raised->reset();
-      throw error;
-    }
-    result->status().throw_if_error();
+  if (result->ok()) return;
+  if (raised) std::rethrow_exception(raised);
+  for (std::optional<nb::python_error>* of_source : {&b.source->error, &b.images->error}) {
+    if (!*of_source) continue;
+    nb::python_error error = std::move(**of_source);
+    of_source->reset();
+    throw error;
   }
-  return step_arrays(**result, b, batch.owner);
+  result->status().throw_if_error();
+}
+
+/// Runs f(simulator, WhileDrawing) -> Result<BatchStep> and returns its BatchStep of Python. This object
+/// is made, and `meanwhile` called with it, while a GPU draws.
+template <class F>
+nb::object observe(PythonBatch& batch, const char* what, nb::handle meanwhile, const F& f) {
+  BatchCore& b = *batch.core;
+  if (!meanwhile.is_none() && !PyCallable_Check(meanwhile.ptr())) {
+    throw nb::type_error(
+        (std::string(what) + ": meanwhile must be callable or None, got " + type_of(meanwhile)).c_str());
+  }
+  nb::object made;
+  Unfilled unfilled;
+  std::exception_ptr raised;
+  const WhileDrawing prepare = [&](const BatchStep& s) -> Status {
+    const HoldGil gil;
+    b.begun = true;
+    try {
+      made = nb::cast(step_arrays(s, b, batch.owner, unfilled));
+      if (!meanwhile.is_none()) call_python(nb::borrow(meanwhile), made);
+      return {};
+    } catch (const std::exception&) {
+      raised = std::current_exception();
+      return {Errc::invalid_argument, "meanwhile raised an exception"};
+    }
+  };
+  run(b, what, raised, [&](BatchSimulator& sim) { return f(sim, prepare); });
+  for (const auto& [image, data] : unfilled) copy_numbers(image, data);
+  return made;
 }
 
 /// Memory for images that numpy arrays own. The pool keeps the bytes of two steps, because a caller may
@@ -155,25 +125,35 @@ void make(PythonBatch* self, const DeviceArg& device, const std::vector<SceneArg
   new (self) PythonBatch(std::move(core));
 }
 
-PythonStep reset(nb::handle self, nb::handle mask) {
+nb::object reset(nb::handle self, nb::handle mask, nb::handle meanwhile) {
   auto& b = object_of<PythonBatch>(self);
   const Busy::Hold hold(b.core->busy, "BatchSimulator.reset");
   const std::vector<std::uint8_t> chosen = reset_mask(mask, b.core->sim.environments());
-  PythonStep step =
-      observe(b, "BatchSimulator.reset", [&](BatchSimulator& sim) { return sim.reset(chosen); });
-  b.core->begun = true;
-  return step;
+  return observe(b, "BatchSimulator.reset", meanwhile,
+                 [&](BatchSimulator& sim, const WhileDrawing& f) { return sim.reset(chosen, f); });
 }
 
-PythonStep step(nb::handle self, nb::handle actions) {
+nb::object step(nb::handle self, nb::handle actions, nb::handle meanwhile) {
   auto& b = object_of<PythonBatch>(self);
   const Busy::Hold hold(b.core->busy, "BatchSimulator.step");
   const BatchActions chosen = batch_actions(actions, b.core->sim.environments());
   return std::visit(
       [&](const auto& a) {
-        return observe(b, "BatchSimulator.step", [&](BatchSimulator& sim) { return sim.step(a); });
+        return observe(b, "BatchSimulator.step", meanwhile,
+                       [&](BatchSimulator& sim, const WhileDrawing& f) { return sim.step(a, f); });
       },
       chosen);
+}
+
+/// Steps with actions that plain_actions takes. Returns false, and does nothing, for others.
+bool step_plain(nb::handle self, nb::handle actions, std::size_t count, nb::handle meanwhile) {
+  auto& b = object_of<PythonBatch>(self);
+  const Busy::Hold hold(b.core->busy, "BatchSimulator.step");
+  const auto chosen = plain_actions(actions, b.core->sim.environments(), count);
+  if (!chosen) return false;
+  observe(b, "BatchSimulator.step", meanwhile,
+          [&](BatchSimulator& sim, const WhileDrawing& f) { return sim.step(*chosen, f); });
+  return true;
 }
 
 /// Seconds of some steps without Python between them: what speed.py compares VectorEnv with.
@@ -189,7 +169,7 @@ double time_steps(nb::handle self, const std::vector<nb::object>& steps) {
     chosen.push_back(batch_actions(actions, b.core->sim.environments()));
   }
   std::chrono::duration<double> took{};
-  observe(b, "BatchSimulator._time_steps", [&](BatchSimulator& sim) {
+  run(*b.core, "BatchSimulator._time_steps", {}, [&](BatchSimulator& sim) {
     const auto start = std::chrono::steady_clock::now();
     std::optional<Result<BatchStep>> last;
     for (const BatchActions& actions : chosen) {
@@ -267,7 +247,6 @@ void bind_counts(nb::class_<PythonBatch>& c) {
 }  // namespace
 
 void bind_batch(nb::module_& m) {
-  types();
   bind_step(m);
   using P = PythonBatch;
   nb::class_<P> c(
@@ -295,17 +274,31 @@ void bind_batch(nb::module_& m) {
         "returns an array of at least that many float32 (DLPack) where `config.images` leaves images. "
         "The step draws into it, so a learner can keep images without a copy. Other libraries must "
         "have finished their work on this memory.")
+      .def("reset", reset, nb::arg("mask") = nb::none(), nb::arg("meanwhile") = nb::none(),
+           nb::sig("def reset(self, mask: numpy.typing.NDArray[numpy.bool_] | None = None, meanwhile: "
+                   "collections.abc.Callable[[BatchStep], object] | None = None) -> BatchStep"),
+           "Starts the next episode in all environments, or in those whose mask is True, bool [N]. "
+           "`meanwhile`: as in step.")
       .def(
-          "reset", reset, nb::arg("mask") = nb::none(),
-          nb::sig("def reset(self, mask: numpy.typing.NDArray[numpy.bool_] | None = None) -> BatchStep"),
-          "Starts the next episode in all environments, or in those whose mask is True, bool [N].")
-      .def("step", step, nb::arg("actions").none(),
-           nb::sig("def step(self, actions: numpy.typing.NDArray[numpy.integer[typing.Any]] | "
-                   "collections.abc.Sequence[Action | int] | collections.abc.Sequence[VelocityCommand]) "
-                   "-> BatchStep"),
-           "Performs one action per environment and renders. `actions`: integers [N] of any dtype, "
-           "stride "
-           "and library (DLPack), or a list. Wrong actions are refused before any environment moves.")
+          "step", step, nb::arg("actions").none(), nb::arg("meanwhile") = nb::none(),
+          nb::sig("def step(self, actions: numpy.typing.NDArray[numpy.integer[typing.Any]] | "
+                  "collections.abc.Sequence[Action | int] | collections.abc.Sequence[VelocityCommand], "
+                  "meanwhile: collections.abc.Callable[[BatchStep], object] | None = None) "
+                  "-> BatchStep"),
+          "Performs one action per environment and renders. `actions`: integers [N] of any dtype, "
+          "stride "
+          "and library (DLPack), or a list. Wrong actions are refused before any environment moves.\n\n"
+          "`meanwhile(step)` is called once after the environments have moved, while a GPU draws, so "
+          "that "
+          "its work takes no time of its own. It gets the BatchStep that the call returns, whose images "
+          "are complete only then. On a CPU it is called after drawing. Its exceptions reach the caller "
+          "when the images are complete; no reset is needed. It must not call the simulator.")
+      .def("_step_plain", step_plain, nb::arg("actions"), nb::arg("count"), nb::arg("meanwhile"),
+           nb::sig("def _step_plain(self, actions: object, count: int, "
+                   "meanwhile: collections.abc.Callable[[BatchStep], object]) -> bool"),
+           "Step of VectorEnv: False, and no step, unless the actions are a contiguous array [N] of "
+           "int32 "
+           "or int64 below `count`.")
       .def("_time_steps", time_steps, nb::arg("actions"),
            nb::sig("def _time_steps(self, actions: list[typing.Any]) -> float"),
            "Seconds of these steps in C++, for benchmarks.")

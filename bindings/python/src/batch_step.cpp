@@ -12,6 +12,48 @@ namespace gsnav::python {
 
 namespace {
 
+/// dtype of metrics, and the arrays of a step that ends no episode. They live as long as the process.
+struct Types {
+  nb::object metrics = metrics_dtype();
+  nb::object no_goals = array_copy(std::span<const double>(), {0, 2});
+  nb::object no_metrics = structured_copy(std::span<const EpisodeMetrics>(), metrics);
+};
+const Types& types() {
+  static const Types* const made = new Types;
+  return *made;
+}
+
+std::vector<std::size_t> shape_of(const BatchObservation& o) {
+  return {o.environments, static_cast<std::size_t>(o.height), static_cast<std::size_t>(o.width),
+          static_cast<std::size_t>(o.channels)};
+}
+
+/// Arrays by the names of their sensors. `array` makes that of one image.
+template <class F>
+nb::dict image_arrays(std::span<const BatchObservation> images, const F& array) {
+  nb::dict out;
+  for (const BatchObservation& o : images) {
+    if (o.on_backend == nullptr) out[nb::str(o.uuid.data(), o.uuid.size())] = array(o);
+  }
+  return out;
+}
+
+nb::object copied(const BatchObservation& o) { return array_copy(o.data, shape_of(o)); }
+
+nb::dict step_images(std::span<const BatchObservation> images, const BatchCore& b, nb::handle self,
+                     Unfilled& unfilled) {
+  return image_arrays(images, [&](const BatchObservation& o) {
+    if (!b.copy) return array_view(o.data.data(), shape_of(o), self);
+    // Sensors may share an image, but each has an array of its own.
+    nb::object own = b.pool != nullptr ? b.pool->array<float>(o.data.data(), shape_of(o)) : nb::object();
+    if (own.is_valid()) return own;
+    float* data = nullptr;
+    own = new_array(shape_of(o), data);
+    unfilled.emplace_back(o.data, data);
+    return own;
+  });
+}
+
 nb::object bool_view(std::span<const std::uint8_t> values, nb::handle owner) {
   return array_view(values.data(), {values.size()}, owner).attr("view")("?");
 }
@@ -29,7 +71,28 @@ nb::object goal_view(const PythonStep& s) {
 
 }  // namespace
 
+PythonStep step_arrays(const BatchStep& s, const BatchCore& b, nb::handle self, Unfilled& unfilled) {
+  PythonStep out{s, nb::borrow(self), {}, {}, {}, {}, {}, {}, {}};
+  std::vector<std::int64_t> finished(s.finished.begin(), s.finished.end());
+  const std::size_t ended = finished.size();
+  out.finished = array_from(std::move(finished), {ended});
+  const auto* const goals = reinterpret_cast<const double*>(s.final_point_goals.data());
+  const Types& t = types();
+  out.final_point_goals = ended == 0 ? t.no_goals : array_copy(std::span(goals, 2 * ended), {ended, 2});
+  out.final_metrics = ended == 0 ? t.no_metrics : structured_copy(s.final_metrics, t.metrics);
+  // Images are views of memory that belongs to the simulator, or to the arrays of the source.
+  const nb::object owner = b.images->given.size() == 0
+                               ? nb::borrow(self)
+                               : nb::object(nb::make_tuple(nb::borrow(self), b.images->given));
+  out.images = step_images(s.images, b, owner, unfilled);
+  out.final_images = image_arrays(s.final_images, copied);
+  out.on_backend = device_images(s.images, b.sim.device(), b.consumers, owner);
+  out.final_on_backend = device_images(s.final_images, b.sim.device(), b.consumers, self);
+  return out;
+}
+
 void bind_step(nb::module_& m) {
+  types();
   using S = PythonStep;
   nb::class_<S> c(m, "BatchStep",
                   "Result of a batch step in the form of Gymnasium's VectorEnv. Arrays with one row per "
