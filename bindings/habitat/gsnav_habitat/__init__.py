@@ -6,7 +6,7 @@ import functools
 import os
 import sys
 import warnings
-from typing import Any, NoReturn
+from typing import Any, Callable, NoReturn
 
 # Distributions that own the names of this one. "magnum" on PyPI is a service of OpenStack.
 _RIVALS = ("habitat_sim", "magnum", "magnum_bindings")
@@ -66,15 +66,33 @@ def message(name: str) -> str:
     return f"gsnav serves navigation only: {name}"
 
 
+class NotServed(NotImplementedError, AttributeError):
+    """A name that gsnav does not serve. `hasattr` is False for it, as for names that do not exist."""
+
+
+def missing(module: str) -> Callable[[str], NoReturn]:
+    """The function __getattr__ of a module. It raises NotServed with the name."""
+
+    def look_up(name: str) -> NoReturn:
+        if name.startswith("__"):  # Python asks for these.
+            raise AttributeError(f"module {module!r} has no attribute {name!r}")
+        raise NotServed(message(f"{module}.{name}"))
+
+    return look_up
+
+
 class _Unserved(type):
     """Type of placeholders. Their attributes and calls raise NotImplementedError."""
 
     def __call__(cls, *args: Any, **kwargs: Any) -> NoReturn:
         raise NotImplementedError(message(f"{cls.__module__}.{cls.__qualname__}"))
 
+    def __getattr__(cls, name: str) -> NoReturn:
+        raise NotServed(message(f"{cls.__module__}.{cls.__qualname__}.{name}"))
+
 
 def unserved(module: str, name: str, **members: Any) -> type:
-    """A class for annotations and imports. It raises NotImplementedError when it is constructed.
+    """A class for annotations and imports. It raises NotImplementedError when it or an attribute of it is used.
 
     `members` become attributes of the class.
     """

@@ -13,14 +13,16 @@ _MODULES: dict[str, tuple[str, ...]] = {
     "attributes_managers": ("ObjectAttributesManager", "StageAttributesManager", "AssetAttributesManager"),
     "sim": ("SimulatorBackend",),
     "bindings": ("Configuration", "ConfigValType"),
-    "_ext.habitat_sim_bindings": ("Configuration",),
+    "_ext.habitat_sim_bindings": ("Configuration", "AssetType", "RenderInstanceHelper"),
 }
-_NAMES = ("ReplayRenderer", "ReplayRendererConfiguration", "AbstractReplayRenderer", "AudioSensorSpec")
+_NAMES = ("ReplayRenderer", "ReplayRendererConfiguration", "AbstractReplayRenderer", "AudioSensorSpec",
+          "AssetType", "RenderInstanceHelper")  # fmt: skip
 
 
 def _module(name: str, names: tuple[str, ...]) -> types.ModuleType:
     full = f"habitat_sim.{name}"
     made = types.ModuleType(full, "Names that gsnav does not serve.")
+    made.__getattr__ = _shared.missing(full)  # type: ignore[method-assign]
     for each in names:
         setattr(made, each, _shared.unserved(full, each))
     sys.modules[full] = made

@@ -229,7 +229,17 @@ def test_names_that_are_not_served_say_so(sim):
                  sim.cast_ray):  # fmt: skip
         with pytest.raises(NotImplementedError, match="gsnav serves navigation only: habitat_sim"):
             call()
-    assert habitat_sim.__gsnav__ is True and not hasattr(habitat_sim, "no_such_name")
+    assert habitat_sim.__gsnav__ is True
+    for where, name in ((habitat_sim, "no_such_name"), (habitat_sim.gfx, "no_such_name"), (mn, "no_such_name"),
+                        (habitat_sim.AssetType, "GAUSSIAN_SPLATTING"), (habitat_sim.gfx.RenderTarget, "blit_depth_to"),
+                        (habitat_sim.physics.MotionType, "DYNAMIC")):  # fmt: skip
+        with pytest.raises(NotImplementedError, match=f"gsnav serves navigation only: .*{name}"):
+            getattr(where, name)
+        assert not hasattr(where, name)
+    with pytest.raises(NotImplementedError, match="gsnav.*RenderInstanceHelper"):
+        habitat_sim.RenderInstanceHelper(sim, use_xyzw_orientations=False)
+    with pytest.raises(ImportError):
+        from habitat_sim import no_such_name  # noqa: F401
     assert (habitat_sim.cuda_enabled, habitat_sim.built_with_bullet, habitat_sim.audio_enabled) == (False,) * 3
 
 
