@@ -234,18 +234,22 @@ Result<NavMesh> build_in_tiles(const NavGround& ground, const NavMeshSettings& t
 
 Result<NavMesh> build_whole(const NavGround& ground, GaussianNavReport& report) {
   const NavMeshSettings& settings = ground.settings;
+  detail::Progress progress;
+  if (ground.options.progress)
+    progress = [&](double share) { ground.options.progress("polygons", share); };
   detail::RecastLog log;
   auto field = detail::make_heightfield(log, settings, {}, ground.extent.high - ground.extent.low);
   if (!field.ok()) return field.status();
   if (Status s = ground.add_to(log, 0, 0, **field); !s.ok()) return s;
   if (!ground.triangles.empty()) {
     if (Status s = detail::rasterise(log, settings, ground.vertices, ground.triangles, ground.origin(),
-                                     **field);
+                                     **field, progress);
         !s.ok())
       return s;
   }
-  return detail::finish_navmesh(log, settings, **field, ground.origin(),
-                                {Pruner{ground.options.min_island_area, report}, ground.height, {}});
+  return detail::finish_navmesh(
+      log, settings, **field, ground.origin(),
+      {Pruner{ground.options.min_island_area, report}, ground.height, progress});
 }
 
 Result<NavMeshFromGaussians> build(const NavMeshSettings& settings, std::span<const GaussianSet> sets,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Voxels that opaque Gaussians fill, tile by tile.
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -290,13 +291,19 @@ Status rasterise_tiles(VoxelGrid& g, std::span<const GaussianSet> sets, const Ga
     }
     out.runs.shrink_to_fit();
   };
+  std::atomic<bool> ended{false};  // The progress function threw: no tile is begun any more.
   const Status made = run_guarded(pool, static_cast<std::uint32_t>(tiles.size()), [&](std::uint32_t t) {
+    if (ended) return Status();
     tile(t);
     if (!o.progress) return Status();
     const std::lock_guard held(lock);
     ++done;
-    o.progress("voxels", static_cast<double>(done) / static_cast<double>(tiles.size()));
-    return Status();
+    const Status told = guarded([&] {
+      o.progress("voxels", static_cast<double>(done) / static_cast<double>(tiles.size()));
+      return Status();
+    });
+    if (!told) ended = true;
+    return told;
   });
   if (!made.ok()) return {made.code(), "NavMesh from Gaussians, solid voxels: " + made.message()};
   return join_tiles(g, lists, tiles);

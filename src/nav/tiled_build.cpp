@@ -248,10 +248,11 @@ Result<NavMesh> build_in_tiles(const NavMeshSettings& settings, std::span<const 
   std::sort(work.begin(), work.end(), std::greater<>());
   std::mutex lock;
   std::size_t done = 0;
+  std::atomic<bool> ended{false};  // hooks.progress threw: no tile is begun any more.
   CallingProgress calling(hooks.calling_progress, tiles.size());
   const auto piece = [&](std::uint32_t turn) noexcept {
     const std::uint32_t i = work[turn].second;
-    if (calling.stopped()) return;
+    if (calling.stopped() || ended) return;
     failed[i] = guarded([&] {
       if (i == 0) {
         if (!hooks.height) heights.emplace(vertices, triangles, origin, box);
@@ -263,8 +264,12 @@ Result<NavMesh> build_in_tiles(const NavMeshSettings& settings, std::span<const 
       calling.tile_is_done();
       if (!hooks.progress) return Status();
       const std::lock_guard held(lock);
-      hooks.progress(static_cast<double>(++done) / static_cast<double>(tiles.size()));
-      return Status();
+      const Status told = guarded([&] {
+        hooks.progress(static_cast<double>(++done) / static_cast<double>(tiles.size()));
+        return Status();
+      });
+      if (!told) ended = true;
+      return told;
     });
   };
   pool.run(static_cast<std::uint32_t>(tiles.size() + 1), piece);

@@ -56,7 +56,10 @@ Result<Gaussians> read_file(OpeningScene& s) {
 
 /// Makes the embedded flat, with its triangles.
 Result<Gaussians> make_flat(OpeningScene& s) {
-  auto flat = make_default_scene(s.options.density);
+  SceneSampling sampling;
+  sampling.density = s.options.density;
+  sampling.progress = [&s](double share) { s.tell("Gaussians", share); };
+  auto flat = make_default_scene(sampling);
   if (!flat) return flat.status();
   s.triangles = {std::move(flat->vertices), std::move(flat->triangles)};
   s.out.report.source = s.source.name;

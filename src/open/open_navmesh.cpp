@@ -170,6 +170,7 @@ Status add_people(OpeningScene& s, const std::optional<NavMeshChoice>& choice) {
     body.agent_height = 1.8;
     if (auto made = build(s, *choice, body, "NavMesh of people")) wide = std::move(*made);
   }
+  s.tell("people");
   auto people = walking_people(wide ? *wide : *s.scene.navmesh, o.people, o.seed, o.density);
   if (!people) return people.status();
   s.scene.avatars = std::move(*people);
@@ -183,6 +184,7 @@ Status open_navmesh(OpeningScene& s) {
   const OpenOptions& o = s.options;
   const auto choice = choose(s);
   if (!choice) return choice.status();
+  s.tell("NavMesh");
   if (o.crop && (!*choice || !(*choice)->file.empty() || (*choice)->triangles))
     s.warn("crop: no NavMesh is built from Gaussians, which alone are cropped");
   if (*choice) {

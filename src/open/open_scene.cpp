@@ -51,7 +51,9 @@ Result<OpenedScene> open(const std::string& name, const OpenOptions& options) {
   if (!source) return source.status();
   detail::OpeningScene s{options, std::move(*source), {}, {}, {}, {}};
   s.out.name = s.source.name;
+  s.tell("Gaussians");
   if (Status status = detail::open_gaussians(s); !status) return status;
+  s.tell("triangles");
   if (Status status = detail::open_triangles(s); !status) return status;
   s.out.load_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - from).count();
   if (Status status = detail::open_navmesh(s); !status) return status;
@@ -65,13 +67,32 @@ Result<OpenedScene> open(const std::string& name, const OpenOptions& options) {
 }  // namespace
 
 Result<OpenedScene> open_scene(const std::string& name, const OpenOptions& options) {
-  try {
-    return open(name, options);
-  } catch (const std::bad_alloc&) {
-    return {Errc::out_of_memory, name + ": out of memory"};
-  } catch (const std::exception& e) {
-    return {Errc::backend_failure, name + ": " + e.what()};
+  // Some of the work turns exceptions into errors, or goes on after an error.
+  std::exception_ptr thrown;
+  OpenOptions watched = options;
+  if (options.progress) {
+    watched.progress = [&](const std::string& task, double share) {
+      if (thrown) std::rethrow_exception(thrown);
+      try {
+        options.progress(task, share);
+      } catch (...) {
+        thrown = std::current_exception();
+        throw;
+      }
+    };
   }
+  Result<OpenedScene> opened = Status(Errc::backend_failure, name);
+  try {
+    opened = open(name, watched);
+  } catch (const std::bad_alloc&) {
+    opened = Status(Errc::out_of_memory, name + ": out of memory");
+  } catch (const std::exception& e) {
+    opened = Status(Errc::backend_failure, name + ": " + e.what());
+  } catch (...) {
+    if (!thrown) throw;
+  }
+  if (thrown) std::rethrow_exception(thrown);
+  return opened;
 }
 
 }  // namespace gsnav

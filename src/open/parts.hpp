@@ -24,6 +24,10 @@ struct OpeningScene {
 
   void note(std::string text) { out.notes.push_back(std::move(text)); }
   void warn(std::string text) { out.warnings.push_back(std::move(text)); }
+  /// Reports the start of a task, or a share of it.
+  void tell(const std::string& task, double share = 0) const {
+    if (options.progress) options.progress(task, share);
+  }
   /// Whether the triangles that a NavMesh may be built of are needed.
   bool wants_obstacles() const {
     return options.keep_triangles || (!options.navmesh.empty() && options.navmesh != "none");

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
+#include <stdexcept>
 
 #include "files.hpp"
 #include "gsnav/demo.hpp"
@@ -281,6 +283,36 @@ TEST_CASE("open: levels of detail and visible sets are kept beside the scene's f
   CHECK(open_scene(file, o)->scene->assets[0].packed != nullptr);
   o.levels = SceneLevels::built;
   CHECK(open_scene(file, o).message().find("OpenOptions.storage") != std::string::npos);
+}
+
+TEST_CASE("open: an exception of progress leaves at any task, and is the last call") {
+  OpenOptions o = coarse();
+  o.navmesh = "gaussians";
+  o.people = 1;
+  o.levels = SceneLevels::built;
+  std::vector<std::string> tasks;
+  o.progress = [&](const std::string& task, double share) {
+    CHECK(share >= 0);
+    CHECK(share <= 1);
+    tasks.push_back(task);
+  };
+  const OpenedScene whole = open_scene("default", o).value();
+  for (const char* task :
+       {"Gaussians", "levels of detail", "triangles", "NavMesh", "NavMesh: voxels", "NavMesh: floors",
+        "NavMesh: polygons", "NavMesh of people: voxels", "people"}) {
+    CAPTURE(task);
+    CHECK(std::count(tasks.begin(), tasks.end(), task) > 0);
+    std::size_t calls = 0;
+    o.progress = [&](const std::string& now, double) {
+      calls += calls > 0 || now == task ? 1 : 0;
+      if (now == task) throw std::range_error(now);
+    };
+    CHECK_THROWS_AS(open_scene("default", o), std::range_error);
+    CHECK(calls == 1);
+  }
+  o.progress = {};
+  CHECK(open_scene("default", o)->scene->navmesh->polygon_count() ==
+        whole.scene->navmesh->polygon_count());
 }
 
 TEST_CASE("open: the embedded flat is stored as asked") {

@@ -74,27 +74,20 @@ OpenedScene open(nb::handle named, OpenOptions options, const nb::object& progre
   if (options.levels != SceneLevels::none || options.visible_sets == "auto") {
     check_fork(options.device, "open_scene");  // Other options do not compute on the device.
   }
-  std::optional<nb::python_error> stop;
-  if (!progress.is_none()) {
-    options.progress = [&progress, &stop](const std::string& task, double share) {
-      HoldGil gil;
-      try {
-        call_python(progress, task, share);
-      } catch (nb::python_error& e) {
-        if (e.matches(PyExc_Exception)) {
-          e.discard_as_unraisable("gsnav.open_scene: progress");
-        } else if (!stop) {
-          stop.emplace(std::move(e));  // Such as Ctrl-C: it is raised when the work is done.
-        }
-      }
-    };
-  }
-  auto opened = [&] {
-    const ReleaseGil release;
-    return open_scene(name, options);
-  }();
-  if (stop) throw std::move(*stop);
-  return std::move(opened).value();
+  options.progress = [&progress](const std::string& task, double share) {
+    const HoldGil gil;
+    // Signals are handled by the thread that called, if it is the main one.
+    if (PyErr_CheckSignals() != 0) throw nb::python_error();
+    if (progress.is_none()) return;
+    try {
+      call_python(progress, task, share);
+    } catch (nb::python_error& e) {
+      if (!e.matches(PyExc_Exception)) throw;  // Such as Ctrl-C.
+      e.discard_as_unraisable("gsnav.open_scene: progress");
+    }
+  };
+  const ReleaseGil release;
+  return open_scene(name, options).value();
 }
 
 nb::object itself(nb::handle self) { return nb::borrow(self); }
@@ -191,7 +184,7 @@ void bind_scene(nb::module_& m) {
       "SPZ, glTF, ...), a folder, or a scene of a Habitat dataset.\n\n"
       "`progress(task, share)` is called from time to time, from any thread. Its errors are printed, "
       "and "
-      "Ctrl-C in it is raised when the work is done. Raises FileNotFound, InvalidFile, Unsupported, "
+      "Ctrl-C ends the work, also without `progress`. Raises FileNotFound, InvalidFile, Unsupported, "
       "InvalidArgument or NothingNavigable, naming the file or the option.");
   m.def(
       "views_around",

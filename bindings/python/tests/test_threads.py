@@ -177,6 +177,43 @@ def test_ctrl_c_ends_the_rendering_of_many_cameras():
     assert float(run.stdout) < 0.6  # of the time of the whole call; mostly an eighth
 
 
+OPENED = """
+import os, signal, sys, threading, time
+import gsnav
+class Stop(BaseException):
+    pass
+def handler(*_):
+    raise Stop
+signal.signal(signal.SIGINT, handler)
+options = gsnav.OpenOptions(navmesh=sys.argv[1], levels=getattr(gsnav.SceneLevels, sys.argv[2]), density=0.2,
+                            cell_size=0.02)
+start = time.process_time()
+gsnav.open_scene("default", options)
+whole = time.process_time() - start
+def interrupt():
+    while time.process_time() - start < share * whole:
+        time.sleep(0.002)
+    os.kill(os.getpid(), signal.SIGINT)
+for share in (0.1, 0.4):
+    start = time.process_time()
+    thread = threading.Thread(target=interrupt)
+    thread.start()
+    try:
+        gsnav.open_scene("default", options)
+    except Stop:
+        print(f"{(time.process_time() - start) / whole - share:.2f}")
+    thread.join()
+"""
+
+
+@pytest.mark.parametrize("parts", [("gaussians", "none"), ("mesh", "built")])
+def test_ctrl_c_ends_the_opening_of_a_scene(parts):
+    run = subprocess.run([sys.executable, "-c", OPENED, *parts], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    waited = [float(line) for line in run.stdout.split()]
+    assert len(waited) == 2 and max(waited) < 0.5, waited  # shares of the processor time of the whole call
+
+
 def test_many_cameras_are_rendered_in_parts_with_the_same_bits(people):
     cameras = [gsnav.Camera.look_at((5, 1.5, 4 + 0.1 * i), (5, 1, 3), (0, 1, 0), 1536, 1024, 90) for i in range(13)]
     outputs = int(gsnav.Output.kRgb | gsnav.Output.kMedianDepth)

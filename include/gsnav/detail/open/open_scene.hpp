@@ -103,7 +103,8 @@ struct OpenOptions {
                            ///< [0.05, 20].
 
   /// Called from time to time with the current task ("NavMesh: floors") and the share of it that is
-  /// done, in [0, 1]. Calls come from any thread, one at a time.
+  /// done, in [0, 1]. Calls come from any thread, one at a time. An exception of it leaves open_scene
+  /// when all threads have ended their part of the task.
   std::function<void(const std::string& task, double share)> progress{};
 };
 
