@@ -30,5 +30,7 @@ void bind_device_array(nb::module_& m);
 void bind_batch(nb::module_& m);
 void bind_avatar_tracker(nb::module_& m);
 void bind_habitat(nb::module_& m);
+/// Gives the functions of a module better errors for wrong arguments.
+void mend_call_errors(nb::module_& m);
 
 }  // namespace gsnav::python

@@ -37,6 +37,7 @@ NB_MODULE(_gsnav_of_main, m) {
   bind_batch(m);
   bind_habitat(m);
   bind_avatar_tracker(m);
+  mend_call_errors(m);
 }
 
 /// Python calls this function to import the module. nanobind keeps its types per process, and replaces

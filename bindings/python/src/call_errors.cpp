@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// Errors of calls whose arguments fit no function. nanobind lists the types; gsnav names the arguments
+// and their values too. Each function of nanobind holds the address of the code that calls it, and here
+// this code is replaced by one that looks at the error afterwards. A call without an error costs a jump.
+#include <array>
+#include <cstddef>
+#include <string_view>
+#include <utility>
+
+#include "bind.hpp"
+
+namespace gsnav::python {
+namespace {
+
+using Call = PyObject* (*)(PyObject*, PyObject* const*, std::size_t, PyObject*);
+
+/// The first members of a function object of nanobind, in each of its versions.
+struct Function {
+  PyVarObject head;
+  Call call;
+};
+
+/// Replaces the error of nanobind for a call by one with names and values
+/// (gsnav._call_errors.explained).
+void explain(PyObject* function, PyObject* const* args, std::size_t flagged, PyObject* names) {
+  nb::python_error raised;
+  try {
+    const std::string text = raised.matches(PyExc_TypeError) ? text_of(raised.value()) : std::string();
+    if (text.find("(): incompatible function arguments.") != std::string::npos) {
+      nb::list given;
+      // Python and nanobind keep flags in the upper bits.
+      const std::size_t count = (flagged & 0xFFFF) + (names == nullptr ? 0 : nb::len(nb::handle(names)));
+      for (std::size_t i = 0; i < count; ++i) given.append(nb::handle(args[i]));
+      const nb::object known = names == nullptr ? nb::object(nb::tuple()) : nb::borrow(names);
+      const nb::object explained = nb::module_::import_("gsnav._call_errors").attr("explained");
+      const nb::object better =
+          explained(nb::borrow(function), given, known, nb::str(text.data(), text.size()));
+      PyErr_SetObject(PyExc_TypeError, better.ptr());
+      return;
+    }
+  } catch (const std::exception&) {  // The error of nanobind is better than none.
+    PyErr_Clear();
+  }
+  raised.restore();
+}
+
+std::array<Call, 8> originals{};  // nanobind 3.1 has six.
+
+template <std::size_t I>
+PyObject* call(PyObject* function, PyObject* const* args, std::size_t flagged, PyObject* names) {
+  PyObject* const result = originals[I](function, args, flagged, names);
+  if (result == nullptr && PyErr_ExceptionMatches(PyExc_TypeError) != 0)
+    explain(function, args, flagged, names);
+  return result;
+}
+
+template <std::size_t... I>
+constexpr std::array<Call, sizeof...(I)> calls(std::index_sequence<I...>) {
+  return {call<I>...};
+}
+constexpr auto kCalls = calls(std::make_index_sequence<originals.size()>());
+
+void mend(nb::handle object) {
+  const std::string_view type = nb::type_name(object.type()).c_str();
+  if (!type.ends_with("nb_func") && !type.ends_with("nb_method")) return;
+  auto* const function = reinterpret_cast<Function*>(object.ptr());
+  // Another layout is left alone.
+  if (function->call == nullptr || PyVectorcall_Function(object.ptr()) != function->call) return;
+  for (std::size_t i = 0; i < originals.size(); ++i) {
+    if (function->call == kCalls[i]) return;
+    if (originals[i] == nullptr) originals[i] = function->call;
+    if (originals[i] != function->call) continue;
+    function->call = kCalls[i];
+    return;
+  }
+}
+
+void mend_class(nb::handle type) {
+  for (const nb::handle value : nb::object(type.attr("__dict__").attr("values")())) {
+    mend(value);
+    if (nb::hasattr(value, "fset")) mend(nb::object(value.attr("fset")));
+  }
+}
+
+}  // namespace
+
+void mend_call_errors(nb::module_& m) {
+  for (const nb::handle value : nb::object(m.attr("__dict__").attr("values")())) {
+    mend(value);
+    if (PyType_Check(value.ptr())) mend_class(value);
+  }
+}
+
+}  // namespace gsnav::python
