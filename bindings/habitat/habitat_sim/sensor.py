@@ -6,7 +6,7 @@ import enum
 from typing import Any
 
 import gsnav_habitat as _shared
-from magnum import Color4, Quaternion, Rad, Vector3
+from magnum import Color4, Deg, Quaternion, Rad, Vector3
 
 from .scene import SceneNode
 
@@ -165,6 +165,17 @@ class Sensor:
     def specification(self) -> Any:
         """The specification."""
         return self._spec
+
+    @property
+    def hfov(self) -> Deg:
+        """Horizontal angle of view of a camera. It cannot be changed; make another sensor instead."""
+        if not hasattr(self._spec, "hfov"):
+            raise AttributeError(f"sensor {self.uuid!r} is no camera with a horizontal angle of view")
+        return Deg(float(self._spec.hfov))
+
+    @hfov.setter
+    def hfov(self, value: Any) -> None:
+        raise NotImplementedError(_shared.message(f"changing hfov of sensor {self.uuid!r}"))
 
     def set_transformation_from_spec(self) -> None:
         """Puts the node where the specification says, relative to its parent."""

@@ -71,6 +71,18 @@ def test_depth_is_planar_and_the_top_row_is_up(sim):
     assert depth[0, 24] == 0 or depth[0, 24] == pytest.approx(4.4, abs=1e-3)
 
 
+def test_a_camera_tells_its_angle_of_view(stage):
+    config = make_cfg({"scene": stage, "hfov": 70})
+    around = habitat_sim.EquirectangularSensorSpec()
+    around.uuid, around.sensor_type = "around", COLOR
+    config.agents[0].sensor_specifications.append(around)
+    with habitat_sim.Simulator(config) as sim:
+        sensors = sim.agents[0].sensors
+        assert sensors["color_sensor"].hfov == mn.Deg(70) and not hasattr(sensors["around"], "hfov")
+        with pytest.raises(NotImplementedError, match="gsnav.*hfov of sensor 'color_sensor'"):
+            sensors["color_sensor"].hfov = mn.Deg(60)
+
+
 def test_any_pose_is_taken_without_snapping(sim):
     agent = place(sim, [1.0, 7.5, 2.0], 1.1, (0.2, 0.9, -0.4))
     state = agent.get_state()
