@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "gsnav/detail/core/field_check.hpp"
+
 namespace gsnav {
 
 Result<AvatarActor> AvatarActor::create(std::shared_ptr<const AvatarAsset> asset,
@@ -28,8 +30,8 @@ Result<AvatarActor> AvatarActor::create(std::shared_ptr<const AvatarAsset> asset
     return bad("a motion of " + std::to_string(motion->joint_count()) + " joints for a skeleton of " +
                std::to_string(asset->skeleton.size()));
   }
-  if (!(options.scale > 0) || !is_finite(options.scale))
-    return bad("ActorOptions.scale must be positive");
+  detail::FieldCheck check("ActorOptions.");
+  if (!check.positive("scale", options.scale).status()) return check.status();
   if (!is_finite(options.time_begin) || !(options.time_end >= options.time_begin)) {
     return bad("ActorOptions.time_end lies before time_begin");
   }

@@ -3,11 +3,11 @@
 
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <string>
 #include <type_traits>
 #include <vector>
 
+#include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/detail/math/screw.hpp"
 #include "gsnav/detail/skin/fk.hpp"
 #include "gsnav/skin/lbs.hpp"
@@ -26,7 +26,8 @@ double MotionClip::duration() const noexcept {
 Status MotionClip::validate() const {
   const BadArgument bad{"MotionClip."};
   const std::size_t t = frames();
-  if (!(frame_rate > 0) || !is_finite(frame_rate)) return bad("frame_rate must be positive");
+  detail::FieldCheck check("MotionClip.");
+  if (!check.positive("frame_rate", frame_rate).status()) return check.status();
   if (t == 0 || rotations.size() != t * joints) {
     return bad("rotations has " + std::to_string(rotations.size()) + " values: no multiple of " +
                std::to_string(joints) + " joints");
@@ -38,9 +39,8 @@ Status MotionClip::validate() const {
     return bad("root_translation has " + std::to_string(root_translation.size()) + " values for " +
                std::to_string(t) + " keys");
   }
-  if (!(wrap_time >= 0) || !is_finite(wrap_time)) return bad("wrap_time must be >= 0");
-  if (!(playback_rate > 0) || !is_finite(playback_rate)) return bad("playback_rate must be positive");
-  if (!is_finite(start)) return bad("start must be finite");
+  check.not_negative("wrap_time", wrap_time).positive("playback_rate", playback_rate);
+  if (!check.finite("start", start).status()) return check.status();
   for (std::size_t i = 0; i < rotations.size(); ++i) {
     if (!(abs(dot(rotations[i], rotations[i]) - 1.0) < 1e-4)) {
       return bad("rotations: key " + std::to_string(i / joints) + ", joint " +

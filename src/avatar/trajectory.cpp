@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/math/quat.hpp"
 
 namespace gsnav {
@@ -32,13 +33,11 @@ Result<WalkTrajectory> WalkTrajectory::create(const std::vector<Vec3d>& points,
   for (const Vec3d& p : points) {
     if (!is_finite(p)) return bad("WalkTrajectory: a point is not finite");
   }
-  const auto positive = [](double v) { return v > 0 && is_finite(v); };
-  if (!positive(options.speed)) return bad("WalkOptions.speed must be positive");
-  if (!positive(options.acceleration)) return bad("WalkOptions.acceleration must be positive");
-  if (!positive(options.turn_rate)) return bad("WalkOptions.turn_rate must be positive");
-  if (!positive(options.heading_window)) return bad("WalkOptions.heading_window must be positive");
-  if (!(options.stop_angle > 0)) return bad("WalkOptions.stop_angle must be positive");
-  if (!is_finite(options.start)) return bad("WalkOptions.start must be finite");
+  detail::FieldCheck check("WalkOptions.");
+  check.positive("speed", options.speed).positive("acceleration", options.acceleration);
+  check.positive("turn_rate", options.turn_rate).positive("heading_window", options.heading_window);
+  check.need(options.stop_angle > 0, "stop_angle", options.stop_angle, "must be positive");
+  if (!check.finite("start", options.start).status()) return check.status();
   WalkTrajectory w;
   w.options_ = options;
   w.build(points);

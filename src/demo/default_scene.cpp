@@ -4,6 +4,7 @@
 #include <string>
 
 #include "flat_parts.hpp"
+#include "gsnav/detail/core/field_check.hpp"
 
 namespace gsnav {
 namespace flat {
@@ -166,19 +167,11 @@ std::array<DefaultView, 4> default_scene_views() noexcept {
 }
 
 Status validate(const SceneSampling& s) {
-  if (!(s.density >= 0.05 && s.density <= 20.0)) {
-    return {Errc::invalid_argument,
-            "density = " + std::to_string(s.density) + ": must be in [0.05, 20]"};
-  }
-  if (s.gaussians > kMostSceneGaussians) {
-    return {Errc::invalid_argument, "gaussians = " + std::to_string(s.gaussians) + ": must be at most " +
-                                        std::to_string(kMostSceneGaussians)};
-  }
-  if (s.sh_degree < 0 || s.sh_degree > kMaxShDegree) {
-    return {Errc::invalid_argument,
-            "sh_degree = " + std::to_string(s.sh_degree) + ": must be in [0, 3]"};
-  }
-  return {};
+  detail::FieldCheck check("");
+  check.in("density", s.density, 0.05, 20);
+  check.need(s.gaussians <= kMostSceneGaussians, "gaussians", s.gaussians,
+             ("must be at most " + std::to_string(kMostSceneGaussians)).c_str());
+  return check.in("sh_degree", s.sh_degree, 0, kMaxShDegree).status();
 }
 
 Result<DefaultScene> make_default_scene(const SceneSampling& sampling) {

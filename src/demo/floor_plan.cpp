@@ -9,6 +9,7 @@
 #include <string>
 
 #include "gsnav/core/rng.hpp"
+#include "gsnav/detail/core/field_check.hpp"
 #include "plan_floor.hpp"
 #include "plan_furniture.hpp"
 
@@ -198,14 +199,9 @@ FloorRect PlannedDoor::floor() const noexcept {
 }
 
 Result<FloorPlan> make_floor_plan(const FloorPlanOptions& options) {
-  if (options.rooms < 1 || options.rooms > kMostRooms) {
-    return {Errc::invalid_argument, "rooms = " + std::to_string(options.rooms) + ": must be in [1, " +
-                                        std::to_string(kMostRooms) + "]"};
-  }
-  if (!(options.clearance >= 0.1 && options.clearance <= 0.35)) {
-    return {Errc::invalid_argument,
-            "clearance = " + std::to_string(options.clearance) + ": must be in [0.1, 0.35] metres"};
-  }
+  detail::FieldCheck check("");
+  check.in("rooms", options.rooms, 1, kMostRooms).in("clearance", options.clearance, 0.1, 0.35);
+  if (!check.status()) return check.status();
   Rng rng(options.seed * static_cast<std::uint64_t>(2 * kMostRooms) +
           static_cast<std::uint64_t>(options.rooms));
   constexpr int kStrictTries = 60, kTries = 1000;

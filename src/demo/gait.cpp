@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "gsnav/detail/core/field_check.hpp"
+
 namespace gsnav {
 
 namespace {
@@ -54,13 +56,11 @@ Result<WalkMotion> WalkMotion::create(const Skeleton& skeleton, const GaitOption
       return Status(Errc::invalid_argument, std::string("WalkMotion: no joint called ") + kNames[k]);
     m.joints_[k] = static_cast<std::size_t>(j);
   }
-  const auto bad = [](const char* what) { return Status(Errc::invalid_argument, what); };
-  if (!(options.duty > 0.5 && options.duty < 0.75))
-    return bad("GaitOptions.duty must be in (0.5, 0.75)");
-  if (!(options.speed > 0 && is_finite(options.speed))) return bad("GaitOptions.speed must be positive");
-  if (!(options.stride >= 0 && is_finite(options.stride))) return bad("GaitOptions.stride must be >= 0");
-  if (!is_finite(options.arm_swing)) return bad("GaitOptions.arm_swing must be finite");
-  if (!is_finite(options.start_phase)) return bad("GaitOptions.start_phase must be finite");
+  detail::FieldCheck check("GaitOptions.");
+  check.need(options.duty > 0.5 && options.duty < 0.75, "duty", options.duty, "must be in (0.5, 0.75)");
+  check.positive("speed", options.speed).not_negative("stride", options.stride);
+  check.finite("arm_swing", options.arm_swing).finite("start_phase", options.start_phase);
+  if (!check.status()) return check.status();
   for (const auto& g : skeleton.rest_globals()) {
     m.rest_globals_.push_back({quat_from_matrix(g.linear), g.translation});
   }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "gsnav/core/rng.hpp"
+#include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/detail/rigging/proxy_fit.hpp"
 #include "humanoid_body.hpp"
 #include "humanoid_surface.hpp"
@@ -61,21 +62,13 @@ std::vector<ProxyCapsule> humanoid_capsules(const Skeleton& skeleton, double sca
 }  // namespace
 
 Status validate(const HumanoidOptions& o) {
-  const BadArgument bad{"HumanoidOptions."};
-  if (!(o.height >= 1.0 && o.height <= 2.2)) return bad("height", o.height, "must be in [1, 2.2]");
-  if (!(o.build >= 0.8 && o.build <= 1.3)) return bad("build", o.build, "must be in [0.8, 1.3]");
-  if (!(o.shoulders >= 0.85 && o.shoulders <= 1.15))
-    return bad("shoulders", o.shoulders, "must be in [0.85, 1.15]");
-  if (o.gaussians < 2000 || o.gaussians > 400000)
-    return bad("gaussians", o.gaussians, "must be in [2000, 400000]");
-  if (o.sh_degree < 0 || o.sh_degree > kMaxShDegree)
-    return bad("sh_degree", o.sh_degree, "must be in [0, 3]");
-  for (const Vec3d* c : {&o.skin, &o.hair, &o.top, &o.trousers, &o.shoes}) {
-    for (int k = 0; k < 3; ++k) {
-      if (!((*c)[k] >= 0 && (*c)[k] <= 1)) return bad("a colour", (*c)[k], "must be in [0, 1]");
-    }
-  }
-  return {};
+  detail::FieldCheck check("HumanoidOptions.");
+  check.in("height", o.height, 1, 2.2).in("build", o.build, 0.8, 1.3);
+  check.in("shoulders", o.shoulders, 0.85, 1.15).in("gaussians", o.gaussians, 2000, 400000);
+  check.in("sh_degree", o.sh_degree, 0, kMaxShDegree);
+  for (const Vec3d* c : {&o.skin, &o.hair, &o.top, &o.trousers, &o.shoes})
+    for (int k = 0; k < 3; ++k) check.in("a colour", (*c)[k], 0, 1);
+  return check.status();
 }
 
 Result<AvatarAsset> try_make_humanoid(const HumanoidOptions& options) {

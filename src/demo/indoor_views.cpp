@@ -9,6 +9,7 @@
 #include <string>
 
 #include "gsnav/core/rng.hpp"
+#include "gsnav/detail/core/field_check.hpp"
 
 namespace gsnav {
 namespace {
@@ -19,18 +20,9 @@ constexpr double kLeastSight = 1.5;  // metres
 constexpr double kDown = 0.12;       // slope of a view
 
 Status validate(const IndoorViewOptions& o) {
-  const auto in = [](const char* name, double value, double low, double high) -> Status {
-    if (value >= low && value <= high) return {};
-    return {Errc::invalid_argument, std::string(name) + " = " + std::to_string(value) +
-                                        ": must be in [" + std::to_string(low) + ", " +
-                                        std::to_string(high) + "]"};
-  };
-  for (const Status& s :
-       {in("count", o.count, 1, 10000), in("width", o.width, 1, 16384), in("height", o.height, 1, 16384),
-        in("hfov", o.hfov, 10, 150), in("eye_height", o.eye_height, 0.3, 2.2)}) {
-    if (!s) return s;
-  }
-  return {};
+  detail::FieldCheck check("");
+  check.in("count", o.count, 1, 10000).in("width", o.width, 1, 16384).in("height", o.height, 1, 16384);
+  return check.in("hfov", o.hfov, 10, 150).in("eye_height", o.eye_height, 0.3, 2.2).status();
 }
 
 /// The mesh of a scene, for testing whether a place is free and how far a ray goes.

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "gaussian_floor.hpp"
+#include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/detail/core/guarded.hpp"
 #include "navmesh_stages.hpp"
 #include "triangle_heights.hpp"
@@ -17,15 +18,6 @@
 namespace gsnav {
 
 Status validate(const GaussianNavOptions& o) {
-  struct Field {
-    const char* name;
-    double value, low, high;
-  };
-  const Field fields[] = {
-      {"min_opacity", o.min_opacity, 0.0, 1.0},       {"sigmas", o.sigmas, 0.1, 10.0},
-      {"solid_alpha", o.solid_alpha, 0.01, 0.999999}, {"max_hole", o.max_hole, 0.0, 100.0},
-      {"floor_band", o.floor_band, 0.0, 1000.0},      {"min_island_area", o.min_island_area, 0.0, 1e9},
-  };
   if (o.crop) {
     for (int k = 0; k < 3; ++k) {
       if (!(o.crop->low[k] < o.crop->high[k])) {
@@ -36,18 +28,12 @@ Status validate(const GaussianNavOptions& o) {
       }
     }
   }
-  if (o.threads < 0) {
-    return {Errc::invalid_argument,
-            "GaussianNavOptions.threads = " + std::to_string(o.threads) + " is negative"};
-  }
-  for (const Field& f : fields) {
-    if (!(f.value >= f.low && f.value <= f.high)) {
-      return {Errc::invalid_argument, std::string("GaussianNavOptions.") + f.name + " = " +
-                                          std::to_string(f.value) + " is not in [" +
-                                          std::to_string(f.low) + ", " + std::to_string(f.high) + "]"};
-    }
-  }
-  return {};
+  detail::FieldCheck check("GaussianNavOptions.");
+  check.need(o.threads >= 0, "threads", o.threads, "must be >= 0");
+  check.in("min_opacity", o.min_opacity, 0, 1).in("sigmas", o.sigmas, 0.1, 10);
+  check.in("solid_alpha", o.solid_alpha, 0.01, 0.999999).in("max_hole", o.max_hole, 0, 100);
+  check.in("floor_band", o.floor_band, 0, 1000).in("min_island_area", o.min_island_area, 0, 1e9);
+  return check.status();
 }
 
 namespace {

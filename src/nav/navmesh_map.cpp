@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <limits>
-#include <string>
 
+#include "gsnav/detail/core/field_check.hpp"
 #include "navmesh_impl.hpp"
 
 namespace gsnav {
@@ -38,15 +38,10 @@ Reach reach_at(const detail::PolyMesh& m, const detail::PolyMesh::Poly& poly, do
 
 Result<TopDownMap> NavMesh::top_down_map(double height, double metres_per_cell, double max_height_delta,
                                          TopDownLayout layout) const {
-  const auto bad = [](const char* name, double value, const char* what) {
-    return Status(Errc::invalid_argument,
-                  std::string("top-down map: ") + name + " = " + std::to_string(value) + " " + what);
-  };
-  if (!is_finite(height)) return bad("height", height, "is not finite");
-  if (!(max_height_delta >= 0)) return bad("max_height_delta", max_height_delta, "must be at least 0");
-  if (!(metres_per_cell > 0) || !is_finite(metres_per_cell)) {
-    return bad("metres_per_cell", metres_per_cell, "must be positive and finite");
-  }
+  detail::FieldCheck check("top-down map: ");
+  check.finite("height", height);
+  check.need(max_height_delta >= 0, "max_height_delta", max_height_delta, "must be >= 0");
+  if (!check.positive("metres_per_cell", metres_per_cell).status()) return check.status();
   const Aabb<double> box = bounds();
   const bool corners = layout == TopDownLayout::habitat;
   const auto cells = [&](double low, double high) {
@@ -54,13 +49,11 @@ Result<TopDownMap> NavMesh::top_down_map(double height, double metres_per_cell, 
     return corners ? std::floor(n + kWhole) : max(std::ceil(n), 1.0);
   };
   const double columns = cells(box.low.x, box.high.x), rows = cells(box.low.z, box.high.z);
-  if (!(columns * rows <= kMaxCells)) {
-    return bad("metres_per_cell", metres_per_cell, "makes more than 2^28 cells; raise it");
-  }
-  if (columns * rows < 1) {
-    return bad("metres_per_cell", metres_per_cell,
-               "is more than the mesh measures; lower it, or use another layout");
-  }
+  check.need(columns * rows <= kMaxCells, "metres_per_cell", metres_per_cell,
+             "makes more than 2^28 cells; raise it");
+  check.need(columns * rows >= 1, "metres_per_cell", metres_per_cell,
+             "is more than the mesh measures; lower it, or use another layout");
+  if (!check.status()) return check.status();
   TopDownMap map;
   map.low = box.low;
   map.metres_per_cell = metres_per_cell;

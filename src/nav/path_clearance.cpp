@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/math/functions.hpp"
 
 namespace gsnav {
@@ -50,12 +51,11 @@ std::vector<Vec3d> straight(const NavMesh& mesh, const NavPoint& a, const NavPoi
 Result<ClearPath> keep_clear(const NavMesh& mesh, std::span<const Vec3d> points,
                              const ClearanceOptions& options) {
   const BadArgument bad{"keep_clear: "};
-  if (!(options.clearance >= 0) || !(options.clearance <= 10))
-    return bad("ClearanceOptions.clearance must be from 0 to 10 m");
-  if (!(options.spacing > 0.01) || !(options.spacing <= 1))
-    return bad("ClearanceOptions.spacing must be above 0.01 m, at most 1 m");
-  if (options.passes < 0 || options.passes > 100000)
-    return bad("ClearanceOptions.passes must be from 0 to 100000");
+  detail::FieldCheck check("ClearanceOptions.");
+  check.in("clearance", options.clearance, 0, 10);
+  check.need(options.spacing > 0.01 && options.spacing <= 1, "spacing", options.spacing,
+             "must be in (0.01, 1]");
+  if (!check.in("passes", options.passes, 0, 100000).status()) return check.status();
   if (points.size() < 2) return bad("a path has two points or more");
 
   std::vector<NavPoint> band;

@@ -3,12 +3,12 @@
 
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <exception>
 #include <new>
 #include <string>
 #include <utility>
 
+#include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/detail/scene/up_axis.hpp"
 #include "parts.hpp"
 
@@ -17,26 +17,15 @@ namespace {
 
 /// Returns invalid_argument naming the field that is out of range, or ok.
 Status validate(const OpenOptions& o) {
-  const auto bad = [](const char* field, double value, const char* rule) {
-    char text[128];
-    std::snprintf(text, sizeof text, "OpenOptions.%s = %g: must be %s", field, value, rule);
-    return Status(Errc::invalid_argument, text);
-  };
-  if (!std::isfinite(o.time)) return bad("time", o.time, "finite");
-  if (o.level < 0) return bad("level", o.level, "0 or more");
-  if (!(o.unseen_color >= 0 && std::isfinite(o.unseen_color)))
-    return bad("unseen_color", o.unseen_color, "0 or more");
-  if (!(o.cell_size > 0 && std::isfinite(o.cell_size)))
-    return bad("cell_size", o.cell_size, "positive, metres");
-  if (!(o.agent_radius >= 0 && std::isfinite(o.agent_radius)))
-    return bad("agent_radius", o.agent_radius, "0 or more, metres");
-  if (!(o.agent_height > 0 && std::isfinite(o.agent_height)))
-    return bad("agent_height", o.agent_height, "positive, metres");
+  detail::FieldCheck check("OpenOptions.");
+  check.finite("time", o.time).need(o.level >= 0, "level", o.level, "must be >= 0");
+  check.not_negative("unseen_color", o.unseen_color).positive("cell_size", o.cell_size);
+  check.not_negative("agent_radius", o.agent_radius).positive("agent_height", o.agent_height);
   for (int k = 0; o.crop && k < 3; ++k) {
-    if (std::isnan(o.crop->low[k])) return bad("crop.low", o.crop->low[k], "a number");
-    if (std::isnan(o.crop->high[k])) return bad("crop.high", o.crop->high[k], "a number");
+    for (const auto& [field, at] : {std::pair{"crop.low", o.crop->low}, {"crop.high", o.crop->high}})
+      check.need(!std::isnan(at[k]), field, at[k], "must be a number");
   }
-  if (!(o.density >= 0.05 && o.density <= 20)) return bad("density", o.density, "in [0.05, 20]");
+  if (!check.in("density", o.density, 0.05, 20).status()) return check.status();
   if (o.up != "auto" && o.up != "keep") {
     if (const auto turned = upright(o.up); !turned)
       return {turned.code(), "OpenOptions.up: " + turned.message() + ", or auto or keep"};

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/detail/rigging/capsule_volume.hpp"
 #include "gsnav/detail/rigging/proxy_fit.hpp"
 #include "gsnav/math/capsule.hpp"
@@ -239,10 +240,12 @@ Result<CapsuleReport> fit_body_capsules(AvatarAsset& asset,
                  std::to_string(asset.skeleton.size()));
     }
   }
-  if (!(options.percentile > 0.5 && options.percentile <= 1))
-    return bad("percentile must be in (0.5, 1]");
-  if (!(options.contained >= 0 && options.contained <= 1)) return bad("contained must be in [0, 1]");
-  if (!(options.shortest >= 0)) return bad("shortest must be >= 0");
+  detail::FieldCheck check("fit_body_capsules: ");
+  const double p = options.percentile;
+  check.need(p > 0.5 && p <= 1, "percentile", p, "must be in (0.5, 1]");
+  check.in("contained", options.contained, 0, 1);
+  check.need(options.shortest >= 0, "shortest", options.shortest, "must be >= 0");
+  if (!check.status()) return check.status();
 
   const std::size_t row = static_cast<std::size_t>(asset.influences);
   const std::vector<std::size_t> owner = capsule_owners(asset, options);

@@ -6,11 +6,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <string>
 #include <utility>
 #include <vector>
 
 #include "gsnav/core/rng.hpp"
+#include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/detail/math/curves.hpp"
 #include "gsnav/detail/rigging/mesh_surface.hpp"
 #include "gsnav/frame/sh.hpp"
@@ -103,15 +103,13 @@ Status finish_avatar(AvatarAsset& asset, GaussianCloudBuilder& builder,
 }  // namespace detail
 
 Result<MeshAvatar> make_mesh_avatar(const SkinnedMesh& mesh, const MeshAvatarOptions& options) {
-  const BadArgument bad{"MeshAvatarOptions."};
   if (Status s = mesh.validate(); !s) return s;
-  if (options.gaussians < 100 || options.gaussians > 4000000)
-    return bad("gaussians must be in [100, 4000000]");
-  if (!(options.overlap > 0) || !is_finite(options.overlap)) return bad("overlap must be positive");
-  if (!(options.thickness > 0) || !is_finite(options.thickness))
-    return bad("thickness must be positive");
-  if (!(options.opacity > 0 && options.opacity < 1)) return bad("opacity must be in (0, 1)");
-  if (!(options.shade >= 0 && options.shade <= 1)) return bad("shade must be in [0, 1]");
+  detail::FieldCheck check("MeshAvatarOptions.");
+  check.in("gaussians", options.gaussians, 100, 4000000);
+  check.positive("overlap", options.overlap).positive("thickness", options.thickness);
+  check.need(options.opacity > 0 && options.opacity < 1, "opacity", options.opacity,
+             "must be in (0, 1)");
+  if (!check.in("shade", options.shade, 0, 1).status()) return check.status();
   const MeshSampler sampler(mesh);
   MeshAvatar out;
   out.area = sampler.area();

@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/detail/sim/episode.hpp"
 
+#include "gsnav/detail/core/field_check.hpp"
+
 namespace gsnav {
 namespace {
 
 constexpr double kTwoPi = 6.283185307179586;
-
-Status bad(const char* field, double value, const char* rule) {
-  return {Errc::invalid_argument,
-          std::string("EpisodeRules.") + field + " = " + std::to_string(value) + ": " + rule};
-}
 
 /// Islands with a radius of at least `least_radius`.
 std::vector<std::size_t> wide_islands(const NavMesh& navmesh, double least_radius) {
@@ -34,18 +31,18 @@ std::size_t draw_island(const NavMesh& navmesh, const std::vector<std::size_t>& 
 }  // namespace
 
 Status validate(const EpisodeRules& r) {
-  if (!(r.min_distance >= 0 && is_finite(r.min_distance)))
-    return bad("min_distance", r.min_distance, "must be >= 0");
-  if (!(r.max_distance >= r.min_distance))
-    return bad("max_distance", r.max_distance, "must be >= min_distance");
-  if (!(r.min_island_radius >= 0)) return bad("min_island_radius", r.min_island_radius, "must be >= 0");
-  if (!(r.max_height_difference >= 0)) {
-    return bad("max_height_difference", r.max_height_difference, "must be >= 0");
-  }
-  if (!(r.straight_ratio >= 0)) return bad("straight_ratio", r.straight_ratio, "must be >= 0");
-  if (r.retries_per_goal < 1) return bad("retries_per_goal", r.retries_per_goal, "must be >= 1");
-  if (r.max_goals < 1) return bad("max_goals", r.max_goals, "must be >= 1");
-  return {};
+  detail::FieldCheck check("EpisodeRules.");
+  const auto at_least = [&check](const char* field, auto value, auto least, const char* rule) {
+    check.need(value >= least, field, value, rule);
+  };
+  check.not_negative("min_distance", r.min_distance);
+  at_least("max_distance", r.max_distance, r.min_distance, "must be >= min_distance");
+  at_least("min_island_radius", r.min_island_radius, 0.0, "must be >= 0");
+  at_least("max_height_difference", r.max_height_difference, 0.0, "must be >= 0");
+  at_least("straight_ratio", r.straight_ratio, 0.0, "must be >= 0");
+  at_least("retries_per_goal", r.retries_per_goal, 1, "must be >= 1");
+  at_least("max_goals", r.max_goals, 1, "must be >= 1");
+  return check.status();
 }
 
 Result<PointNavEpisode> generate_episode(const NavMesh& navmesh, Rng& rng, const EpisodeRules& rules) {

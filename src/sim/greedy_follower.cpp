@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "gsnav/detail/core/field_check.hpp"
+
 namespace gsnav {
 namespace {
 
@@ -18,10 +20,8 @@ Result<GreedyGeodesicFollower> GreedyGeodesicFollower::make(const NavMesh& mesh,
                                                             const TaskConfig& task,
                                                             const GreedyFollowerOptions& options) {
   if (Status s = validate(task); !s) return s;
-  if (!(options.goal_radius >= 0) || !is_finite(options.goal_radius)) {
-    return {Errc::invalid_argument, "GreedyFollowerOptions.goal_radius = " +
-                                        std::to_string(options.goal_radius) + ": must be >= 0"};
-  }
+  detail::FieldCheck check("GreedyFollowerOptions.");
+  if (!check.not_negative("goal_radius", options.goal_radius).status()) return check.status();
   auto field = GeodesicField::make(mesh, std::span(&goal, 1), {{0.5, 1.0, 0.5}});
   if (!field) return field.status();
   GreedyGeodesicFollower out(mesh, std::move(*field), task, options);

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "gsnav/core/rng.hpp"
+#include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/math/functions.hpp"
 
 namespace gsnav {
@@ -77,18 +78,10 @@ void add_salt_and_pepper(const NoiseModel& model, Rng& rng, std::span<float> rgb
 }  // namespace
 
 Status validate(const NoiseModel& m, const char* sensor) {
-  const auto bad = [&](const char* field, double value, const char* rule) {
-    return Status(Errc::invalid_argument, "SensorSpec \"" + std::string(sensor) + "\": noise." + field +
-                                              " = " + std::to_string(value) + ": " + rule);
-  };
-  if (!is_finite(m.intensity)) return bad("intensity", m.intensity, "must be finite");
-  if (!is_finite(m.mean)) return bad("mean", m.mean, "must be finite");
-  if (!(m.sigma >= 0) || !is_finite(m.sigma)) return bad("sigma", m.sigma, "must be >= 0");
-  if (!(m.multiplier >= 0) || !is_finite(m.multiplier))
-    return bad("multiplier", m.multiplier, "must be >= 0");
-  if (!(m.amount >= 0 && m.amount <= 1)) return bad("amount", m.amount, "must be in [0, 1]");
-  if (!(m.salt >= 0 && m.salt <= 1)) return bad("salt", m.salt, "must be in [0, 1]");
-  return {};
+  detail::FieldCheck check("SensorSpec \"" + std::string(sensor) + "\": noise.");
+  check.finite("intensity", m.intensity).finite("mean", m.mean);
+  check.not_negative("sigma", m.sigma).not_negative("multiplier", m.multiplier);
+  return check.in("amount", m.amount, 0, 1).in("salt", m.salt, 0, 1).status();
 }
 
 void add_color_noise(const NoiseModel& model, std::uint64_t seed, std::span<float> rgb) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/math/functions.hpp"
 #include "gsnav/render/config.hpp"
 
@@ -33,76 +34,48 @@ std::vector<SensorSpec> pointnav_v2_sensors() {
 }
 
 Status validate(const SensorSpec& s) {
-  const auto bad = [&](const char* field, const std::string& value, const char* rule) {
-    return Status(Errc::invalid_argument,
-                  "SensorSpec \"" + s.uuid + "\": " + field + " = " + value + ": " + rule);
-  };
   if (s.uuid.empty()) return {Errc::invalid_argument, "SensorSpec.uuid is empty: a sensor needs a name"};
-  if (s.kind > SensorKind::normal)
-    return bad("kind", std::to_string(static_cast<int>(s.kind)), "not a value of the enum");
-  if (s.model > SensorModel::fisheye)
-    return bad("model", std::to_string(static_cast<int>(s.model)), "not a value of the enum");
-  if (s.noise.kind > NoiseKind::salt_and_pepper) {
-    return bad("noise.kind", std::to_string(static_cast<int>(s.noise.kind)), "not a value of the enum");
-  }
-  for (const int side : s.resolution) {
-    if (side < 1 || side > kMaxImageSide)
-      return bad("resolution", std::to_string(side), "must be in [1, 16384]");
-  }
-  const bool fisheye = s.model == SensorModel::fisheye;
-  if (!(s.hfov > 0 && s.hfov < (fisheye ? 360 : 180))) {
-    return bad("hfov", std::to_string(s.hfov),
-               fisheye ? "must be in (0, 360) degrees" : "must be in (0, 180) degrees");
-  }
-  if (!(s.fisheye.alpha >= 0 && s.fisheye.alpha <= 1)) {
-    return bad("fisheye.alpha", std::to_string(s.fisheye.alpha), "must be in [0, 1]");
-  }
-  if (!(s.fisheye.xi > -1 && s.fisheye.xi < 1)) {
-    return bad("fisheye.xi", std::to_string(s.fisheye.xi), "must be in (-1, 1)");
-  }
-  for (const double f : s.fisheye.focal_length) {
-    if (!(f >= 0 && is_finite(f))) return bad("fisheye.focal_length", std::to_string(f), "must be >= 0");
-  }
-  for (const double f : s.fisheye.principal_point_offset) {
-    if (!is_finite(f)) return bad("fisheye.principal_point_offset", std::to_string(f), "must be finite");
-  }
+  detail::FieldCheck check("SensorSpec \"" + s.uuid + "\": ");
+  const auto known = [&check](const char* field, auto value, auto last) {
+    check.need(value <= last, field, static_cast<int>(value), "not a value of the enum");
+  };
+  known("kind", s.kind, SensorKind::normal);
+  known("model", s.model, SensorModel::fisheye);
+  known("noise.kind", s.noise.kind, NoiseKind::salt_and_pepper);
+  for (const int side : s.resolution) check.in("resolution", side, 1, kMaxImageSide);
+  const bool fisheye = s.model == SensorModel::fisheye, pinhole = s.model == SensorModel::pinhole;
+  check.need(s.hfov > 0 && s.hfov < (fisheye ? 360 : 180), "hfov", s.hfov,
+             fisheye ? "must be in (0, 360) degrees" : "must be in (0, 180) degrees");
+  check.in("fisheye.alpha", s.fisheye.alpha, 0, 1);
+  check.need(s.fisheye.xi > -1 && s.fisheye.xi < 1, "fisheye.xi", s.fisheye.xi, "must be in (-1, 1)");
+  for (const double f : s.fisheye.focal_length) check.not_negative("fisheye.focal_length", f);
+  for (const double f : s.fisheye.principal_point_offset)
+    check.finite("fisheye.principal_point_offset", f);
   if (fisheye && (!(s.fisheye.focal_length[0] > 0) || !(s.fisheye.focal_length[1] > 0))) {
     // Limit of the double sphere projection. Beyond it, two directions would share an image point.
     const double a = s.fisheye.alpha, z = std::cos(s.hfov * std::numbers::pi / 360.0),
                  shifted = s.fisheye.xi + z;
     const double w = a > 0.5 ? (1 - a) / a : a / (1 - a);
-    if (!(shifted > -w * std::sqrt(1 - z * z + shifted * shifted))) {
-      return bad("hfov", std::to_string(s.hfov),
-                 "is more than a lens of this fisheye.alpha and xi sees");
-    }
+    check.need(shifted > -w * std::sqrt(1 - z * z + shifted * shifted), "hfov", s.hfov,
+               "is more than a lens of this fisheye.alpha and xi sees");
   }
-  if (s.cube_size < 0 || s.cube_size > kMaxImageSide - 2) {
-    return bad("cube_size", std::to_string(s.cube_size), "must be in [0, 16382]");
-  }
-  if (s.kind == SensorKind::semantic && s.model != SensorModel::pinhole) {
-    return bad("model", "not pinhole", "semantic sensors are pinholes");
-  }
-  if (s.kind == SensorKind::normal && s.model != SensorModel::pinhole) {
-    return bad("model", "not pinhole", "sensors of normals are pinholes");
-  }
+  check.in("cube_size", s.cube_size, 0, kMaxImageSide - 2);
+  check.need(s.kind != SensorKind::semantic || pinhole, "model", "not pinhole",
+             "semantic sensors are pinholes");
+  check.need(s.kind != SensorKind::normal || pinhole, "model", "not pinhole",
+             "sensors of normals are pinholes");
+  if (!check.status()) return check.status();
   if (Status noise = validate(s.noise, s.uuid.c_str()); !noise) return noise;
-  const SensorKind noisy = is_color_noise(s.noise.kind) ? SensorKind::rgb : SensorKind::depth;
-  if (s.noise.kind != NoiseKind::none && s.kind != noisy) {
-    return bad("noise.kind", noisy == SensorKind::rgb ? "noise of colour" : "redwood_depth",
-               "redwood_depth is for depth, other noise for colour");
-  }
-  if (!is_finite(s.position)) return bad("position", "not finite", "must be finite");
-  if (!is_finite(s.orientation)) return bad("orientation", "not finite", "must be finite");
-  if (!(s.near_plane > 0 && is_finite(s.near_plane))) {
-    return bad("near_plane", std::to_string(s.near_plane), "must be positive");
-  }
-  if (!(s.near_sigma >= 0 && is_finite(s.near_sigma))) {
-    return bad("near_sigma", std::to_string(s.near_sigma), "must be >= 0");
-  }
-  if (!(s.far_plane > s.near_plane)) {
-    return bad("far_plane", std::to_string(s.far_plane), "must be beyond near_plane");
-  }
-  return {};
+  const bool of_color = is_color_noise(s.noise.kind);
+  check.need(
+      s.noise.kind == NoiseKind::none || s.kind == (of_color ? SensorKind::rgb : SensorKind::depth),
+      "noise.kind", of_color ? "noise of colour" : "redwood_depth",
+      "redwood_depth is for depth, other noise for colour");
+  check.need(is_finite(s.position), "position", "not finite", "must be finite");
+  check.need(is_finite(s.orientation), "orientation", "not finite", "must be finite");
+  check.positive("near_plane", s.near_plane).not_negative("near_sigma", s.near_sigma);
+  check.need(s.far_plane > s.near_plane, "far_plane", s.far_plane, "must be beyond near_plane");
+  return check.status();
 }
 
 Status validate(std::span<const SensorSpec> sensors) {

@@ -1,32 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <string>
-
+#include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/sim/world.hpp"
 
 namespace gsnav {
 
 Status validate(const TaskConfig& c) {
-  const BadArgument bad{"TaskConfig."};
-  const auto positive = [](double v) { return v > 0 && is_finite(v); };
-  const auto not_negative = [](double v) { return v >= 0 && is_finite(v); };
-  if (!not_negative(c.agent_radius)) return bad("agent_radius", c.agent_radius, "must be >= 0");
-  if (!positive(c.agent_height)) return bad("agent_height", c.agent_height, "must be positive");
-  if (!positive(c.forward_step)) return bad("forward_step", c.forward_step, "must be positive");
-  if (!(c.turn_angle > 0 && c.turn_angle <= 180))
-    return bad("turn_angle", c.turn_angle, "must be in (0, 180]");
-  if (!positive(c.control_period)) return bad("control_period", c.control_period, "must be positive");
-  if (!(c.tilt_angle > 0 && c.tilt_angle <= 90))
-    return bad("tilt_angle", c.tilt_angle, "must be in (0, 90]");
-  if (c.substeps < 1 || c.substeps > 1000) return bad("substeps", c.substeps, "must be in [1, 1000]");
+  const auto angle = [](double v, double most) { return v > 0 && v <= most; };
+  detail::FieldCheck check("TaskConfig.");
+  check.not_negative("agent_radius", c.agent_radius);
+  check.positive("agent_height", c.agent_height);
+  check.positive("forward_step", c.forward_step);
+  check.need(angle(c.turn_angle, 180), "turn_angle", c.turn_angle, "must be in (0, 180]");
+  check.positive("control_period", c.control_period);
+  check.need(angle(c.tilt_angle, 90), "tilt_angle", c.tilt_angle, "must be in (0, 90]");
+  check.in("substeps", c.substeps, 1, 1000);
   const RewardConfig& r = c.reward;
-  for (const double w : {r.progress, r.slack, r.success, r.proximity, r.collision, r.wall}) {
-    if (!is_finite(w)) return bad("reward", w, "weights must be finite");
-  }
-  if (c.max_steps < 1) return bad("max_steps", c.max_steps, "must be >= 1");
-  if (!not_negative(c.success_distance))
-    return bad("success_distance", c.success_distance, "must be >= 0");
-  if (!positive(c.skin)) return bad("skin", c.skin, "must be positive");
-  return {};
+  for (const double w : {r.progress, r.slack, r.success, r.proximity, r.collision, r.wall})
+    check.need(is_finite(w), "reward", w, "weights must be finite");
+  check.need(c.max_steps >= 1, "max_steps", c.max_steps, "must be >= 1");
+  check.not_negative("success_distance", c.success_distance);
+  check.positive("skin", c.skin);
+  return check.status();
 }
 
 }  // namespace gsnav

@@ -3,9 +3,9 @@
 
 #include <cmath>
 #include <functional>
-#include <string>
 
 #include "gsnav/core/status.hpp"
+#include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/math/functions.hpp"
 
@@ -44,23 +44,15 @@ struct VisibleSettings {
 
 /// Returns invalid_argument naming the field that is out of range, or ok.
 inline Status validate(const VisibleSettings& s) {
-  const BadArgument bad{"VisibleSettings."};
-  if (!(s.cell > 0 && is_finite(s.cell))) return bad("cell", s.cell, "must be positive");
-  if (!(s.margin >= 0 && is_finite(s.margin))) return bad("margin", s.margin, "must be >= 0");
-  if (!(s.min_weight >= 0 && s.min_weight < 1))
-    return bad("min_weight", s.min_weight, "must be in [0, 1)");
-  if (s.rows != 0 && (s.rows < 1 || s.rows > 32 || 32 % s.rows != 0)) {
-    return {Errc::invalid_argument,
-            "VisibleSettings.rows = " + std::to_string(s.rows) + ": must be 0, 1, 2, 4, 8, 16 or 32"};
-  }
-  if (s.face < 16 || s.face > 4096) return bad("face", s.face, "must be in [16, 4096]");
-  if (!(s.near_plane > 0 && is_finite(s.near_plane)))
-    return bad("near_plane", s.near_plane, "must be positive");
-  if (!(s.near_sigma >= 0 && is_finite(s.near_sigma)))
-    return bad("near_sigma", s.near_sigma, "must be >= 0");
-  if (!(s.most_share > 0 && s.most_share <= 1))
-    return bad("most_share", s.most_share, "must be in (0, 1]");
-  return {};
+  const bool divides_word = s.rows >= 1 && s.rows <= 32 && 32 % s.rows == 0;
+  detail::FieldCheck check("VisibleSettings.");
+  check.positive("cell", s.cell).not_negative("margin", s.margin);
+  check.need(s.min_weight >= 0 && s.min_weight < 1, "min_weight", s.min_weight, "must be in [0, 1)");
+  check.need(s.rows == 0 || divides_word, "rows", s.rows, "must be 0, 1, 2, 4, 8, 16 or 32");
+  check.in("face", s.face, 16, 4096);
+  check.positive("near_plane", s.near_plane).not_negative("near_sigma", s.near_sigma);
+  const bool share = s.most_share > 0 && s.most_share <= 1;
+  return check.need(share, "most_share", s.most_share, "must be in (0, 1]").status();
 }
 
 }  // namespace gsnav
