@@ -157,11 +157,8 @@ class SceneReader {
 
 Result<AvatarScene> load_avatar_scene(const fs::path& path) {
   return detail::guarded(path.string(), [&]() -> Result<AvatarScene> {
-    const auto file = detail::read_file(path);
-    if (!file) return file.status();
-    const auto json = detail::parse_json(file->span(), path.string());
-    if (!json) return json.status();
-    return SceneReader(path, *json).run();
+    const auto json = detail::load_json(path);
+    return json ? SceneReader(path, *json).run() : json.status();
   });
 }
 

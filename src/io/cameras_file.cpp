@@ -85,9 +85,7 @@ Result<std::vector<Camera>> load_cameras(const std::filesystem::path& path, int 
                                         std::to_string(height) + " must be 0 x 0 or from 1 to 65536"};
   }
   return detail::guarded(source, [&]() -> Result<std::vector<Camera>> {
-    const auto file = detail::read_file(path);
-    if (!file) return file.status();
-    const auto json = detail::parse_json(file->span(), source);
+    const auto json = detail::load_json(path);
     if (!json) return json.status();
     if (!json->is_array()) {
       return {Errc::invalid_file, source + ": must be an array of cameras, is " + json->type_name()};

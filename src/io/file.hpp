@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "gsnav/core/status.hpp"
@@ -21,6 +22,7 @@ struct FileBytes {
   std::unique_ptr<std::byte[]> data;
   std::size_t size = 0;
   std::span<const std::byte> span() const noexcept { return {data.get(), size}; }
+  std::string_view text() const noexcept { return {reinterpret_cast<const char*>(data.get()), size}; }
 };
 
 /// Reads a regular file. Folders, pipes and devices are refused, because reading one could block for
@@ -103,6 +105,16 @@ auto guarded(const std::string& name, const F& f) noexcept -> decltype(f()) {
     }
   };
   return gsnav::detail::guarded(on_files, name);
+}
+
+/// Reads a file and returns read(FileBytes). Errors: those of read_file and `read`; see guarded.
+template <class F>
+auto with_file(const std::filesystem::path& path, const F& read) noexcept
+    -> decltype(read(std::declval<const FileBytes&>())) {
+  return guarded(path.string(), [&]() -> decltype(read(std::declval<const FileBytes&>())) {
+    const auto file = read_file(path);
+    return file ? read(*file) : file.status();
+  });
 }
 
 /// Returns freed memory to the system. glibc keeps it otherwise, and never reuses it for large arrays.

@@ -15,9 +15,7 @@ using detail::must_be;
 using detail::shown;
 
 Result<Json> load_object(const fs::path& path) {
-  const auto file = detail::read_file(path);
-  if (!file) return file.status();
-  auto json = detail::parse_json(file->span(), path.string());
+  auto json = detail::load_json(path);
   if (json && !json->is_object()) {
     return detail::invalid_file(path, "is " + shown(*json) + ", must be an object");
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "file.hpp"
+#include "gsnav/detail/core/field_check.hpp"
 
 namespace gsnav::io::detail {
 namespace {
@@ -44,20 +45,17 @@ Result<Json> parse(std::span<const std::byte> text, const std::string& source, i
 
 }  // namespace
 
+Result<Json> load_json(const std::filesystem::path& path, const ReadLimits* limits) {
+  const auto file = read_file(path);
+  if (!file) return file.status();
+  return limits != nullptr ? parse_json(file->span(), path.string(), *limits)
+                           : parse_json(file->span(), path.string());
+}
+
 Status check_limits(const ReadLimits& limits, const std::string& source) {
-  struct Field {
-    const char* name;
-    int value, most;
-  };
-  for (const Field& f :
-       {Field{"json_depth", limits.json_depth, 10000}, Field{"inflation", limits.inflation, 1032},
-        Field{"texture_side", limits.texture_side, 65535}}) {
-    if (f.value >= 1 && f.value <= f.most) continue;
-    return {Errc::invalid_argument, source + ": ReadLimits::" + f.name + " is " +
-                                        std::to_string(f.value) + ", must be in [1, " +
-                                        std::to_string(f.most) + "]"};
-  }
-  return {};
+  gsnav::detail::FieldCheck check(source + ": ReadLimits::");
+  check.in("json_depth", limits.json_depth, 1, 10000).in("inflation", limits.inflation, 1, 1032);
+  return check.in("texture_side", limits.texture_side, 1, 65535).status();
 }
 
 Result<Json> parse_json(std::span<const std::byte> text, const std::string& source) {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string>
@@ -22,6 +23,9 @@ Result<Json> parse_json(std::span<const std::byte> text, const std::string& sour
 /// Parses JSON within the caller's limits. Errors: as above; invalid_argument (`limits`).
 Result<Json> parse_json(std::span<const std::byte> text, const std::string& source,
                         const ReadLimits& limits);
+
+/// Parses a JSON file, within `limits` unless they are null. Errors: those of read_file and parse_json.
+Result<Json> load_json(const std::filesystem::path& path, const ReadLimits* limits = nullptr);
 
 /// Checks limits. Error: invalid_argument naming the field that is out of its range.
 Status check_limits(const ReadLimits& limits, const std::string& source);

@@ -92,9 +92,7 @@ class LodReader {
   /// Reads the set; with `coarser` all of its levels.
   Status read(bool coarser) {
     coarser_ = coarser;
-    const auto text = detail::read_file(path_);
-    if (!text) return text.status();
-    const auto json = detail::parse_json(text->span(), source_, options_.limits);
+    const auto json = detail::load_json(path_, &options_.limits);
     if (!json) return json.status();
     if (Status s = read_header(*json); !s) return s;
     if (Status s = walk(*json); !s) return s;

@@ -23,16 +23,6 @@ using detail::member;
 using detail::shown;
 using detail::TextLines;
 
-Result<Json> read_json(const fs::path& path, const ReadLimits& limits) {
-  const auto file = detail::read_file(path);
-  if (!file) return file.status();
-  return detail::parse_json(file->span(), path.string(), limits);
-}
-
-std::string_view text_of(const detail::FileBytes& f) {
-  return {reinterpret_cast<const char*>(f.data.get()), f.size};
-}
-
 /// All vertices of the file, in its units, and the faces of one group.
 struct BaseMesh {
   std::vector<Vec3d> vertices;
@@ -44,7 +34,7 @@ Result<BaseMesh> read_base(const fs::path& path, const std::string& group) {
   const auto file = detail::read_file(path);
   if (!file) return file.status();
   BaseMesh out;
-  TextLines lines(text_of(*file), source);
+  TextLines lines(file->text(), source);
   bool wanted = group.empty();
   while (lines.next()) {
     if (lines.word(0) == "v") {
@@ -85,7 +75,7 @@ Status apply_target(const fs::path& path, double amount, BaseMesh& mesh) {
     return {Errc::invalid_argument, source + ": MakeHumanOptions.targets: the amount is not finite"};
   const auto file = detail::read_file(path);
   if (!file) return file.status();
-  TextLines lines(text_of(*file), source);
+  TextLines lines(file->text(), source);
   while (lines.next()) {
     double v[4];
     for (std::size_t k = 0; k < 4; ++k) {
@@ -262,7 +252,7 @@ Result<LoadedSkinnedMesh> load(const fs::path& path, const MakeHumanOptions& opt
   LoadedSkinnedMesh out;
   SkinnedMesh& mesh = out.mesh;
   mesh.name = path.stem().string();
-  const auto bones = read_json(options.skeleton, options.limits);
+  const auto bones = detail::load_json(options.skeleton, &options.limits);
   if (!bones) return bones.status();
   const std::string source = options.skeleton.string();
   if (Status s = read_skeleton(*bones, source, *base, mesh.skeleton); !s)
@@ -274,7 +264,7 @@ Result<LoadedSkinnedMesh> load(const fs::path& path, const MakeHumanOptions& opt
       return {Errc::invalid_file, source + ": no 'weights_file', and MakeHumanOptions.weights is empty"};
     weights_path = options.skeleton.parent_path() / fs::path(name->get<std::string>()).filename();
   }
-  const auto weights = read_json(weights_path, options.limits);
+  const auto weights = detail::load_json(weights_path, &options.limits);
   if (!weights) return weights.status();
   const std::string weights_source = weights_path.string();
   WeightReader reader(weights_source, base->vertices.size(), mesh.skeleton);

@@ -103,11 +103,7 @@ class ObjParser {
 
 Result<TriangleMesh> load_obj(const std::filesystem::path& path) {
   const std::string source = path.string();
-  return detail::guarded(source, [&]() -> Result<TriangleMesh> {
-    const auto file = detail::read_file(path);
-    if (!file) return file.status();
-    return ObjParser(source).run({reinterpret_cast<const char*>(file->data.get()), file->size});
-  });
+  return detail::with_file(path, [&](const auto& file) { return ObjParser(source).run(file.text()); });
 }
 
 namespace {

@@ -113,12 +113,9 @@ class MeshReader {
 
 Result<TriangleMesh> load_ply_mesh(const std::filesystem::path& path) {
   const std::string source = path.string();
-  return detail::guarded(source, [&]() -> Result<TriangleMesh> {
-    const auto file = detail::read_file(path);
-    if (!file) return file.status();
-    const auto header = detail::parse_ply_header(file->span(), source);
-    if (!header) return header.status();
-    return MeshReader(file->span(), *header, source).run();
+  return detail::with_file(path, [&](const auto& file) -> Result<TriangleMesh> {
+    const auto header = detail::parse_ply_header(file.span(), source);
+    return header ? MeshReader(file.span(), *header, source).run() : header.status();
   });
 }
 

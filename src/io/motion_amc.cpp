@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cctype>
-#include <cmath>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "file.hpp"
+#include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/detail/io/motion_file.hpp"
 #include "motion_asf.hpp"
 #include "text_lines.hpp"
@@ -124,18 +124,14 @@ Result<LoadedMotion> load_amc(const std::filesystem::path& skeleton, const std::
                               const AmcOptions& options) {
   return detail::guarded(motion.string(), [&]() -> Result<LoadedMotion> {
     const std::string name = skeleton.string(), clip_name = motion.string();
-    const auto positive = [](double v) { return v > 0 && std::isfinite(v); };
-    if (!positive(options.frame_rate))
-      return {Errc::invalid_argument, clip_name + ": AmcOptions.frame_rate must be positive"};
-    if (options.scale != 0 && !positive(options.scale))
-      return {Errc::invalid_argument, clip_name + ": AmcOptions.scale must be positive"};
+    gsnav::detail::FieldCheck check(clip_name + ": AmcOptions.");
+    check.positive("frame_rate", options.frame_rate);
+    if (options.scale != 0) check.positive("scale", options.scale);
+    if (!check.status()) return check.status();
     const auto asf = detail::read_file(skeleton), amc = detail::read_file(motion);
     if (!asf) return asf.status();
     if (!amc) return amc.status();
-    const auto text = [](const detail::FileBytes& f) {
-      return std::string_view(reinterpret_cast<const char*>(f.data.get()), f.size);
-    };
-    const auto file = detail::read_asf(text(*asf), name);
+    const auto file = detail::read_asf(asf->text(), name);
     if (!file) return file.status();
     const double scale = options.scale > 0 ? options.scale : 0.0254 / file->length_unit;
     LoadedMotion out;
@@ -143,7 +139,7 @@ Result<LoadedMotion> load_amc(const std::filesystem::path& skeleton, const std::
     if (Status s = detail::asf_joints(*file, scale, name, out.skeleton, joints); !s)
       return {Errc::invalid_file, s.message()};
     out.clip.frame_rate = options.frame_rate;
-    if (Status s = AmcReader(text(*amc), clip_name, *file, scale, options.z_up)
+    if (Status s = AmcReader(amc->text(), clip_name, *file, scale, options.z_up)
                        .run(joints, out.skeleton, out.clip);
         !s) {
       return {Errc::invalid_file, s.message()};

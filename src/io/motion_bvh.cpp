@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "file.hpp"
+#include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/detail/io/motion_file.hpp"
 
 namespace gsnav::io {
@@ -22,9 +23,8 @@ class BvhReader {
       : text_(text), name_(std::move(name)), options_(options) {}
 
   Result<LoadedMotion> run() {
-    if (!(options_.scale > 0) || !std::isfinite(options_.scale)) {
-      return {Errc::invalid_argument, name_ + ": BvhOptions.scale must be positive"};
-    }
+    gsnav::detail::FieldCheck check(name_ + ": BvhOptions.");
+    if (!check.positive("scale", options_.scale).status()) return check.status();
     if (Status s = read_hierarchy(); !s) return s;
     if (Status s = out_.skeleton.validate(); !s) return {Errc::invalid_file, name_ + ": " + s.message()};
     if (Status s = read_frames(); !s) return s;
@@ -231,12 +231,8 @@ class BvhReader {
 }  // namespace
 
 Result<LoadedMotion> load_bvh(const std::filesystem::path& path, const BvhOptions& options) {
-  return detail::guarded(path.string(), [&]() -> Result<LoadedMotion> {
-    const auto file = detail::read_file(path);
-    if (!file) return file.status();
-    const std::string_view text(reinterpret_cast<const char*>(file->data.get()), file->size);
-    return BvhReader(text, path.string(), options).run();
-  });
+  return detail::with_file(
+      path, [&](const auto& file) { return BvhReader(file.text(), path.string(), options).run(); });
 }
 
 }  // namespace gsnav::io

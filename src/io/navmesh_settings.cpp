@@ -78,9 +78,7 @@ Status read_setting(const std::string& key, const Json& value, const std::string
 
 Result<NavMeshSettings> load_navmesh_settings(const std::filesystem::path& path) {
   return detail::guarded(path.string(), [&]() -> Result<NavMeshSettings> {
-    const auto file = detail::read_file(path);
-    if (!file) return file.status();
-    const auto json = detail::parse_json(file->span(), path.string());
+    const auto json = detail::load_json(path);
     if (!json) return json.status();
     if (!json->is_object())
       return detail::invalid_file(path, "is " + shown(*json) + ", must be an object of settings");

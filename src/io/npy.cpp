@@ -34,11 +34,8 @@ Status save_npy(const std::filesystem::path& path, std::span<const double> value
 }
 
 Result<NpyArray> load_npy(const std::filesystem::path& path) {
-  return detail::guarded(path.string(), [&]() -> Result<NpyArray> {
-    const auto file = detail::read_file(path);
-    if (!file) return file.status();
-    return detail::parse_npy(file->span(), path.string());
-  });
+  return detail::with_file(
+      path, [&](const auto& file) { return detail::parse_npy(file.span(), path.string()); });
 }
 
 }  // namespace gsnav::io

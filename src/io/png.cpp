@@ -175,11 +175,8 @@ Status save_png_gray16(const std::filesystem::path& path, std::span<const std::u
 }
 
 Result<PngImage> load_png(const std::filesystem::path& path) {
-  return detail::guarded(path.string(), [&]() -> Result<PngImage> {
-    const auto file = detail::read_file(path);
-    if (!file) return file.status();
-    return detail::decode_png(file->span(), path.string());
-  });
+  return detail::with_file(
+      path, [&](const auto& file) { return detail::decode_png(file.span(), path.string()); });
 }
 
 }  // namespace gsnav::io

@@ -120,7 +120,7 @@ TEST_CASE("read limits: the depth is the caller's") {
   // A tree of nodes needs two levels of JSON each.
   for (const int bad : {0, -1, 10001}) {
     check_refused(io::load_episodes(path, {.json_depth = bad}), Errc::invalid_argument, "a.json",
-                  "ReadLimits::json_depth is " + std::to_string(bad) + ", must be in [1, 10000]");
+                  "ReadLimits::json_depth = " + std::to_string(bad) + ": must be in [1, 10000]");
   }
   write_file(folder / "lod-meta.json", arrays(70));
   io::LoadSceneOptions options;
