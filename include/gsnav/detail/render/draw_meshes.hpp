@@ -23,35 +23,21 @@ namespace gsnav {
 /// meshes.
 template <class S, Backend B>
 struct MeshWorkspace : ScratchMemory<MeshWorkspace<S, B>> {
-  explicit MeshWorkspace(B& b)
-      : placements(b),
-        vertex_chunks(b),
-        triangle_chunks(b),
-        vertices(b),
-        counts(b),
-        not_finite(b),
-        offsets(b),
-        triangles(b),
-        cursors(b),
-        tile_offsets(b),
-        tile_triangles(b),
-        depth(b),
-        visible(b),
-        tile_far(b),
-        color(b) {}
+  explicit MeshWorkspace(B& b) : backend(&b) {}
 
-  Buffer<MeshPlacement, B> placements;
-  Buffer<MeshChunk, B> vertex_chunks, triangle_chunks;
-  Buffer<MeshVertex, B> vertices;
-  Buffer<std::uint32_t, B> counts, not_finite;
-  Buffer<std::uint64_t, B> offsets;
-  Buffer<MeshTriangle<S>, B> triangles;
-  Buffer<std::uint64_t, B> cursors, tile_offsets;
-  Buffer<std::uint32_t, B> tile_triangles;
-  Buffer<S, B> depth;                ///< [H][W], depth of the last frame
-  Buffer<std::uint32_t, B> visible;  ///< [H][W], index of the visible triangle
-  Buffer<S, B> tile_far;
-  Buffer<S, B> color;  ///< [H][W][3], if draw_meshes was called with layer_color
+  B* backend;  ///< Owner of the memory.
+  Buffer<MeshPlacement, B> placements{*backend};
+  Buffer<MeshChunk, B> vertex_chunks{*backend}, triangle_chunks{*backend};
+  Buffer<MeshVertex, B> vertices{*backend};
+  Buffer<std::uint32_t, B> counts{*backend}, not_finite{*backend};
+  Buffer<std::uint64_t, B> offsets{*backend};
+  Buffer<MeshTriangle<S>, B> triangles{*backend};
+  Buffer<std::uint64_t, B> cursors{*backend}, tile_offsets{*backend};
+  Buffer<std::uint32_t, B> tile_triangles{*backend};
+  Buffer<S, B> depth{*backend};                ///< [H][W], depth of the last frame
+  Buffer<std::uint32_t, B> visible{*backend};  ///< [H][W], index of the visible triangle
+  Buffer<S, B> tile_far{*backend};
+  Buffer<S, B> color{*backend};  ///< [H][W][3], if draw_meshes was called with layer_color
   std::vector<MeshPlacement> host_placements;
   std::vector<MeshChunk> host_vertex_chunks, host_triangle_chunks;
   std::vector<std::uint32_t> host_not_finite;

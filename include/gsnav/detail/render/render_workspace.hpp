@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -22,41 +21,27 @@ namespace gsnav {
 /// Scratch memory of `render_camera`. It grows to the largest frame and is reused.
 template <class S, Backend B>
 struct RenderWorkspace : ScratchMemory<RenderWorkspace<S, B>> {
-  explicit RenderWorkspace(B& b)
-      : offsets(b),
-        geometry(b),
-        colors(b),
-        depths(b),
-        perspectives(b),
-        bounds(b),
-        visible(b),
-        cursors(b),
-        tile_offsets(b),
-        tile_splats(b),
-        spans(b),
-        open(b),
-        states(b),
-        mesh(b),
-        fragments(b),
-        composite(b) {}
+  explicit RenderWorkspace(B& b) : backend(&b) {}
 
-  Buffer<Vec3d, B> offsets;
-  Buffer<SplatGeometry<S>, B> geometry;
-  Buffer<SplatColor<S>, B> colors;
-  Buffer<SplatDepth<S>, B> depths;
-  Buffer<SplatPerspective<S>, B> perspectives;
-  Buffer<SplatBounds, B> bounds;
-  VisibleOrder<B> visible;
-  Buffer<std::uint64_t, B> cursors, tile_offsets;
-  Buffer<std::uint32_t, B> tile_splats;
-  Buffer<TileSpans, B> spans;
-  Buffer<std::uint64_t, B> open;  ///< of frames in slices: open cells of each tile; `states` has the
-                                  ///< state of each pixel
-  Buffer<S, B> states;
+  B* backend;  ///< Owner of the memory.
+  Buffer<Vec3d, B> offsets{*backend};
+  Buffer<SplatGeometry<S>, B> geometry{*backend};
+  Buffer<SplatColor<S>, B> colors{*backend};
+  Buffer<SplatDepth<S>, B> depths{*backend};
+  Buffer<SplatPerspective<S>, B> perspectives{*backend};
+  Buffer<SplatBounds, B> bounds{*backend};
+  VisibleOrder<B> visible{*backend};
+  Buffer<std::uint64_t, B> cursors{*backend}, tile_offsets{*backend};
+  Buffer<std::uint32_t, B> tile_splats{*backend};
+  Buffer<TileSpans, B> spans{*backend};
+  Buffer<std::uint64_t, B> open{*backend};  ///< of frames in slices: open squares of each tile; `states`
+                                            ///< has the state of each pixel
+  Buffer<S, B> states{*backend};
   DepthSlices slices;
-  MeshWorkspace<S, B> mesh;
-  FragmentWorkspace<S, B> fragments;
-  Buffer<S, B> composite;  ///< of Composite::hard_depth: alpha and depth of the Gaussians alone
+  MeshWorkspace<S, B> mesh{*backend};
+  FragmentWorkspace<S, B> fragments{*backend};
+  /// Alpha and depth of the Gaussians alone, for Composite::hard_depth.
+  Buffer<S, B> composite{*backend};
   std::vector<Vec3d> host_offsets;
   std::vector<ViewedSet<S>> projections;  ///< [sets], one projection per set
   ProjectOutputs<S> projected;            ///< outputs of the projection
