@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <limits>
 
 #include "batch_state.cuh"
 #include "gsnav/backends/cuda/device.cuh"

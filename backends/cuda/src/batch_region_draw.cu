@@ -293,7 +293,7 @@ __global__ void __launch_bounds__(Policy::kOrderThreads)
     const float all =
         static_cast<float>(r.counters->pairs) * static_cast<float>(tiles) / static_cast<float>(regions);
     const float share = all / static_cast<float>(warps), mean = all / static_cast<float>(a.tiles);
-    kind = r.far_begins[camera] == kNoFarRecords                 ? kInDouble
+    kind = r.precise_begins[camera] == kNoPreciseRecords         ? kInDouble
            : length > Policy::kFirst * Policy::kQuarters * share ? 0u
            : length > Policy::kQuarters * share                  ? 1u
            : length > Policy::kHalves * share                    ? 2u

@@ -16,13 +16,13 @@ struct ListShared {
   std::uint32_t sums[kListWarps];
   std::uint32_t instance, rows;  ///< Current instance, and rows of the camera's sets.
   std::size_t group_base;        ///< First place of the camera's groups in rows_in_view.
-  std::uint32_t far_rows, far_reserved, total, base, pair_base, far_base, fits;
+  std::uint32_t precise_rows, precise_reserved, total, base, pair_base, precise_base, fits;
 };
 
 /// Pixels [x0, x1] x [y0, y1] that a row may cover. Empty if x0 > x1 or y0 > y1.
 struct RowPixels {
   int x0, x1, y0, y1;
-  bool far;  ///< Its record may need double.
+  bool precise;  ///< Its record may need double.
 };
 
 /// Conservative: from the largest axis, without a covariance.
@@ -51,17 +51,18 @@ __device__ RowPixels pixels_of(const BatchArgs& a, const RegionArgs& r, const Pl
   const float out_x = ::fmaxf(::fabsf(mx - 0.5f * width), 0.5f * width);
   const float out_y = ::fmaxf(::fabsf(my - 0.5f * height), 0.5f * height);
   return {pixel(mx - hx, width), pixel(mx + hx, width) - 1, pixel(my - hy, height),
-          pixel(my + hy, height) - 1, out_x + out_y > v.far_limit};
+          pixel(my + hy, height) - 1, out_x + out_y > v.precise_limit};
 }
 
 /// A row's place in the image, kept between counting and placing: its key, or 0 if it is not in view,
-/// and x0 | x1 << 8 | y0 << 16 | y1 << 24 with kFar.
-constexpr std::uint32_t kFar = 0x80u;
+/// and x0 | x1 << 8 | y0 << 16 | y1 << 24 with kPrecise.
+constexpr std::uint32_t kPrecise = 0x80u;
 __device__ uint2 kept(std::uint32_t key, const RowPixels& at) {
   const auto byte = [](int pixel, int place) {
     return static_cast<std::uint32_t>(pixel) << (8 * place);
   };
-  return {key, byte(at.x0, 0) | byte(at.x1, 1) | byte(at.y0, 2) | byte(at.y1, 3) | (at.far ? kFar : 0u)};
+  return {key, byte(at.x0, 0) | byte(at.x1, 1) | byte(at.y0, 2) | byte(at.y1, 3) |
+                   (at.precise ? kPrecise : 0u)};
 }
 
 /// Counts rows in bins of regions, then places them.
@@ -87,7 +88,7 @@ class ListWarp {
       for (unsigned q = 0; q < kAtOnce; ++q) {
         const uint2 row = row_in_view(position[q]);
         if (row.x != 0) for_regions(row, [](int, int, std::uint32_t) {});
-        if ((row.y & kFar) != 0) atomicAdd(&s_.far_rows, 1u);
+        if ((row.y & kPrecise) != 0) atomicAdd(&s_.precise_rows, 1u);
         if (group[q].y != 0) rows[(first + q * kListWarps) * 32 + lane()] = row;
       }
     });
@@ -106,7 +107,8 @@ class ListWarp {
       for (unsigned q = 0; q < kAtOnce; ++q) {
         if (row[q].x == 0) continue;
         std::uint32_t source = group[q].x * 32 + lane() - s_.view.first_row + s_.camera.code.first_rank;
-        if ((row[q].y & kFar) != 0 && s_.far_base != kNoFarRecords) source = far_source(source);
+        if ((row[q].y & kPrecise) != 0 && s_.precise_base != kNoPreciseRecords)
+          source = precise_source(source);
         for_regions(row[q], [&](int x, int y, std::uint32_t place) {
           r_.pairs[s_.pair_base + place] = {source << 12 | rectangle(row[q].y, x, y), row[q].x};
         });
@@ -152,9 +154,9 @@ class ListWarp {
     }
   }
 
-  __device__ std::uint32_t far_source(std::uint32_t source) const {
-    const std::uint32_t number = atomicAdd(&s_.far_rows, 1u), place = s_.far_base + number;
-    if (place < r_.far_capacity) r_.far_rows[place] = {s_.instance, source};
+  __device__ std::uint32_t precise_source(std::uint32_t source) const {
+    const std::uint32_t number = atomicAdd(&s_.precise_rows, 1u), place = s_.precise_base + number;
+    if (place < r_.precise_capacity) r_.precise_rows[place] = {s_.instance, source};
     return s_.rows + number;
   }
 
@@ -205,7 +207,7 @@ __global__ void __launch_bounds__(kListThreads, Policy::kListResident)
   const std::uint32_t count = regions * r.bins;
   for (std::uint32_t i = threadIdx.x; i < count; i += kListThreads) bins[i] = 0;
   if (threadIdx.x == 0) {
-    s.far_rows = 0;
+    s.precise_rows = 0;
     s.rows = r.camera_rows[camera];
     // Bins cover the octaves around the mean depth of groups in view.
     const uint2 depths = r.depths[camera];
@@ -241,13 +243,14 @@ __global__ void __launch_bounds__(kListThreads, Policy::kListResident)
         atomicAdd(&r.counters->pairs, static_cast<unsigned long long>(s.total));
     if (base + s.total > r.pair_capacity) s.fits = 0;
     s.pair_base = static_cast<std::uint32_t>(base);
-    s.far_base = s.far_rows > Policy::kMostFarRows ? kNoFarRecords
-                 : s.far_rows == 0                 ? 0u
-                                                   : atomicAdd(&r.counters->far_rows, s.far_rows);
-    if (s.far_base != kNoFarRecords && s.far_base + s.far_rows > r.far_capacity) s.fits = 0;
-    r.far_begins[camera] = s.far_base;
-    s.far_reserved = s.far_base == kNoFarRecords ? 0u : s.far_rows;
-    s.far_rows = 0;
+    s.precise_base = s.precise_rows > Policy::kMostPreciseRows ? kNoPreciseRecords
+                     : s.precise_rows == 0                     ? 0u
+                                           : atomicAdd(&r.counters->precise_rows, s.precise_rows);
+    if (s.precise_base != kNoPreciseRecords && s.precise_base + s.precise_rows > r.precise_capacity)
+      s.fits = 0;
+    r.precise_begins[camera] = s.precise_base;
+    s.precise_reserved = s.precise_base == kNoPreciseRecords ? 0u : s.precise_rows;
+    s.precise_rows = 0;
   }
   __syncthreads();
   for (std::uint32_t i = threadIdx.x; i < regions; i += kListThreads) {
@@ -256,8 +259,8 @@ __global__ void __launch_bounds__(kListThreads, Policy::kListResident)
     r.lists[camera * regions + i] = {s.pair_base + begin, s.fits != 0 ? end - begin : 0u};
   }
   // Places of rows that do not fit must not look like rows.
-  for (std::uint32_t i = threadIdx.x; s.fits == 0 && i < s.far_reserved; i += kListThreads) {
-    if (s.far_base + i < r.far_capacity) r.far_rows[s.far_base + i] = {kNoSlot, 0};
+  for (std::uint32_t i = threadIdx.x; s.fits == 0 && i < s.precise_reserved; i += kListThreads) {
+    if (s.precise_base + i < r.precise_capacity) r.precise_rows[s.precise_base + i] = {kNoSlot, 0};
   }
   __syncthreads();
   if (s.fits != 0)
@@ -265,14 +268,14 @@ __global__ void __launch_bounds__(kListThreads, Policy::kListResident)
 }
 
 /// Records of rows that may need double.
-__global__ void __launch_bounds__(Policy::kFarThreads)
-    far_rows_kernel(const BatchArgs a, const RegionArgs r) {
-  const std::uint32_t n = used(r.counters->far_rows, r.far_capacity);
+__global__ void __launch_bounds__(Policy::kPreciseThreads)
+    precise_rows_kernel(const BatchArgs a, const RegionArgs r) {
+  const std::uint32_t n = used(r.counters->precise_rows, r.precise_capacity);
   for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < n; i += gridDim.x * blockDim.x) {
-    const FarRow far = r.far_rows[i];
-    if (far.instance == kNoSlot) continue;
-    const ViewedSet<float>& args = a.instances[far.instance].args;
-    const ViewedRow row({args.gaussians.shape, far.source - args.first_rank}, args.offsets);
+    const PreciseRow listed = r.precise_rows[i];
+    if (listed.instance == kNoSlot) continue;
+    const ViewedSet<float>& args = a.instances[listed.instance].args;
+    const ViewedRow row({args.gaussians.shape, listed.source - args.first_rank}, args.offsets);
     const RowKey<float> key = row_key<float>(args.camera64, row);
     const ProjectedRow<float> projected(args.camera, row, key);
     Splat splat;
@@ -286,7 +289,7 @@ __global__ void __launch_bounds__(Policy::kFarThreads)
       splat.geometry = {};
       splat.geometry.log2_opacity = -1e30f;
     }
-    r.far_records[i] = splat.geometry;
+    r.precise_records[i] = splat.geometry;
   }
 }
 
@@ -299,8 +302,8 @@ void launch_region_lists(const BatchArgs& args, const RegionArgs& regions, int m
   cudaFuncSetAttribute(list_rows_kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
                        static_cast<int>(bytes));
   list_rows_kernel<<<args.cameras, kListThreads, bytes, stream>>>(args, regions);
-  far_rows_kernel<<<static_cast<unsigned>(multiprocessors), Policy::kFarThreads, 0, stream>>>(args,
-                                                                                              regions);
+  precise_rows_kernel<<<static_cast<unsigned>(multiprocessors), Policy::kPreciseThreads, 0, stream>>>(
+      args, regions);
 }
 
 }  // namespace gsnav::cuda

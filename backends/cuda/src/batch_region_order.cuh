@@ -221,8 +221,8 @@ __device__ inline std::uint32_t source_of(const RegionArgs& r, std::uint32_t cam
                                           std::uint32_t source) {
   const std::uint32_t rows = r.camera_rows[camera];
   if (source < rows) return source;
-  const std::uint32_t place = r.far_begins[camera] + source - rows;
-  return r.far_rows[min(place, r.far_capacity - 1)].source;
+  const std::uint32_t place = r.precise_begins[camera] + source - rows;
+  return r.precise_rows[min(place, r.precise_capacity - 1)].source;
 }
 
 /// Ranks of the rows of a camera's lists.

@@ -14,19 +14,19 @@ struct RowOfInstance {
 };
 
 /// Geometry and bounds of a row. Returns false if it covers no pixel of the image.
-/// @tparam InDouble true: rows that need double are projected here. false: the kernel of far rows has
-/// made their records.
+/// @tparam InDouble true: rows that need double are projected here. false: the kernel of precise rows
+/// has made their records.
 template <bool Color, bool InDouble>
 __device__ inline bool project_source(const BatchArgs& a, const RegionArgs& r,
                                       std::uint32_t camera_index, std::uint32_t source, Splat& splat,
                                       RowOfInstance& out) {
   const std::uint32_t rows = r.camera_rows[camera_index];
-  const bool far = source >= rows;
-  std::uint32_t far_place = 0;
-  if (far) {
-    far_place = r.far_begins[camera_index] + source - rows;
-    if (far_place >= r.far_capacity) return false;
-    source = r.far_rows[far_place].source;
+  const bool precise = source >= rows;
+  std::uint32_t precise_place = 0;
+  if (precise) {
+    precise_place = r.precise_begins[camera_index] + source - rows;
+    if (precise_place >= r.precise_capacity) return false;
+    source = r.precise_rows[precise_place].source;
   }
   const std::uint32_t first = a.camera_first[camera_index], end = a.camera_first[camera_index + 1];
   const std::uint32_t place = end - first == 1 ? first : last_start(first, end, [&](std::uint32_t i) {
@@ -40,8 +40,8 @@ __device__ inline bool project_source(const BatchArgs& a, const RegionArgs& r,
   const RegionShape from{r.positions[row], r.shapes[2 * row], r.shapes[2 * row + 1], packed};
   const RowKey<float> key = row_key<float>(key_camera_of(packed), from);
   if constexpr (Color) out = {instance, local, key.delta};
-  if (far) {
-    splat.geometry = r.far_records[far_place];
+  if (precise) {
+    splat.geometry = r.precise_records[precise_place];
     splat.bounds = {0, 0, a.grid.width, a.grid.height};
     return true;
   }

@@ -53,8 +53,8 @@ cuda::RegionView region_view(const cuda::BatchInstance& instance, const Gaussian
   v.limit2_y = static_cast<float>(limit_y * limit_y * 1.00001);
   v.inverse_scale = static_cast<float>(1 / c.scale);
   v.near_sigma = instance.args.camera.near_sigma;
-  v.far_limit = static_cast<float>(0.5 * (c.width + c.height) +
-                                   (detail::kFloatOffset - 0.5) / whitened_per_pixel(set) - 2);
+  v.precise_limit = static_cast<float>(0.5 * (c.width + c.height) +
+                                       (detail::kFloatOffset - 0.5) / whitened_per_pixel(set) - 2);
   v.rounding = static_cast<float>((std::abs(c.fx) + std::abs(c.fy)) * 4e-6);
   v.camera = instance.camera;
   return v;
@@ -139,7 +139,7 @@ void CudaBatchRenderer::State::plan_regions(std::span<const GaussianSet> sets,
   if (regions.pair_capacity == 0) {
     regions.pair_capacity = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(
         gaussians / Policy::kGaussiansPerPair, cuda::policy::Capacity::kLeastSlots, 0x7fffffffu));
-    regions.far_capacity = regions.pair_capacity / Policy::kPairsPerFarRow;
+    regions.precise_capacity = regions.pair_capacity / Policy::kPairsPerPreciseRow;
     regions.group_capacity = regions.pair_capacity / 32;
   }
 }
@@ -164,19 +164,19 @@ void CudaBatchRenderer::State::size_regions() {
   r.in_view = with_room(regions.in_view, regions.groups_in_view);
   r.lists = with_room(regions.lists, count);
   r.bases = with_room(regions.bases, args.cameras);
-  r.far_begins = with_room(regions.far_begins, args.cameras);
+  r.precise_begins = with_room(regions.precise_begins, args.cameras);
   r.order = with_room(regions.order, std::size_t{4 * cuda::kItemKinds} * args.tiles);
   regions.pairs.resize_exactly(regions.pair_capacity);
   r.pairs = regions.pairs.data();
-  regions.far_rows.resize_exactly(regions.far_capacity);
-  r.far_rows = regions.far_rows.data();
-  regions.far_records.resize_exactly(regions.far_capacity);
-  r.far_records = regions.far_records.data();
+  regions.precise_rows.resize_exactly(regions.precise_capacity);
+  r.precise_rows = regions.precise_rows.data();
+  regions.precise_records.resize_exactly(regions.precise_capacity);
+  r.precise_records = regions.precise_records.data();
   regions.rows_in_view.resize_exactly(std::size_t{regions.group_capacity} * 32);
   r.rows_in_view = regions.rows_in_view.data();
   r.group_capacity = regions.group_capacity;
   r.pair_capacity = regions.pair_capacity;
-  r.far_capacity = regions.far_capacity;
+  r.precise_capacity = regions.precise_capacity;
   raster.depths = {};
   raster.perspectives = {};
   stats.scratch_bytes = inputs.capacity_bytes() + regions.bytes();

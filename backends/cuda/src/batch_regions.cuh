@@ -30,9 +30,9 @@ struct alignas(16) RegionView {
   float axis[3], nearest;    ///< View axis and near plane, in asset units.
   float limit2_x, limit2_y;  ///< Squares of the limits of x/z and y/z in the Jacobian.
   float inverse_scale, near_sigma;
-  float far_limit;  ///< A row may need double if |dx| + |dy| exceeds this, pixels. (dx, dy) is its
-                    ///< centre minus that of the image.
-  float rounding;   ///< Pixels.
+  float precise_limit;  ///< A row may need double if |dx| + |dy| exceeds this, pixels. (dx, dy) is its
+                        ///< centre minus that of the image.
+  float rounding;       ///< Pixels.
   std::uint32_t first_row;      ///< Number of the set's first row among the rows of the call.
   std::uint32_t first_in_view;  ///< Index of its first place in `in_view`.
   std::uint32_t camera;
@@ -46,22 +46,22 @@ struct alignas(8) RegionRow {
 inline constexpr int kRegion = policy::Regions::kRegion, kRegionTile = policy::Regions::kTile;
 
 /// Row of a list whose record may need double precision.
-struct FarRow {
+struct PreciseRow {
   std::uint32_t instance, source;
 };
 
-/// Value of far_begins: the camera has too many such rows, and tiles compute their records.
-inline constexpr std::uint32_t kNoFarRecords = 0xffffffffu;
+/// Value of precise_begins: the camera has too many such rows, and tiles compute their records.
+inline constexpr std::uint32_t kNoPreciseRecords = 0xffffffffu;
 
 /// Kinds of items: tiles in quarters (two lengths), in halves, whole (two lengths), and those of cameras
-/// without far records.
+/// without precise records.
 inline constexpr std::uint32_t kItemKinds = 6, kInDouble = 5;
 
 struct RegionCounters {
   static constexpr std::size_t kLine = 256;
   alignas(kLine) unsigned long long pairs;
   unsigned long long groups;  ///< Number of groups in view, summed over all cameras.
-  alignas(kLine) std::uint32_t far_rows;
+  alignas(kLine) std::uint32_t precise_rows;
   alignas(kLine) std::uint32_t next_item[2];  ///< For all kinds but kInDouble, and for that.
   alignas(kLine) std::uint32_t items[kItemKinds];
 };
@@ -83,16 +83,16 @@ struct RegionArgs {
   float4* positions;           ///< Per row: mean, row_word().
   float4* shapes;              ///< Two per row: quaternion; scales, opacity.
   RowGroup* bounds;
-  uint2* in_view;             ///< Group and mask of rows, per instance.
-  uint2* rows_in_view;        ///< 32 per group in view: key and pixels.
-  uint2* lists;               ///< Per region: begin and length.
-  std::uint32_t* bases;       ///< Per camera: first key of bin 1.
-  std::uint32_t* far_begins;  ///< Per camera.
+  uint2* in_view;                 ///< Group and mask of rows, per instance.
+  uint2* rows_in_view;            ///< 32 per group in view: key and pixels.
+  uint2* lists;                   ///< Per region: begin and length.
+  std::uint32_t* bases;           ///< Per camera: first key of bin 1.
+  std::uint32_t* precise_begins;  ///< Per camera.
   RegionRow* pairs;
   std::uint32_t* order;  ///< Items by class: tile | part << 28.
-  FarRow* far_rows;
-  SplatGeometry<float>* far_records;
-  std::uint32_t pair_capacity, far_capacity, group_capacity;
+  PreciseRow* precise_rows;
+  SplatGeometry<float>* precise_records;
+  std::uint32_t pair_capacity, precise_capacity, group_capacity;
   bool operator==(const RegionArgs&) const = default;
 };
 

@@ -29,7 +29,7 @@ cuda::BatchCounters counters_of(const cuda::Flight& flight) {
   if (flight.key.regions.sets == nullptr) return *flight.counters;
   cuda::BatchCounters n{};
   n.pairs = flight.region_counters->pairs;
-  n.high_precision = flight.region_counters->far_rows;
+  n.high_precision = flight.region_counters->precise_rows;
   n.items = static_cast<std::uint32_t>(flight.region_counters->groups);
   return n;
 }
@@ -226,7 +226,7 @@ bool CudaBatchRenderer::State::fit_capacities(const cuda::Flight& flight) {
   };
   if (flight.key.regions.sets != nullptr) {
     fit(regions.pair_capacity, flight.key.regions.pair_capacity, n.pairs);
-    fit(regions.far_capacity, flight.key.regions.far_capacity, n.high_precision);
+    fit(regions.precise_capacity, flight.key.regions.precise_capacity, n.high_precision);
     fit(regions.group_capacity, flight.key.regions.group_capacity, n.items);
     return had;
   }

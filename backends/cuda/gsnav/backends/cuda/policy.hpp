@@ -116,14 +116,14 @@ struct Regions {
   /// Fewer cameras do not keep all multiprocessors busy.
   static constexpr std::size_t kLeastCameras = 128;
   static constexpr std::uint64_t kMostRows = (1u << 20) - (1u << 14);  ///< Largest number per camera.
-  static constexpr std::uint32_t kMostFarRows = 1u << 13;              ///< Largest number of their
+  static constexpr std::uint32_t kMostPreciseRows = 1u << 13;          ///< Largest number of their
                                                                        ///< records per camera.
   /// Depth bins of all regions of an image, and of one region. They cover kOctaves octaves, of which
   /// kOctavesBelow are nearer than the mean.
   static constexpr std::uint32_t kBins = 20480, kMostBins = 1280, kOctaves = 5, kOctavesBelow = 3;
   static constexpr unsigned kRowThreads = 256, kCullThreads = 256, kCullBlocks = 16;
   static constexpr unsigned kListThreads = 1024, kListResident = 1, kGroupsAtOnce = 4;
-  static constexpr unsigned kFarThreads = 128, kOrderThreads = 256;
+  static constexpr unsigned kPreciseThreads = 128, kOrderThreads = 256;
   /// A tile is drawn in quarters or halves if its list is longer than this fraction of the rows that a
   /// warp reads on average.
   static constexpr float kQuarters = 0.8f, kHalves = 0.4f;
@@ -133,7 +133,7 @@ struct Regions {
   static constexpr std::uint32_t kHeld = 256, kTarget = 160, kLeast = 48;
   static constexpr std::uint32_t kStaged = 64;     ///< Splats staged before they are drawn.
   static constexpr std::uint32_t kReadAtOnce = 4;  ///< Batches of 32 rows of a list.
-  static constexpr std::uint64_t kGaussiansPerPair = 2, kPairsPerFarRow = 16;  ///< First estimates.
+  static constexpr std::uint64_t kGaussiansPerPair = 2, kPairsPerPreciseRow = 16;  ///< First estimates.
 };
 
 struct MedianDepth {
