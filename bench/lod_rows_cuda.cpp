@@ -11,7 +11,7 @@
 
 #include "device_time.hpp"
 #include "gsnav/backends/cuda/batch.hpp"
-#include "gsnav/detail/sim/scene_detail.hpp"
+#include "gsnav/detail/sim/scene_levels.hpp"
 #include "gsnav/scene/basic_renderer.hpp"
 #include "lod_rows.hpp"
 
@@ -39,18 +39,18 @@ class GpuRows {
         visible_there_(cuda),
         memory_(cuda),
         time_(cuda) {
-    detail_.assets = {{&tree, &cloud, {}, arrays_.set().gaussians, merged_.set().gaussians}};
+    levels_.assets = {{&tree, &cloud, {}, arrays_.set().gaussians, merged_.set().gaussians}};
     memory_.resize_discard(4 * kPixels);
     visible_there_.upload(visible.bits.data(), visible.bits.size());
   }
 
   void row(const char* name, LodDraw draw, double pixels, bool seen = false) {
-    SceneDetail::Asset& asset = detail_.assets[0];
+    SceneLevels::Asset& asset = levels_.assets[0];
     asset.tree = draw == LodDraw::lod ? tree_ : nullptr;
     asset.visible = seen ? visible_ : nullptr;
     asset.visible_there = seen ? visible_there_.data() : nullptr;
     LodRow out(views_, draw);
-    detail_.choice.pixels = std::max(pixels, 1e-3);
+    levels_.choice.pixels = std::max(pixels, 1e-3);
     std::vector<float> rgb(3 * kPixels), depth(kPixels);
     for (const Camera& camera : views_.cameras) {
       BatchImages images;
@@ -74,13 +74,13 @@ class GpuRows {
   /// All views in one call.
   void batch_row(const char* name, LodDraw draw, double pixels, bool seen = false) {
     LodRow out(views_, draw);
-    detail_.choice.pixels = std::max(pixels, 1e-3);
-    SceneDetail::Asset& asset = detail_.assets[0];
+    levels_.choice.pixels = std::max(pixels, 1e-3);
+    SceneLevels::Asset& asset = levels_.assets[0];
     asset.tree = tree_;
     asset.visible = seen ? visible_ : nullptr;
     asset.visible_there = seen ? visible_there_.data() : nullptr;
     const std::size_t n = views_.cameras.size();
-    std::vector<DetailSets> cuts(n);
+    std::vector<CutSets> cuts(n);
     std::vector<GaussianSet> sets{arrays_.set()};
     std::vector<std::vector<std::uint32_t>> lists(n);
     std::vector<View<const std::uint32_t>> bits(n);
@@ -89,7 +89,7 @@ class GpuRows {
     for (std::size_t c = 0; c < n; ++c) {
       batch.push_back({views_.cameras[c], {}, {}});
       if (draw == LodDraw::lod) {
-        cuts[c].select(detail_, {}, views_.cameras[c]);
+        cuts[c].select(levels_, {}, views_.cameras[c]);
         drawn += cuts[c].cut(0).stats().drawn;
       } else {
         drawn += cloud_.size();
@@ -148,14 +148,14 @@ class GpuRows {
   double draw_once(LodDraw draw, const Camera& camera, const BatchImages& images, double& pairs) {
     const BatchCamera view{camera, {}, {}};
     const GaussianSet own = arrays_.set();
-    GaussianSet photo = LodCut::photo_set(cloud_, detail_.choice);
+    GaussianSet photo = LodCut::photo_set(cloud_, levels_.choice);
     photo.gaussians = own.gaussians;
     std::span<const GaussianSet> sets(draw == LodDraw::direct || draw == LodDraw::seen ? &own : &photo,
                                       1);
     CudaBatchRenderer* const renderer = &renderer_;
     drawn_ = cloud_.size();
-    const bool chosen = draw == LodDraw::lod || detail_.assets[0].visible != nullptr;
-    if (chosen) sets = cut_.select(detail_, sets, camera);
+    const bool chosen = draw == LodDraw::lod || levels_.assets[0].visible != nullptr;
+    if (chosen) sets = cut_.select(levels_, sets, camera);
     if (draw == LodDraw::lod) {
       drawn_ = cut_.cut(0).stats().drawn;
     } else if (chosen) {
@@ -181,8 +181,8 @@ class GpuRows {
   Buffer<std::uint32_t, CudaBackend> visible_there_;
   Buffer<float, CudaBackend> memory_;
   DeviceTime time_;
-  SceneDetail detail_;
-  DetailSets cut_;
+  SceneLevels levels_;
+  CutSets cut_;
   std::uint64_t drawn_ = 0;
 };
 

@@ -47,7 +47,7 @@ class RendererOn final : public RendererEngine {
                             &config_,
                             BasicRenderer<float, B>::images_of(out, c),
                             {scene_.meshes().instances, light_}},
-                           scene_.detail(),
+                           scene_.levels(),
                            scene_.bodies(0)});
     }
     if (Status s = images_.render(requests_, ImageMemory::host); !s) return s;

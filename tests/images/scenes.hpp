@@ -67,7 +67,7 @@ class SceneThere {
     if (scene.detailed == nullptr) return;
     detailed_ = std::make_unique<SceneOnBackend<B>>(backend, scene.detailed, scene.choice);
     detailed_->pose(0, 0.4).throw_if_error();
-    chosen_.select(*detailed_->detail(), detailed_->sets(0), scene.camera);
+    chosen_.select(*detailed_->levels(), detailed_->sets(0), scene.camera);
     config_ = chosen_.rules(config_);
     chunks_.place(std::span(&chosen_, 1));
     sets_.assign(chosen_.sets().begin(), chosen_.sets().end());
@@ -129,7 +129,7 @@ class SceneThere {
   std::vector<gsnav::Buffer<float, B>> floats_;
   std::vector<gsnav::Buffer<std::uint32_t, B>> words_;
   std::unique_ptr<gsnav::SceneOnBackend<B>> detailed_;
-  gsnav::DetailSets chosen_;
+  gsnav::CutSets chosen_;
   gsnav::ChosenChunks<B> chunks_;
   std::vector<gsnav::GaussianSet> sets_;
   std::vector<gsnav::MeshInstance> instances_;

@@ -15,7 +15,7 @@
 #include "gsnav/detail/demo/humanoid.hpp"
 #include "gsnav/detail/eval/oracle_photo.hpp"
 #include "gsnav/detail/rigging/body_levels.hpp"
-#include "gsnav/detail/sim/body_detail.hpp"
+#include "gsnav/detail/sim/body_levels.hpp"
 #include "gsnav/scene/basic_renderer.hpp"
 #include "support/scenes.hpp"
 

@@ -118,16 +118,16 @@ class HostView {
         reference_(backend_) {}
 
   void look(const Camera& camera) {
-    const bool whole = scene_.detail() == nullptr;
-    sets_ = whole ? scene_.assets() : details_.select(*scene_.detail(), scene_.assets(), camera);
-    rules_ = whole ? config_ : details_.rules(config_);
+    const bool whole = scene_.levels() == nullptr;
+    sets_ = whole ? scene_.assets() : cuts_.select(*scene_.levels(), scene_.assets(), camera);
+    rules_ = whole ? config_ : cuts_.rules(config_);
   }
   /// Ledger of the last camera, for a frame with these counts.
   FrameLedger ledger(const Camera& camera, const RenderStats& stats, const LoadReport& report) const {
     const SceneAsset& asset = scene_.scene().assets[0];
-    const LodCut* const cut = asset.lod != nullptr ? &details_.cut(0) : nullptr;
+    const LodCut* const cut = asset.lod != nullptr ? &cuts_.cut(0) : nullptr;
     FrameLedger l = frame_ledger(sets_, camera, rules_, stats, &report, asset.bands.get(), cut);
-    l.unseen = details_.unseen();
+    l.unseen = cuts_.unseen();
     if (asset.visible != nullptr) l.unseen_weight = asset.visible->min_weight;
     return l;
   }
@@ -143,7 +143,7 @@ class HostView {
   SerialBackend backend_;
   SceneOnBackend<SerialBackend> scene_;
   RenderConfig config_, rules_;
-  DetailSets details_;
+  CutSets cuts_;
   std::span<const GaussianSet> sets_;
   BasicRenderer<double, SerialBackend> reference_;
 };

@@ -98,7 +98,7 @@ class BasicSimulator {
     const SensorView view{
         agent.position,  agent.rotation(), agent.pitch, noise_seed(config_.seed, world_.state()),
         scene_.sets(0),  &config_.render,  0,           scene_.meshes(),
-        scene_.detail(), scene_.bodies(0)};
+        scene_.levels(), scene_.bodies(0)};
     rig_.resize(buffers_, 1);
     if (Status s = rig_.render(std::span(&view, 1), buffers_); !s) return s;
     for (std::size_t i = 0; i < images_.size(); ++i) images_[i].data = buffers_.image(rig_.plan(), i, 0);
@@ -156,7 +156,7 @@ class BasicSimulator {
     config.outputs = outputs;
     ++spectator_count_;
     const ImageRequest request{
-        {scene_.sets(0), &camera, &config, {}, scene_.meshes()}, scene_.detail(), scene_.bodies(0)};
+        {scene_.sets(0), &camera, &config, {}, scene_.meshes()}, scene_.levels(), scene_.bodies(0)};
     if (Status s = rig_.renderer().render(request, spectator_); !s) return s;
     return &spectator_;
   }
@@ -177,7 +177,7 @@ class BasicSimulator {
                           &config_.render,
                           0,
                           scene_.meshes(),
-                          scene_.detail(),
+                          scene_.levels(),
                           {}};
     rig_.resize(goal_buffers_, 1);
     if (Status e = rig_.render(std::span(&view, 1), goal_buffers_); !e) return e;

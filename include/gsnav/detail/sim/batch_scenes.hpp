@@ -137,7 +137,7 @@ class BatchScenes {
         view.sets = scene.sets(p.slot);
         view.config = &configs_[number];
         view.meshes = scene.meshes();
-        view.detail = scene.detail();
+        view.levels = scene.levels();
         view.bodies = scene.bodies(p.slot);
       }
     }

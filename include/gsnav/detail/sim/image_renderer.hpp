@@ -8,7 +8,7 @@
 
 #include "gsnav/detail/core/host_threads.hpp"
 #include "gsnav/detail/sim/frame_batch.hpp"
-#include "gsnav/detail/sim/scene_detail.hpp"
+#include "gsnav/detail/sim/scene_levels.hpp"
 #include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/sim/config.hpp"
 
@@ -16,9 +16,9 @@ namespace gsnav {
 
 /// One image to render: camera, sets, meshes, rules and output.
 struct ImageRequest : FrameJob<float> {
-  const SceneDetail* detail = nullptr;   ///< Levels of detail and visible sets of the assets, which are
+  const SceneLevels* levels = nullptr;   ///< Levels of detail and visible sets of the assets, which are
                                          ///< the first of `sets`. Null: draw everything.
-  std::span<const BodyDetail> bodies{};  ///< Levels of detail of the avatars, which are the last of
+  std::span<const BodyLevels> bodies{};  ///< Levels of detail of the avatars, which are the last of
                                          ///< `sets`.
 };
 
@@ -37,7 +37,7 @@ class ImageRenderer {
   /// @return an error of rendering.
   Status render(std::span<ImageRequest> requests, ImageMemory memory,
                 [[maybe_unused]] const std::function<void()>& idle = {}) {
-    choose_detail(requests);
+    choose_levels(requests);
     jobs_.clear();
     if constexpr (BatchBackend<B>) {
       single_.clear();
@@ -55,7 +55,7 @@ class ImageRenderer {
   /// Renders one request into `out`, which is resized. `request.config->outputs` selects the images;
   /// `request.images` is ignored.
   Status render(ImageRequest request, Frames<float>& out) {
-    choose_detail(std::span(&request, 1));
+    choose_levels(std::span(&request, 1));
     renderer_.set_config(*request.config);
     renderer_.set_meshes(request.meshes.instances, request.meshes.light);
     return renderer_.render(request.sets, std::span(request.camera, 1), out);
@@ -77,18 +77,18 @@ class ImageRenderer {
     using type = FrameBatch<T>;
   };
 
-  void choose_detail(std::span<ImageRequest> requests) {
-    detailed_.clear();
+  void choose_levels(std::span<ImageRequest> requests) {
+    leveled_.clear();
     for (ImageRequest& r : requests) {
-      if (r.detail != nullptr) detailed_.push_back(&r);
+      if (r.levels != nullptr) leveled_.push_back(&r);
     }
-    while (cuts_.size() < detailed_.size()) cuts_.emplace_back();
-    for_each_on_host(*backend_, detailed_.size(), [this](std::size_t i) {
-      ImageRequest& r = *detailed_[i];
-      r.sets = cuts_[i].select(*r.detail, r.sets, *r.camera, r.bodies);
+    while (cuts_.size() < leveled_.size()) cuts_.emplace_back();
+    for_each_on_host(*backend_, leveled_.size(), [this](std::size_t i) {
+      ImageRequest& r = *leveled_[i];
+      r.sets = cuts_[i].select(*r.levels, r.sets, *r.camera, r.bodies);
       r.config = &cuts_[i].rules(*r.config);
     });
-    chosen_.place(std::span(cuts_).first(detailed_.size()));
+    chosen_.place(std::span(cuts_).first(leveled_.size()));
   }
   Status render_by_one(std::span<const FrameJob<float>> jobs) {
     stats_.assign(jobs.size(), {});
@@ -106,8 +106,8 @@ class ImageRenderer {
   BasicRenderer<float, B> renderer_;
   [[no_unique_address]] typename BatchesOf<B>::type batches_;
   ChosenChunks<B> chosen_;
-  std::vector<DetailSets> cuts_;  // One per element of detailed_.
-  std::vector<ImageRequest*> detailed_;
+  std::vector<CutSets> cuts_;  // One per element of leveled_.
+  std::vector<ImageRequest*> leveled_;
   std::vector<FrameJob<float>> jobs_, single_;
   std::vector<RenderStats> stats_;
 };

@@ -12,8 +12,8 @@
 #include "gsnav/avatar/actor.hpp"
 #include "gsnav/detail/avatar/skinned_crowd.hpp"
 #include "gsnav/detail/scene/placed_meshes.hpp"
-#include "gsnav/detail/sim/body_detail.hpp"
-#include "gsnav/detail/sim/scene_detail.hpp"
+#include "gsnav/detail/sim/body_levels.hpp"
+#include "gsnav/detail/sim/scene_levels.hpp"
 #include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/sim/scene.hpp"
 
@@ -30,23 +30,23 @@ class SceneOnBackend {
   SceneOnBackend(B& backend, std::shared_ptr<const SimulatorScene> scene,
                  const DetailChoice& choice = {})
       : backend_(&backend), scene_(std::move(scene)) {
-    if (choice.lod) detail_.choice = *choice.lod;
+    if (choice.lod) levels_.choice = *choice.lod;
     if (!scene_->assets.empty()) lod_ = choice.lod;
     for (const SceneAsset& a : scene_->assets) {
       arrays_.push_back(arrays_of(a, choice.lod ? nullptr : a.bands.get()));
       sets_.push_back(arrays_.back().set(a.world_from_asset));
       if (!choice.lod && !choice.visible_sets) continue;
-      detail_.assets.push_back({choice.lod ? a.lod.get() : nullptr, a.cloud.get(), a.world_from_asset});
-      if (choice.visible_sets) detail_.assets.back().visible = a.visible.get();
+      levels_.assets.push_back({choice.lod ? a.lod.get() : nullptr, a.cloud.get(), a.world_from_asset});
+      if (choice.visible_sets) levels_.assets.back().visible = a.visible.get();
       if constexpr (!is_host_backend<B>) {
         if (choice.visible_sets) {
           visible_.emplace_back(backend).upload(a.visible->bits.data(), a.visible->bits.size());
-          detail_.assets.back().visible_there = visible_.back().data();
+          levels_.assets.back().visible_there = visible_.back().data();
         }
         if (!choice.lod) continue;
-        detail_.assets.back().cloud_there = sets_.back().gaussians;
+        levels_.assets.back().cloud_there = sets_.back().gaussians;
         if (a.lod->merged.size() == 0) continue;
-        detail_.assets.back().merged_there =
+        levels_.assets.back().merged_there =
             merged_.emplace_back(backend, a.lod->merged).set().gaussians;
       }
     }
@@ -66,19 +66,19 @@ class SceneOnBackend {
   /// `config` with the sort order of the scene's assets and, if used, the rules of levels of detail or
   /// visible sets.
   RenderConfig render_config(RenderConfig config) const noexcept {
-    if (detail() != nullptr) config = lod_config(config);
+    if (levels() != nullptr) config = lod_config(config);
     if (!scene_->assets.empty()) config.sort_order = scene_->assets.front().sort_order();
     return config;
   }
   /// Levels of detail of the avatars of a slot, if levels were asked for. Valid until the slot is posed
   /// again.
-  std::span<const BodyDetail> bodies(std::size_t slot) const noexcept { return slots_[slot]->bodies; }
+  std::span<const BodyLevels> bodies(std::size_t slot) const noexcept { return slots_[slot]->bodies; }
   /// Sets of the assets, without avatars.
   std::span<const GaussianSet> assets() const noexcept { return sets_; }
   /// Meshes of the scene. The id of an instance is the index of its SceneMesh.
   MeshFrame meshes() const noexcept { return {instances_, scene_->light}; }
   /// How the assets are selected per camera. Null: draw them whole.
-  const SceneDetail* detail() const noexcept { return detail_.assets.empty() ? nullptr : &detail_; }
+  const SceneLevels* levels() const noexcept { return levels_.assets.empty() ? nullptr : &levels_; }
   /// Number of times that an avatar was posed so far.
   std::size_t pose_count() const noexcept { return pose_count_; }
 
@@ -141,7 +141,7 @@ class SceneOnBackend {
     explicit Slot(B& backend) : people(backend) {}
     SkinnedCrowd<B> people;
     std::vector<GaussianSet> sets;
-    std::vector<BodyDetail> bodies;
+    std::vector<BodyLevels> bodies;
     double time = 0.0;
     bool whole = false;  // True if posed for any camera.
   };
@@ -181,7 +181,7 @@ class SceneOnBackend {
     s.bodies.resize(s.people.size());
     for (std::size_t i = 0; i < s.bodies.size(); ++i) {
       const AvatarAsset& asset = *scene_->avatars[i].asset();
-      BodyDetail& b = s.bodies[i];
+      BodyLevels& b = s.bodies[i];
       b.asset = s.people.is_seen(i) && !asset.levels.empty() ? &asset : nullptr;
       if (b.asset == nullptr) continue;
       b.bounds = s.people.bounds(i);
@@ -208,7 +208,7 @@ class SceneOnBackend {
   std::vector<GaussianArrays<B>> merged_;  // Merged Gaussians of the trees, if the backend has its own
                                            // memory.
   std::vector<Buffer<std::uint32_t, B>> visible_;  // Bits of the visible sets, likewise.
-  SceneDetail detail_;
+  SceneLevels levels_;
   std::vector<MeshArrays<B>> mesh_arrays_;
   std::vector<MeshInstance> instances_;
   std::vector<std::shared_ptr<const AvatarArrays<B>>> bodies_;  // One per avatar.

@@ -27,10 +27,10 @@ struct SensorView {
   const RenderConfig* config = nullptr;  ///< Render settings. The sensors choose `outputs`.
   std::size_t row = 0;                   ///< Row of the images.
   MeshFrame meshes{};                    ///< Meshes to draw. Semantic images contain their ids.
-  const SceneDetail* detail = nullptr;   ///< Levels of detail and visible sets of the assets, which are
+  const SceneLevels* levels = nullptr;   ///< Levels of detail and visible sets of the assets, which are
                                         ///< the first of `sets`. Null: draw everything. Semantic sensors
                                         ///< always draw everything.
-  std::span<const BodyDetail> bodies{};  ///< Levels of detail of the avatars.
+  std::span<const BodyLevels> bodies{};  ///< Levels of detail of the avatars.
 
   /// Number of sets and meshes that a semantic sensor distinguishes.
   std::size_t things() const noexcept {
@@ -140,7 +140,7 @@ class SensorRequests {
     images.median_depth = at[Plan::kDepth];
     images.alpha = at[static_cast<std::size_t>(SensorKind::alpha)];
     requests_.push_back(
-        {{view.sets, &camera, view.config, images, view.meshes}, view.detail, view.bodies});
+        {{view.sets, &camera, view.config, images, view.meshes}, view.levels, view.bodies});
   }
 
   /// Adds the images of pinhole group `g` for view number `v`; `camera`: its index in cameras_.

@@ -16,9 +16,9 @@
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
-#include "gsnav/detail/sim/body_detail.hpp"
+#include "gsnav/detail/scene/view_cells.hpp"
+#include "gsnav/detail/sim/body_levels.hpp"
 #include "gsnav/scene/lod_cut.hpp"
-#include "gsnav/scene/visible_sets.hpp"
 
 namespace gsnav {
 
@@ -84,10 +84,10 @@ class LodCells {
 
 /// Selects which part of a scene's assets is drawn: by level of detail (docs/concepts/scene.md), by
 /// visibility from the camera's cell, or both.
-struct SceneDetail {
+struct SceneLevels {
   /// Data of one asset.
   struct Asset {
-    const LodTree* tree;                         ///< Level-of-detail tree. Null: no levels of detail.
+    const LodTree* tree;                         ///< Level-of-detail tree. Null: no levels of levels.
     const GaussianCloud* cloud;                  ///< The Gaussians.
     Similarity world_from_asset;                 ///< Transform from the asset's frame to the world.
     GaussianRows cloud_there{}, merged_there{};  ///< Arrays of `cloud` and of the tree in the backend's
@@ -97,27 +97,27 @@ struct SceneDetail {
         nullptr;  ///< `visible->bits` in the backend's own memory. Null if it uses host memory.
   };
   std::vector<Asset> assets;  ///< In the order of the scene's sets. Empty: draw all assets whole.
-  LodChoice choice{};         ///< Settings of the levels of detail. Without hysteresis.
+  LodChoice choice{};         ///< Settings of the levels of levels. Without hysteresis.
   std::shared_ptr<LodCells> cells = std::make_shared<LodCells>();  ///< Cuts found so far.
 };
 
 /// The sets that one camera draws with levels of detail and visible sets. They depend only on the
 /// camera and the cell that it is in, not on earlier views. A simulator that was restored to a state, or
 /// is part of a batch, therefore renders the same bits.
-class DetailSets {
+class CutSets {
  public:
   /// Selects the sets for a camera. The result is valid until the next call.
   /// @param sets Sets of the scene: assets first, then avatars.
   /// @param bodies Levels of detail of the avatars. Empty, or without an asset: the avatar's set is not
   /// changed.
-  std::span<const GaussianSet> select(const SceneDetail& detail, std::span<const GaussianSet> sets,
-                                      const Camera& camera, std::span<const BodyDetail> bodies = {}) {
-    cuts_.assign(detail.assets.size(), nullptr);
+  std::span<const GaussianSet> select(const SceneLevels& levels, std::span<const GaussianSet> sets,
+                                      const Camera& camera, std::span<const BodyLevels> bodies = {}) {
+    cuts_.assign(levels.assets.size(), nullptr);
     sets_.clear();
     to_place_.clear();
     looked_from_.clear();
-    for (std::size_t a = 0; a < detail.assets.size(); ++a) {
-      const SceneDetail::Asset& asset = detail.assets[a];
+    for (std::size_t a = 0; a < levels.assets.size(); ++a) {
+      const SceneLevels::Asset& asset = levels.assets[a];
       const auto cell = asset.visible != nullptr ? asset.visible->cell_of(camera, asset.world_from_asset)
                                                  : std::nullopt;
       View<const std::uint32_t> seen;
@@ -131,7 +131,7 @@ class DetailSets {
         continue;
       }
       const LodCut& cut =
-          *(cuts_[a] = detail.cells->at(a, *asset.tree, *asset.cloud, camera, detail.choice,
+          *(cuts_[a] = levels.cells->at(a, *asset.tree, *asset.cloud, camera, levels.choice,
                                         asset.world_from_asset, seen, cell));
       for (const GaussianSet& set : cut.sets()) {
         sets_.push_back(set);
@@ -139,11 +139,11 @@ class DetailSets {
       }
     }
     const auto others =
-        sets.subspan(detail.assets.size() < sets.size() ? detail.assets.size() : sets.size());
+        sets.subspan(levels.assets.size() < sets.size() ? levels.assets.size() : sets.size());
     for (std::size_t i = 0; i < others.size(); ++i) {
-      const BodyDetail* const body = i < bodies.size() ? &bodies[i] : nullptr;
+      const BodyLevels* const body = i < bodies.size() ? &bodies[i] : nullptr;
       sets_.push_back(body == nullptr || body->asset == nullptr ? others[i]
-                                                                : body->set_for(camera, detail.choice));
+                                                                : body->set_for(camera, levels.choice));
     }
     return sets_;
   }
@@ -177,7 +177,7 @@ class DetailSets {
 
  private:
   /// Changes the last set from host arrays to the backend's arrays.
-  void move(const SceneDetail::Asset& asset, std::size_t index, GaussianSet& set,
+  void move(const SceneLevels::Asset& asset, std::size_t index, GaussianSet& set,
             std::optional<std::size_t> cell) {
     const View<const std::uint32_t> drawn = set.selection.drawn_chunks;
     to_place_.push_back({sets_.size() - 1, index, drawn});
@@ -211,7 +211,7 @@ class ChosenChunks {
 
   /// Uploads the lists of these cuts. Their sets can be drawn until the next call. Cameras that share a
   /// cut share its lists.
-  void place(std::span<DetailSets> cuts) {
+  void place(std::span<CutSets> cuts) {
     if constexpr (!is_host_backend<B>) {
       if (!list_new(cuts) || used_ + new_.size() > there_.size()) {
         // Forget all lists, so that memory is bounded, and list those of this call.
@@ -225,7 +225,7 @@ class ChosenChunks {
                        CopyKind::host_to_device);
       }
       used_ += new_.size();
-      for (DetailSets& cut : cuts) {
+      for (CutSets& cut : cuts) {
         cut.place_chunks([&](const auto&, View<const std::uint32_t> list) {
           return std::as_const(there_).data() + kept_.at(list.data).first;
         });
@@ -236,9 +236,9 @@ class ChosenChunks {
  private:
   /// Puts the lists that are not on the backend yet into new_. Returns false if more would be kept than
   /// LodCells keeps.
-  bool list_new(std::span<DetailSets> cuts) {
+  bool list_new(std::span<CutSets> cuts) {
     new_.clear();
-    for (DetailSets& cut : cuts) {
+    for (CutSets& cut : cuts) {
       cut.place_chunks([&](const std::shared_ptr<const LodCut>& held, View<const std::uint32_t> list) {
         const auto [at, is_new] = kept_.try_emplace(list.data, used_ + new_.size(), held);
         if (is_new) new_.insert(new_.end(), list.data, list.data + list.size);

@@ -11,7 +11,7 @@
 namespace gsnav {
 
 /// A body that is posed at several levels of detail.
-struct BodyDetail {
+struct BodyLevels {
   const AvatarAsset* asset = nullptr;  ///< Null: no camera sees the body, or it has no levels.
   ChunkBounds bounds{};                ///< A box that contains it, in its frame.
   Similarity world_from_body{};        ///< Its placement.
@@ -41,7 +41,7 @@ inline std::size_t level_of_body(const AvatarAsset& asset, const Similarity& wor
   return level;
 }
 
-inline GaussianSet BodyDetail::set_for(const Camera& camera, const LodChoice& choice) const {
+inline GaussianSet BodyLevels::set_for(const Camera& camera, const LodChoice& choice) const {
   const std::size_t wanted = level_of_body(*asset, world_from_body, bounds, camera, choice);
   for (std::size_t i = 0; i < sets.size(); ++i) {
     if (levels[i] == wanted) return sets[i];
