@@ -6,13 +6,13 @@
 #include <new>
 #include <string>
 
-#include "field_cells.hpp"
+#include "field_patches.hpp"
 #include "navmesh_impl.hpp"
 
 namespace gsnav {
 
-using detail::FieldCells;
 using detail::FieldGrid;
+using detail::FieldPatches;
 using detail::FieldSource;
 using detail::GeodesicSearch;
 using detail::Site;
@@ -21,20 +21,20 @@ struct GeodesicField::Impl {
   ~Impl() {
     if (faces == nullptr) return;
     for (std::uint32_t f = 0; f + 1 < first.size(); ++f)
-      delete faces[f].cells.load(std::memory_order_relaxed);
+      delete faces[f].patches.load(std::memory_order_relaxed);
   }
 
-  /// Creates the cells of a face at its first lookup. If several threads do so at once, they make the
-  /// same cells and one copy is kept. Returns null if memory is exhausted or the face has more sources
-  /// than cells can count.
-  const FieldCells* make_cells(std::uint32_t face) const noexcept {
+  /// Creates the patches of a face at its first lookup. If several threads do so at once, they make the
+  /// same patches and one copy is kept. Returns null if memory is exhausted or the face has more sources
+  /// than patches can count.
+  const FieldPatches* make_patches(std::uint32_t face) const noexcept {
     const std::span<const FieldSource> own = sources_of(face);
-    if (own.size() > FieldCells::kMostSources) return nullptr;
+    if (own.size() > FieldPatches::kMostSources) return nullptr;
     try {
       const Face& f = faces[face];
-      auto made = std::make_unique<const FieldCells>(*unfolded, face, f.grid, own, relative_error);
-      const FieldCells* kept = nullptr;
-      if (f.cells.compare_exchange_strong(kept, made.get(), std::memory_order_acq_rel))
+      auto made = std::make_unique<const FieldPatches>(*unfolded, face, f.grid, own, relative_error);
+      const FieldPatches* kept = nullptr;
+      if (f.patches.compare_exchange_strong(kept, made.get(), std::memory_order_acq_rel))
         return made.release();
       return kept;
     } catch (const std::bad_alloc&) {
@@ -52,7 +52,7 @@ struct GeodesicField::Impl {
   std::vector<FieldSource> sources;
   struct Face {
     FieldGrid grid;
-    mutable std::atomic<const FieldCells*> cells{nullptr};
+    mutable std::atomic<const FieldPatches*> patches{nullptr};
   };
   std::unique_ptr<Face[]> faces;
 };
@@ -117,9 +117,9 @@ double GeodesicField::distance(const NavPoint& p) const noexcept {
   if (p.poly >= impl_->mesh->polys.polys.size() || !is_finite(p.position)) return best;
   const Site at = impl_->mesh->site(p);
   const Impl::Face& face = impl_->faces[at.face];
-  const FieldCells* cells = face.cells.load(std::memory_order_acquire);
-  if (cells == nullptr) cells = impl_->make_cells(at.face);
-  if (cells != nullptr) return cells->least(face.grid.cell(at.at), at.at);
+  const FieldPatches* patches = face.patches.load(std::memory_order_acquire);
+  if (patches == nullptr) patches = impl_->make_patches(at.face);
+  if (patches != nullptr) return patches->least(face.grid.patch(at.at), at.at);
   for (const FieldSource& s : impl_->sources_of(at.face)) best = s.least(at.at, best);
   return best;
 }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -251,7 +250,7 @@ Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Cam
       return e;
     }
     if (s == last) break;
-    ws.projected.open = slices.open_cells(grid, ws.open.view());
+    ws.projected.open = slices.open_squares(grid, ws.open.view());
     const View<const std::uint32_t>& sums = ws.projected.open.sums;
     if (sums[sums.size - 1] == 0) break;
   }

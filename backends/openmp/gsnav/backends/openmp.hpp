@@ -148,7 +148,7 @@ class OpenMPBackend : public HostMemory {
     const auto kernel = lane_kernels().project_chunk;
     parallel_for(args.chunk_count(), [&args, &out, kernel](std::size_t c) { kernel(args, out, c); });
   }
-  /// Projects the listed chunks. Skips splats that reach no open cell (ProjectOutputs::open).
+  /// Projects the listed chunks. Skips splats that reach no open square (ProjectOutputs::open).
   void run(stage::Project, const ViewedSet<float>& args, const ProjectOutputs<float>& out,
            View<const std::uint32_t> chunks) {
     const auto kernel = lane_kernels().project_chunk;

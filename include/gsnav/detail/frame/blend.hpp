@@ -16,9 +16,9 @@ namespace gsnav {
 /// slice.
 template <class S>
 struct TileProgress {
-  View<std::uint64_t> open;  ///< [tiles], one bit per cell of the tile in row order (OpenCells), set if
-                             ///< the cell is open. 0 once the pixels are written. Empty: the frame has
-                             ///< one slice.
+  View<std::uint64_t> open;  ///< [tiles], one bit per square of the tile in row order (OpenSquares), set
+                             ///< if the square is open. 0 once the pixels are written. Empty: the frame
+                             ///< has one slice.
   View<S> states;            ///< [tiles][blend_state_values * pixels of a tile]
   bool first = true, last = true;
 };

@@ -81,7 +81,7 @@ struct ProjectOutputs {
   TileGrid grid;          ///< read if `spans` is not empty
   View<TileSpans> spans;  ///< Tiles of each slot's splat, for backends that find them during projection;
                           ///< else empty.
-  OpenCells open;         ///< Backends may skip splats that reach none of these cells.
+  OpenSquares open;       ///< Backends may skip splats that reach none of these squares.
 };
 
 /// True if some Gaussian of chunk c may be visible. Conservative: never false if one is visible.

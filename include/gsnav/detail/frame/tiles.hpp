@@ -65,15 +65,15 @@ struct TileGrid {
   bool operator==(const TileGrid&) const = default;
 };
 
-/// Cells of 4 x 4 pixels that still accept splats, as a summed-area table for queries of rectangles.
-struct OpenCells {
+/// Squares of 4 x 4 pixels that still accept splats, as a summed-area table for queries of rectangles.
+struct OpenSquares {
   static constexpr int kSize = 4;
   View<const std::uint32_t>
-      sums;  ///< [rows + 1][columns + 1], number of open cells above and left. Empty: all are open.
+      sums;  ///< [rows + 1][columns + 1], number of open squares above and left. Empty: all are open.
   std::size_t stride = 0;  ///< columns + 1
 
   GSNAV_HD bool empty() const noexcept { return sums.empty(); }
-  /// True if some cell in columns [x0, x1) and rows [y0, y1) is open.
+  /// True if some square in columns [x0, x1) and rows [y0, y1) is open.
   GSNAV_HD bool any(std::size_t x0, std::size_t y0, std::size_t x1, std::size_t y1) const noexcept {
     const std::uint32_t* const top = sums.data + y0 * stride;
     const std::uint32_t* const bottom = sums.data + y1 * stride;

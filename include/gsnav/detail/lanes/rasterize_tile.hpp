@@ -79,7 +79,7 @@ class TileBlender {
     } else {
       pixels_.keep();
     }
-    if (!progress.open.empty()) progress.open[tile_] = done ? 0 : pixels_.open_cells();
+    if (!progress.open.empty()) progress.open[tile_] = done ? 0 : pixels_.open_squares();
   }
 
  private:

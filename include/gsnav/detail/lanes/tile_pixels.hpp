@@ -77,15 +77,15 @@ class TilePixels {
     });
   }
 
-  /// One bit per cell (OpenCells), set if the cell has an open block.
-  std::uint64_t open_cells() const noexcept {
-    constexpr int kCell = OpenCells::kSize;
-    static_assert(kCell % kBlockWidth == 0 && kCell % kBlockHeight == 0);
-    std::uint64_t cells = 0;
+  /// One bit per square (OpenSquares), set if the square has an open block.
+  std::uint64_t open_squares() const noexcept {
+    constexpr int kSquare = OpenSquares::kSize;
+    static_assert(kSquare % kBlockWidth == 0 && kSquare % kBlockHeight == 0);
+    std::uint64_t squares = 0;
     for_each_block([&](int block, int x, int y) {
-      if (open[block]) cells |= std::uint64_t{1} << (y / kCell * (size / kCell) + x / kCell);
+      if (open[block]) squares |= std::uint64_t{1} << (y / kSquare * (size / kSquare) + x / kSquare);
     });
-    return cells;
+    return squares;
   }
 
   /// Stores the blending states for the next slice of depth.

@@ -26,10 +26,10 @@ struct ProjectedPack {
 
 namespace detail {
 
-/// The lanes of `lanes` whose bounds reach an open cell, as bits.
-GSNAV_HD std::uint32_t reaching_open(const OpenCells& open, const PixelBox<F>& box,
+/// The lanes of `lanes` whose bounds reach an open square, as bits.
+GSNAV_HD std::uint32_t reaching_open(const OpenSquares& open, const PixelBox<F>& box,
                                      std::uint32_t lanes) noexcept {
-  const F inverse(1.0f / OpenCells::kSize), one(1.0f);
+  const F inverse(1.0f / OpenSquares::kSize), one(1.0f);
   float bounds[4][kWidth];
   truncated(box.x0 * inverse).store(bounds[0]);
   truncated(box.y0 * inverse).store(bounds[1]);
@@ -38,8 +38,8 @@ GSNAV_HD std::uint32_t reaching_open(const OpenCells& open, const PixelBox<F>& b
   std::uint32_t found = 0;
   for (std::uint32_t left = lanes; left != 0; left &= left - 1) {
     const int l = std::countr_zero(left);
-    const auto cell = [&](int k) { return static_cast<std::size_t>(bounds[k][l]); };
-    if (open.any(cell(0), cell(1), cell(2), cell(3))) found |= 1u << l;
+    const auto corner = [&](int k) { return static_cast<std::size_t>(bounds[k][l]); };
+    if (open.any(corner(0), corner(1), corner(2), corner(3))) found |= 1u << l;
   }
   return found;
 }

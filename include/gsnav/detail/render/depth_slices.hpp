@@ -81,9 +81,9 @@ class DepthSlices {
     const auto end = [this](int i) { return key_of_bucket(ends_[static_cast<std::size_t>(i)]); };
     return {s == 0 ? 0 : end(s - 1), s + 1 == count_ ? 0xffffffffu : end(s) - 1};
   }
-  /// Chunks of one set that slice s projects: those that may reach a cell in `open`, or all if `open` is
-  /// empty. Valid until the next call.
-  View<const std::uint32_t> chunks(int s, const ViewedSet<float>& args, const OpenCells& open) {
+  /// Chunks of one set that slice s projects: those that may reach a square in `open`, or all if `open`
+  /// is empty. Valid until the next call.
+  View<const std::uint32_t> chunks(int s, const ViewedSet<float>& args, const OpenSquares& open) {
     const std::size_t begin = s == 0 ? 0 : ends_[static_cast<std::size_t>(s - 1)];
     const std::size_t end = ends_[static_cast<std::size_t>(s)];
     list_.clear();
@@ -96,10 +96,10 @@ class DepthSlices {
     return {list_.data(), list_.size()};
   }
 
-  /// Open cells for the projection of the next slice, from TileProgress::open of the last one. Valid
+  /// Open squares for the projection of the next slice, from TileProgress::open of the last one. Valid
   /// until the next call.
-  OpenCells open_cells(const TileGrid& grid, View<const std::uint64_t> open) {
-    const std::size_t side = static_cast<std::size_t>(grid.tile_size / OpenCells::kSize);
+  OpenSquares open_squares(const TileGrid& grid, View<const std::uint64_t> open) {
+    const std::size_t side = static_cast<std::size_t>(grid.tile_size / OpenSquares::kSize);
     const std::size_t tiles = static_cast<std::size_t>(grid.columns);
     const std::size_t stride = tiles * side + 1, rows = static_cast<std::size_t>(grid.rows) * side;
     sums_.resize(stride * (rows + 1));
@@ -111,9 +111,9 @@ class DepthSlices {
       std::uint32_t row = 0;
       *out++ = 0;
       for (std::size_t t = 0; t < tiles; ++t) {
-        const std::uint64_t cells = masks[t] >> (y % side * side);
+        const std::uint64_t squares = masks[t] >> (y % side * side);
         for (std::size_t x = 0; x < side; ++x)
-          *out++ = *++above + (row += static_cast<std::uint32_t>(cells >> x & 1));
+          *out++ = *++above + (row += static_cast<std::uint32_t>(squares >> x & 1));
       }
     }
     return {{sums_.data(), sums_.size()}, stride};
@@ -137,7 +137,7 @@ class DepthSlices {
   /// Fraction of the Gaussians in the first slice.
   static constexpr double kFirst = 0.35;
 
-  /// Bucket of a chunk's nearest key, and the half-open range of cells that it may reach.
+  /// Bucket of a chunk's nearest key, and the half-open range of squares that it may reach.
   struct Place {
     std::uint16_t bucket = 0;
     std::uint16_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
@@ -148,10 +148,10 @@ class DepthSlices {
     return base_ + (static_cast<std::uint32_t>(bucket) << kBucketShift);
   }
   Place place_of(const ViewedSet<float>& args, std::size_t c) const noexcept {
-    constexpr int kSize = OpenCells::kSize;
+    constexpr int kSize = OpenSquares::kSize;
     const int width = args.camera.width, height = args.camera.height;
-    const auto cells = [](int size) { return static_cast<std::uint16_t>((size + kSize - 1) / kSize); };
-    const std::uint16_t columns = cells(width), rows = cells(height);
+    const auto squares = [](int size) { return static_cast<std::uint16_t>((size + kSize - 1) / kSize); };
+    const std::uint16_t columns = squares(width), rows = squares(height);
     const View<const ChunkBounds> bounds = args.gaussians.chunk_bounds;
     const std::size_t id = args.selection.chunk_id(c);
     if (!args.selection.may_be_seen(id)) return {};
@@ -164,9 +164,9 @@ class DepthSlices {
       return static_cast<std::uint16_t>((pixel > 0 ? std::min(pixel, static_cast<double>(size)) : 0.0) /
                                         kSize);
     };
-    const auto end = [&cells](double pixel, int size) {
+    const auto end = [&squares](double pixel, int size) {
       return pixel < size ? static_cast<std::uint16_t>((pixel > 0 ? pixel : 0.0) / kSize + 1)
-                          : cells(size);
+                          : squares(size);
     };
     Place place{0, begin(e.x0, width), begin(e.y0, height), end(e.x1, width), end(e.y1, height)};
     if (place.x0 >= place.x1 || place.y0 >= place.y1) return {0, 0, 0, columns, rows};

@@ -44,11 +44,11 @@ struct FieldSource {
   }
 };
 
-/// Grid that divides a face into cells.
+/// Grid that divides a face into patches.
 struct FieldGrid {
-  /// Sizes of cells: about kCellsASource cells per source, each at least kLeastSide metres wide, and at
-  /// most kMostAcross along a side.
-  static constexpr double kCellsASource = 2.0, kLeastSide = 0.2, kMostAcross = 64;
+  /// Sizes of patches: about kPatchesASource patches per source, each at least kLeastSide metres wide,
+  /// and at most kMostAcross along a side.
+  static constexpr double kPatchesASource = 2.0, kLeastSide = 0.2, kMostAcross = 64;
 
   Flat low;
   double columns_a_metre = 0, rows_a_metre = 0;
@@ -57,33 +57,33 @@ struct FieldGrid {
   FieldGrid() = default;
   FieldGrid(const UnfoldedMesh& mesh, std::uint32_t face, std::size_t sources);
 
-  std::size_t cell(const Flat& p) const noexcept {
+  std::size_t patch(const Flat& p) const noexcept {
     const double x = std::clamp((p.x - low.x) * columns_a_metre, 0.0, static_cast<double>(columns - 1));
     const double y = std::clamp((p.y - low.y) * rows_a_metre, 0.0, static_cast<double>(rows - 1));
     return std::size_t{static_cast<std::uint32_t>(y)} * columns + static_cast<std::uint32_t>(x);
   }
 };
 
-/// Cells of a face, each with the sources that can be nearest in it, in one block of memory.
+/// Patches of a face, each with the sources that can be nearest in it, in one block of memory.
 ///
-/// Consider the part of a cell that lies in the face. The length of a source's path is convex in its end
-/// point, so it is nowhere below its tangent at a point of that part. A source is dropped if this
+/// Consider the part of a patch that lies in the face. The length of a source's path is convex in its
+/// end point, so it is nowhere below its tangent at a point of that part. A source is dropped if this
 /// tangent is at least the length of another source at all corners of the part: their difference is
 /// convex, so the same holds in the whole part. With a relative error eps the tangent is multiplied by 1
 /// + eps, and the result is at most that much above the minimum. A source is stored as a point if it
 /// sees the whole part, or if all paths to the part bend at the same end of its window.
-class FieldCells {
+class FieldPatches {
  public:
-  /// Largest average number of cells per source. Beyond it, all cells share all sources.
+  /// Largest average number of patches per source. Beyond it, all patches share all sources.
   static constexpr std::size_t kMostCopies = 16;
   static constexpr std::size_t kMostSources = 0xffff;  ///< Largest number of sources of a face.
 
-  FieldCells(const UnfoldedMesh& mesh, std::uint32_t face, const FieldGrid& grid,
-             std::span<const FieldSource> sources, double relative_error);
+  FieldPatches(const UnfoldedMesh& mesh, std::uint32_t face, const FieldGrid& grid,
+               std::span<const FieldSource> sources, double relative_error);
 
-  /// Smallest length to a point of a cell. Infinity if there are no sources.
-  double least(std::size_t cell, const Flat& p) const noexcept {
-    const std::uint64_t head = block_[cell];
+  /// Smallest length to a point of a patch. Infinity if there are no sources.
+  double least(std::size_t patch, const Flat& p) const noexcept {
+    const std::uint64_t head = block_[patch];
     const std::uint64_t* at = block_.get() + (head >> 32);
     double best = std::numeric_limits<double>::infinity();
     for (std::uint64_t n = head >> 16 & 0xffffu; n != 0; --n, at += 3) {
@@ -102,7 +102,7 @@ class FieldCells {
  private:
   static double number(std::uint64_t bits) noexcept { return std::bit_cast<double>(bits); }
 
-  /// First a head per cell: index of its numbers (32 bits), number of points and number of windows (16
+  /// First a head per patch: index of its numbers (32 bits), number of points and number of windows (16
   /// bits each). Then the numbers of points (at, g) and windows (root, right, left, g).
   std::unique_ptr<std::uint64_t[]> block_;
 };

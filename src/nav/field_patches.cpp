@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "field_cells.hpp"
+#include "field_patches.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <initializer_list>
 #include <utility>
 #include <vector>
@@ -11,7 +10,7 @@
 namespace gsnav::detail {
 namespace {
 
-constexpr double kMargin = 1e-9;     // Margin by which a cell and a face extend beyond their sides,
+constexpr double kMargin = 1e-9;     // Margin by which a patch and a face extend beyond their sides,
                                      // metres.
 constexpr double kRounding = 1e-12;  // Rounding error of a length, metres.
 constexpr double kAtBend = 1e-9;     // Metres: closer points define no direction.
@@ -28,7 +27,7 @@ void cut(std::vector<Flat>& polygon, std::vector<Flat>& scratch, const Flat& p, 
   polygon.swap(scratch);
 }
 
-/// Builds FieldCells::block_ of a face.
+/// Builds FieldPatches::block_ of a face.
 class CellsBuilder {
  public:
   CellsBuilder(const UnfoldedMesh& mesh, std::uint32_t face, const FieldGrid& grid,
@@ -43,9 +42,9 @@ class CellsBuilder {
         heads_(std::size_t{grid.columns} * grid.rows, 0) {}
 
   void build() {
-    const std::size_t most = FieldCells::kMostCopies * sources_.size();
+    const std::size_t most = FieldPatches::kMostCopies * sources_.size();
     const bool one = !(width_ > 0 && depth_ > 0);
-    for (std::size_t cell = 0; cell < heads_.size() && !one && copies_ <= most; ++cell) add(cell);
+    for (std::size_t patch = 0; patch < heads_.size() && !one && copies_ <= most; ++patch) add(patch);
     if (one || copies_ > most) share_all();
   }
 
@@ -62,10 +61,10 @@ class CellsBuilder {
     std::uint32_t source = 0;
   };
 
-  void add(std::size_t cell) {
+  void add(std::size_t patch) {
     const std::size_t begin = numbers_.size();
-    heads_[cell] = head(begin, 0, 0);
-    cut_part(cell);
+    heads_[patch] = head(begin, 0, 0);
+    cut_part(patch);
     if (part_.empty()) return;
     find_middle();
     find_candidates();
@@ -78,14 +77,14 @@ class CellsBuilder {
       ++copies_;
       put_source(s);
     }
-    heads_[cell] = head(begin, (numbers_.size() - begin) / 3, windows_.size() / 7);
+    heads_[patch] = head(begin, (numbers_.size() - begin) / 3, windows_.size() / 7);
     numbers_.insert(numbers_.end(), windows_.begin(), windows_.end());
   }
 
-  /// The part of a cell that lies in the face.
-  void cut_part(std::size_t cell) {
-    const Flat a = grid_.low + Flat{static_cast<double>(cell % grid_.columns) * width_ - kMargin,
-                                    static_cast<double>(cell / grid_.columns) * depth_ - kMargin};
+  /// The part of a patch that lies in the face.
+  void cut_part(std::size_t patch) {
+    const Flat a = grid_.low + Flat{static_cast<double>(patch % grid_.columns) * width_ - kMargin,
+                                    static_cast<double>(patch / grid_.columns) * depth_ - kMargin};
     const Flat b = a + Flat{width_ + 2 * kMargin, depth_ + 2 * kMargin};
     part_ = {a, {b.x, a.y}, b, {a.x, b.y}};
     for (std::uint32_t k = 0; k < face_.count && !part_.empty(); ++k) {
@@ -153,7 +152,7 @@ class CellsBuilder {
     }
   }
 
-  /// Gives every cell all sources.
+  /// Gives every patch all sources.
   void share_all() {
     numbers_.clear();
     for (const FieldSource& s : sources_) put_window(numbers_, s);
@@ -176,10 +175,10 @@ class CellsBuilder {
   const FieldGrid& grid_;
   std::span<const FieldSource> sources_;
   double relative_error_;
-  double width_, depth_;  ///< Size of a cell, metres.
+  double width_, depth_;  ///< Size of a patch, metres.
   std::vector<std::uint64_t> heads_, numbers_;
   std::size_t copies_ = 0;
-  // State of the current cell:
+  // State of the current patch:
   std::vector<Flat> part_, scratch_;
   Flat middle_;  ///< Mean of the part's corners.
   double radius_ = 0;
@@ -204,15 +203,15 @@ FieldGrid::FieldGrid(const UnfoldedMesh& mesh, std::uint32_t face, std::size_t s
   const Flat size = high - low;
   if (sources < 2 || !(size.x > 0 && size.y > 0)) return;
   const double side =
-      max(std::sqrt(size.x * size.y / (kCellsASource * static_cast<double>(sources))), kLeastSide);
+      max(std::sqrt(size.x * size.y / (kPatchesASource * static_cast<double>(sources))), kLeastSide);
   columns = static_cast<std::uint32_t>(clamp(std::ceil(size.x / side), 1.0, kMostAcross));
   rows = static_cast<std::uint32_t>(clamp(std::ceil(size.y / side), 1.0, kMostAcross));
   columns_a_metre = columns / size.x;
   rows_a_metre = rows / size.y;
 }
 
-FieldCells::FieldCells(const UnfoldedMesh& mesh, std::uint32_t face, const FieldGrid& grid,
-                       std::span<const FieldSource> sources, double relative_error) {
+FieldPatches::FieldPatches(const UnfoldedMesh& mesh, std::uint32_t face, const FieldGrid& grid,
+                           std::span<const FieldSource> sources, double relative_error) {
   CellsBuilder builder(mesh, face, grid, sources, relative_error);
   builder.build();
   block_ = builder.block();
