@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // What of the flat's colours depends on where they are seen from.
-#include <algorithm>
 #include <array>
 #include <cmath>
 

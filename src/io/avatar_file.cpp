@@ -11,7 +11,6 @@
 #include "gsnav/detail/avatar/weight_gradients.hpp"
 #include "gsnav/detail/io/npz_file.hpp"
 #include "gsnav/detail/skin/fk.hpp"
-#include "gsnav/frame/sh.hpp"
 #include "npz_arrays.hpp"
 
 namespace gsnav::io {

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "cloud_fill.hpp"
-#include "described.hpp"
 #include "file.hpp"
 #include "gsnav/core/text.hpp"
 #include "gsnav/detail/io/gltf.hpp"

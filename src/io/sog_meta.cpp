@@ -2,7 +2,6 @@
 #include "sog_meta.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "file.hpp"
 #include "json.hpp"

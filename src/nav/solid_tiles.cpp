@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
-#include <string>
 
 #include "gsnav/detail/core/run_guarded.hpp"
 #include "solid_gaussians.hpp"

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <optional>
 #include <string>
-#include <vector>
 
 #include "gsnav/detail/open/open_scene.hpp"
 #include "gsnav/nav/navmesh.hpp"

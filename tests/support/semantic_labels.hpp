@@ -35,7 +35,8 @@ SemanticLabels semantic_labels(B& backend, std::span<const gsnav::GaussianSet> s
   for (std::size_t pass = 0; pass < SemanticPasses<B>::count(things); ++pass) {
     const std::vector<MeshInstance> recolored = passes.recolored(meshes, sets.size(), pass);
     renderer.set_meshes(recolored);
-    const auto drawn = renderer.render(passes.recolored(sets, pass), std::vector<Camera>{camera}).value();
+    const auto drawn =
+        renderer.render(passes.recolored(sets, pass), std::vector<Camera>{camera}).value();
     shares.emplace_back(drawn.rgb.begin(), drawn.rgb.end());
   }
   SemanticLabels out;

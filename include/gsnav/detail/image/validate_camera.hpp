@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <string>
-
 #include "gsnav/core/status.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/math/functions.hpp"

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cmath>
-#include <string>
 #include <type_traits>
 
 #include "gsnav/core/status.hpp"
