@@ -57,9 +57,7 @@ ChunkBounds BodyBounds::around(const Vec3d& center, double radius) const noexcep
   double reach = 0;
   for (const double r : reach_) reach = max(reach, r);
   const Vec3d half = Vec3d{1, 1, 1} * (radius + reach * (1 + 1e-5) + 1e-5);
-  ChunkBounds out;
-  out.low = center - half;
-  out.high = center + half;
+  ChunkBounds out{.low = center - half, .high = center + half};
   return grown(out);
 }
 

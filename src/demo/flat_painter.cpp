@@ -52,9 +52,7 @@ Painter::Painter() {
 }
 
 Room& Painter::add_room(const Box& inside, const Vec3d& bounce) {
-  Room r;
-  r.inside = inside;
-  r.bounce = bounce;
+  Room r{.inside = inside, .bounce = bounce};
   rooms_.push_back(std::move(r));
   place();
   return rooms_.back();

@@ -98,9 +98,7 @@ void WalkMotion::pose_of(const MotionInput& input, const std::vector<char>& need
 }
 
 void WalkMotion::pose(double cycles, double walking, double time, LocalPose& out) const {
-  Steps steps;
-  steps.cycles = cycles;
-  steps.stride = walking * stride_;
+  Steps steps{.cycles = cycles, .stride = walking * stride_};
   pose(steps, walking, time, {}, out);
 }
 
@@ -194,9 +192,7 @@ void WalkMotion::prepare() {
       const double phase = k / 64.0;
       const Body b = body(phase, 1.0, drop);
       for (int side = 0; side < 2; ++side) {
-        Steps steps;
-        steps.cycles = phase;
-        steps.stride = stride_;
+        Steps steps{.cycles = phase, .stride = stride_};
         stretch = max(stretch, solve(side, b, foot(side, steps, 1.0)).stretch);
       }
     }

@@ -8,11 +8,10 @@ using K = FurnitureKind;
 using Groups = std::vector<Group>;
 
 Group single(K kind, double width = 0, double corner = 0) {
-  Group g;
-  g.pieces = {{kind, 0, 0, false, width, 0}};
-  g.tall = kind == K::wardrobe || kind == K::bookshelf || kind == K::bed;
-  g.corner = corner;
-  g.picture = kind == K::sofa || kind == K::sideboard || kind == K::bed ? 0.7 : 0.0;
+  Group g{.pieces = {{kind, 0, 0, false, width, 0}},
+          .tall = kind == K::wardrobe || kind == K::bookshelf || kind == K::bed,
+          .corner = corner,
+          .picture = kind == K::sofa || kind == K::sideboard || kind == K::bed ? 0.7 : 0.0};
   return g;
 }
 
@@ -58,9 +57,7 @@ Group dining(double width, double depth, int chairs) {
 }
 
 Group carpet(double width, double depth) {
-  Group g;
-  g.at_wall = false;
-  g.pieces = {{K::rug, 0, 0, false, width, depth}};
+  Group g{.pieces = {{K::rug, 0, 0, false, width, depth}}, .at_wall = false};
   return g;
 }
 

@@ -25,8 +25,7 @@ class ClipPath final : public Trajectory {
 
   TrajectorySample at(double t) const override {
     LocalPose pose;
-    MotionInput in;
-    in.time = t;
+    MotionInput in{.time = t};
     clip_->pose(in, pose);
     TrajectorySample out;
     out.position = {pose.translations[0].x + pose.root.x, floor_at(t) + offset_y_,
@@ -96,8 +95,7 @@ std::vector<double> floor_of(const Skeleton& skeleton, const MotionClip& clip) {
   LocalPose pose;
   std::vector<Affine3<double>> globals;
   for (std::size_t t = 0; t < n; ++t) {
-    MotionInput in;
-    in.time = static_cast<double>(t) / clip.frame_rate;
+    MotionInput in{.time = static_cast<double>(t) / clip.frame_rate};
     clip.pose(in, pose);
     forward_kinematics(skeleton, pose, globals);
     lowest[t] = globals[0].translation.y;
@@ -174,10 +172,9 @@ Result<AvatarActor> load_actor(const SceneAvatar& a,
     }
     body = of_driver;
   }
-  ActorOptions options;
-  options.scale = a.scale;
-  options.time_begin = a.time_begin;
-  options.time_end = a.time_end.value_or(a.time_begin + driver->clip.duration());
+  ActorOptions options{.time_begin = a.time_begin,
+                       .time_end = a.time_end.value_or(a.time_begin + driver->clip.duration()),
+                       .scale = a.scale};
   std::vector<double> floor = floor_of(body->skeleton, driver->clip);
   const auto clip = std::make_shared<const MotionClip>(std::move(driver->clip));
   const auto path = std::make_shared<const ClipPath>(clip, std::move(floor), a.offset_y);

@@ -65,11 +65,10 @@ Result<Camera> camera_of(const Json& object, const std::string& where) {
   if (!position) return position.status();
   const auto rotation = rotation_of(object, where);
   if (!rotation) return rotation.status();
-  Camera c;
-  c.width = static_cast<int>(*width);
-  c.height = static_cast<int>(*height);
-  c.fx = focal[0];
-  c.fy = focal[1];
+  Camera c{.fx = focal[0],
+           .fy = focal[1],
+           .width = static_cast<int>(*width),
+           .height = static_cast<int>(*height)};
   c.viewmat =
       rigid_inverse(Affine3<double>{*rotation, {(*position)[0], (*position)[1], (*position)[2]}});
   return c;

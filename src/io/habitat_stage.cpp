@@ -99,9 +99,7 @@ Status read_stage(const Json& object, const fs::path& folder, const std::string&
 Similarity StageConfig::world_from_asset() const noexcept {
   // Map the asset's right, up and back to the world's x, y and z.
   const Vec3d y = normalized(up), z = -normalized(front), x = cross(y, z);
-  Similarity out;
-  out.rotation = quat_from_matrix(Mat3d{{x, y, z}});
-  out.scale = units_to_meters * scale;
+  Similarity out{.rotation = quat_from_matrix(Mat3d{{x, y, z}}), .scale = units_to_meters * scale};
   out.translation = -(rotate(out.rotation, origin) * out.scale);
   return out;
 }

@@ -109,18 +109,17 @@ Status check(const fs::path& path, const VisibleSets& v, std::size_t cloud_rows)
 
 Status save_visible_sets(const fs::path& path, const VisibleSets& sets, const GaussianCloud& cloud) {
   return detail::guarded(path.string(), [&]() -> Status {
-    VisibleHeader header{};
-    header.front = front_of(cloud);
-    header.cell = sets.cell;
-    header.focal = sets.focal;
-    header.near_plane = sets.near_plane;
-    header.near_sigma = sets.near_sigma;
-    header.min_weight = sets.min_weight;
-    header.viewpoints = sets.viewpoints;
-    header.cells = sets.cells();
-    header.chunks = sets.cloud_chunks;
-    header.words = sets.bits.size();
-    header.checksum = checksum(sets);
+    VisibleHeader header{.front = front_of(cloud),
+                         .cell = sets.cell,
+                         .focal = sets.focal,
+                         .near_plane = sets.near_plane,
+                         .near_sigma = sets.near_sigma,
+                         .min_weight = sets.min_weight,
+                         .viewpoints = sets.viewpoints,
+                         .cells = sets.cells(),
+                         .chunks = sets.cloud_chunks,
+                         .words = sets.bits.size(),
+                         .checksum = checksum(sets)};
     return replace_file(path, [&](OutputFile& file) {
       file.write(&header, sizeof header);
       file.write(sets.keys.data(), sets.keys.size() * sizeof(VisibleSets::Key));

@@ -168,13 +168,12 @@ Status ZipReader::read_directory(std::size_t end_record) {
       return {Errc::invalid_file,
               entry + ": the name " + in_quotes(name) + " leaves the archive's folder"};
     }
-    Entry e;
-    e.flags = load_le<std::uint16_t>(p + 8);
-    e.method = load_le<std::uint16_t>(p + 10);
-    e.crc = load_le<std::uint32_t>(p + 16);
-    e.packed = load_le<std::uint32_t>(p + 20);
-    e.size = load_le<std::uint32_t>(p + 24);
-    e.local_offset = load_le<std::uint32_t>(p + 42);
+    Entry e{.method = load_le<std::uint16_t>(p + 10),
+            .flags = load_le<std::uint16_t>(p + 8),
+            .crc = load_le<std::uint32_t>(p + 16),
+            .packed = load_le<std::uint32_t>(p + 20),
+            .size = load_le<std::uint32_t>(p + 24),
+            .local_offset = load_le<std::uint32_t>(p + 42)};
     if (!take_zip64({p + kCentralSize + name_size, extra_size}, e.size, e.packed, e.local_offset)) {
       return {Errc::invalid_file, entry + " (" + in_quotes(name) + ") lacks a zip64 size or offset"};
     }

@@ -199,12 +199,11 @@ bool Landmarks::add(const UnfoldedMesh& mesh, const Site& at, GeodesicSearch& se
   for (std::uint32_t e = 0; e < mesh.edges.size(); ++e) {
     if ((line_of_[e] & 1u) != 0) continue;
     const std::uint32_t line = line_of_[e] / 2;
-    AlongEdge own;
-    own.first = reaches.data() + first[line];
-    own.last = reaches.data() + first[line + 1];
-    own.length = length(mesh.edges[mesh.next(e)].at - mesh.edges[e].at);
-    own.from_low = known(mesh.edges[e].vertex);
-    own.from_high = known(mesh.edges[mesh.next(e)].vertex);
+    AlongEdge own{.first = reaches.data() + first[line],
+                  .last = reaches.data() + first[line + 1],
+                  .length = length(mesh.edges[mesh.next(e)].at - mesh.edges[e].at),
+                  .from_low = known(mesh.edges[e].vertex),
+                  .from_high = known(mesh.edges[mesh.next(e)].vertex)};
     Line out{};
     if (own.from_low < kInfinity && own.from_high < kInfinity) {
       double below = 0, above = 0;

@@ -25,11 +25,11 @@ Result<Gaussians> read_file(OpeningScene& s) {
   const OpenOptions& o = s.options;
   const std::string& file = s.source.gaussians;
   Gaussians made;
-  io::LoadSceneOptions load;
-  load.time = o.time;
-  load.level = o.level;
-  load.keep_zero_bands = o.keep_zero_bands;
-  load.storage = o.storage == CloudStorage::compact ? io::Storage::compact : io::Storage::full;
+  io::LoadSceneOptions load{
+      .level = o.level,
+      .time = o.time,
+      .storage = o.storage == CloudStorage::compact ? io::Storage::compact : io::Storage::full,
+      .keep_zero_bands = o.keep_zero_bands};
   if (o.levels == SceneLevels::shipped) {
     auto set = io::load_shipped_levels(file, load);
     if (!set) return set.status();

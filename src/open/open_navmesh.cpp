@@ -70,10 +70,8 @@ Result<std::optional<NavMeshChoice>> choose(const OpeningScene& s) {
 /// Settings of the NavMesh for the agent.
 NavMeshSettings settings_of(const OpenOptions& o) {
   if (o.navmesh_settings) return *o.navmesh_settings;
-  NavMeshSettings settings;
-  settings.agent_radius = o.agent_radius;
-  settings.agent_height = o.agent_height;
-  settings.cell_size = o.cell_size;
+  NavMeshSettings settings{
+      .cell_size = o.cell_size, .agent_height = o.agent_height, .agent_radius = o.agent_radius};
   return settings;
 }
 

@@ -169,9 +169,7 @@ std::vector<ProxyCapsule> habitat_capsules(const Skeleton& skeleton) {
 
 CapsuleReport measure_capsules(const AvatarAsset& asset, const std::vector<ProxyCapsule>& capsules,
                                const std::vector<std::vector<Affine3<double>>>& poses, bool volumes) {
-  CapsuleReport report;
-  report.capsules = capsules.size();
-  report.poses = poses.size();
+  CapsuleReport report{.capsules = capsules.size(), .poses = poses.size()};
   double sum = 0.0;
   std::vector<double> over;
   for (const auto& pose : poses) {

@@ -11,10 +11,7 @@
 namespace gsnav {
 
 std::vector<SensorSpec> rgbd_sensors(int height, int width, double hfov, const Vec3d& position) {
-  SensorSpec rgb;
-  rgb.resolution = {height, width};
-  rgb.hfov = hfov;
-  rgb.position = position;
+  SensorSpec rgb{.resolution = {height, width}, .hfov = hfov, .position = position};
   SensorSpec depth = rgb;
   depth.uuid = "depth";
   depth.kind = SensorKind::depth;

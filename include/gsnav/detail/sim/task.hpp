@@ -52,12 +52,11 @@ struct TaskConfig {
 
   /// Settings of Habitat's PointNav v2 challenge (2020 and 2021), without its actuation noise.
   static TaskConfig pointnav_v2() noexcept {
-    TaskConfig c;
-    c.agent_radius = 0.18;
-    c.agent_height = 0.88;
-    c.turn_angle = 30.0;
-    c.allow_sliding = false;
-    c.success_distance = 0.36;
+    TaskConfig c{.agent_radius = 0.18,
+                 .agent_height = 0.88,
+                 .turn_angle = 30.0,
+                 .allow_sliding = false,
+                 .success_distance = 0.36};
     return c;
   }
 
