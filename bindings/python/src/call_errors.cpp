@@ -2,6 +2,9 @@
 // Errors of calls whose arguments fit no function. nanobind lists the types; gsnav names the arguments
 // and their values too. Each function of nanobind holds the address of the code that calls it, and here
 // this code is replaced by one that looks at the error afterwards. A call without an error costs a jump.
+#include <Python.h>
+#include <structmember.h>
+
 #include <array>
 #include <cstddef>
 #include <string_view>
@@ -14,11 +17,18 @@ namespace {
 
 using Call = PyObject* (*)(PyObject*, PyObject* const*, std::size_t, PyObject*);
 
-/// The first members of a function object of nanobind, in each of its versions.
-struct Function {
-  PyVarObject head;
-  Call call;
-};
+/// Where a function object holds the address of its code, as its type says. Null for other objects.
+Call* call_of(nb::handle object) {
+  const std::string_view type = nb::type_name(object.type()).c_str();
+  if (!type.ends_with("nb_func") && !type.ends_with("nb_method")) return nullptr;
+  auto* const class_ = reinterpret_cast<PyTypeObject*>(object.type().ptr());
+  const auto* member = static_cast<const PyMemberDef*>(PyType_GetSlot(class_, Py_tp_members));
+  for (; member != nullptr && member->name != nullptr; ++member) {
+    if (std::string_view(member->name) != "__vectorcalloffset__") continue;
+    return reinterpret_cast<Call*>(reinterpret_cast<char*>(object.ptr()) + member->offset);
+  }
+  return nullptr;
+}
 
 /// Replaces the error of nanobind for a call by one with names and values
 /// (gsnav._call_errors.explained).
@@ -61,16 +71,13 @@ constexpr std::array<Call, sizeof...(I)> calls(std::index_sequence<I...>) {
 constexpr auto kCalls = calls(std::make_index_sequence<originals.size()>());
 
 void mend(nb::handle object) {
-  const std::string_view type = nb::type_name(object.type()).c_str();
-  if (!type.ends_with("nb_func") && !type.ends_with("nb_method")) return;
-  auto* const function = reinterpret_cast<Function*>(object.ptr());
-  // Another layout is left alone.
-  if (function->call == nullptr || PyVectorcall_Function(object.ptr()) != function->call) return;
+  Call* const code = call_of(object);
+  if (code == nullptr || *code == nullptr) return;
   for (std::size_t i = 0; i < originals.size(); ++i) {
-    if (function->call == kCalls[i]) return;
-    if (originals[i] == nullptr) originals[i] = function->call;
-    if (originals[i] != function->call) continue;
-    function->call = kCalls[i];
+    if (*code == kCalls[i]) return;
+    if (originals[i] == nullptr) originals[i] = *code;
+    if (originals[i] != *code) continue;
+    *code = kCalls[i];
     return;
   }
 }
