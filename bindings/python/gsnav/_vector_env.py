@@ -27,11 +27,11 @@ from ._spaces import AutoresetMode, BaseVectorEnv, batch_space, make_generator
 
 # An array per sensor: float32 of numpy, or a DeviceArray.
 Observation = dict[str, Any]
-# Observations, rewards, terminations, truncations and infos.
 StepResults = tuple[Observation, npt.NDArray[np.float64], npt.NDArray[np.bool_], npt.NDArray[np.bool_], dict[str, Any]]
 
 BOOLS = {bool, np.bool_}
 MARKED_FIELDS = tuple((name, "_" + name) for name in _task.INFO_FIELDS)
+ARRAY, ACTIONS = np.ndarray, _task.ACTIONS
 VALID = frozenset(range(_task.ACTIONS))
 AUTO_RESETS = {"NextStep": AutoReset.next_step, "SameStep": AutoReset.same_step, "Disabled": AutoReset.disabled}
 
@@ -118,8 +118,10 @@ class VectorEnv(BaseVectorEnv):
         self._all.flags.writeable = False
         # Views of each step, made once: the simulator writes all steps to the same memory.
         self._views: tuple[npt.NDArray[Any], ...] | None = None
-        # Results of the step that runs, and the environments whose episode ended in it.
-        self._results: tuple[StepResults, list[int]] | None = None
+        self._results: Any = None  # of the step that runs
+        self._ended: list[int] = []  # environments whose episode ended in it
+        self._kept: Any = None  # Results that are freed by the next step, while a GPU draws.
+        self._finishes = self._same_step or render_mode is not None
         self._simulator: BatchSimulator | None = BatchSimulator(
             device, self.scenes, batch_config(config, AUTO_RESETS[mode.value]), self.num_envs, self._source, copy)
 
@@ -162,18 +164,15 @@ class VectorEnv(BaseVectorEnv):
         Returns observations, rewards, terminations, truncations and infos. Wrong actions raise an exception
         before any environment moves.
         """
-        simulator: Any = self.simulator  # _step_plain is no function for users
-        # After a step, whose images filled the caches, functions of numpy take ten times as long. C++ checks the most.
-        if type(actions) is not np.ndarray or not simulator._step_plain(actions, _task.ACTIONS, self._prepare):
+        # On a GPU, all code outside of _prepare adds to the time of a step. It takes ten times as long as in a loop
+        # of its own, because a step uses the caches. So C++ checks actions, and there are few lookups here.
+        simulator: Any = self._simulator or self.simulator
+        if type(actions) is not ARRAY or not simulator._step_plain(actions, ACTIONS, self._prepare):
             simulator.step(self._checked(actions), self._prepare)
-        prepared = self._results
-        assert prepared is not None
+        results: StepResults = self._results
         self._results = None
-        results, ended = prepared
-        if self.render_mode is not None:
-            self._show(results[0][self._rgb])
-        if ended and self._same_step:
-            self._add_begun(results[4], ended)
+        if self._finishes:
+            self._finish(results)
         return results
 
     def _prepare(self, step: BatchStep) -> None:
@@ -183,11 +182,19 @@ class VectorEnv(BaseVectorEnv):
         rows, _, rewards, terminated, truncated = self._views
         infos: dict[str, Any] = {}
         self._add_step_info(infos, rows, self._all)
-        ended = step.finished.tolist()
-        if ended:
+        self._ended = step.finished.tolist()
+        if self._ended:
             self._add_ends(infos, step)
-        results = self._observation(step), rewards.copy(), terminated.copy(), truncated.copy(), infos
-        self._results = results, ended
+        others = rewards.copy(), terminated.copy(), truncated.copy(), infos
+        self._results = self._observation(step), *others
+        self._kept = others if self._copy and step.images else self._results
+
+    def _finish(self, results: Any) -> None:
+        """Adds results that need complete images, or the worlds of episodes that have begun."""
+        if self.render_mode is not None:
+            self._show(results[0][self._rgb])
+        if self._same_step:
+            self._add_begun(results[4], self._ended)
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
         """The last image of each environment's first RGB sensor, uint8 [H][W][3]. None without a render mode."""
@@ -202,7 +209,7 @@ class VectorEnv(BaseVectorEnv):
     def close_extras(self, **kwargs: Any) -> None:
         """Frees the simulator. Observations stay valid."""
         self._simulator = self._views = None
-        self._last = self._results = None
+        self._last = self._results = self._kept = None
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
         many: Any = seed

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <chrono>
 #include <exception>
+#include <functional>
 #include <optional>
 #include <utility>
 #include <variant>
@@ -24,7 +25,7 @@ void run(BatchCore& b, const char* what, const std::exception_ptr& raised, const
   check_fork(b.sim.device(), what);
   b.source->error.reset();
   b.images->error.reset();
-  b.images->given = nb::list();
+  if (b.images->given.size() != 0) b.images->given = nb::list();
   if (b.pool != nullptr) b.pool->begin();
   std::optional<Result<BatchStep>> result;
   {
@@ -43,10 +44,11 @@ void run(BatchCore& b, const char* what, const std::exception_ptr& raised, const
   result->status().throw_if_error();
 }
 
-/// Runs f(simulator, WhileDrawing) -> Result<BatchStep> and returns its BatchStep of Python. This object
-/// is made, and `meanwhile` called with it, while a GPU draws.
+/// Runs f(simulator, WhileDrawing) -> Result<BatchStep> and returns its BatchStep of Python, unless
+/// `dropped`. This object is made, `meanwhile` called with it, and it is dropped, while a GPU draws.
 template <class F>
-nb::object observe(PythonBatch& batch, const char* what, nb::handle meanwhile, const F& f) {
+nb::object observe(PythonBatch& batch, const char* what, nb::handle meanwhile, const F& f,
+                   bool dropped = false) {
   BatchCore& b = *batch.core;
   if (!meanwhile.is_none() && !PyCallable_Check(meanwhile.ptr())) {
     throw nb::type_error(
@@ -55,19 +57,20 @@ nb::object observe(PythonBatch& batch, const char* what, nb::handle meanwhile, c
   nb::object made;
   Unfilled unfilled;
   std::exception_ptr raised;
-  const WhileDrawing prepare = [&](const BatchStep& s) -> Status {
+  const auto prepare = [&](const BatchStep& s) -> Status {
     const HoldGil gil;
     b.begun = true;
     try {
       made = nb::cast(step_arrays(s, b, batch.owner, unfilled));
       if (!meanwhile.is_none()) call_python(nb::borrow(meanwhile), made);
+      if (dropped && unfilled.empty()) made.reset();
       return {};
     } catch (const std::exception&) {
       raised = std::current_exception();
       return {Errc::invalid_argument, "meanwhile raised an exception"};
     }
   };
-  run(b, what, raised, [&](BatchSimulator& sim) { return f(sim, prepare); });
+  run(b, what, raised, [&](BatchSimulator& sim) { return f(sim, std::cref(prepare)); });
   for (const auto& [image, data] : unfilled) copy_numbers(image, data);
   return made;
 }
@@ -151,8 +154,8 @@ bool step_plain(nb::handle self, nb::handle actions, std::size_t count, nb::hand
   const Busy::Hold hold(b.core->busy, "BatchSimulator.step");
   const auto chosen = plain_actions(actions, b.core->sim.environments(), count);
   if (!chosen) return false;
-  observe(b, "BatchSimulator.step", meanwhile,
-          [&](BatchSimulator& sim, const WhileDrawing& f) { return sim.step(*chosen, f); });
+  const auto act = [&](BatchSimulator& sim, const WhileDrawing& f) { return sim.step(*chosen, f); };
+  observe(b, "BatchSimulator.step", meanwhile, act, true);
   return true;
 }
 

@@ -150,15 +150,17 @@ inline nb::object number_array(const double* numbers, std::size_t count) noexcep
 /// __new__ without __init__.
 template <class T>
 T& object_of(nb::handle self) {
-  const std::string wanted = nb::cast<std::string>(nb::type<std::remove_cv_t<T>>().attr("__name__"));
+  const auto wanted = [] {
+    return nb::cast<std::string>(nb::type<std::remove_cv_t<T>>().attr("__name__"));
+  };
   if (!nb::isinstance<std::remove_cv_t<T>>(self)) {
     throw nb::type_error(
-        ("expected a " + wanted + ", got " + nb::cast<std::string>(self.type().attr("__name__")))
+        ("expected a " + wanted() + ", got " + nb::cast<std::string>(self.type().attr("__name__")))
             .c_str());
   }
   if (!nb::inst_ready(self)) {
     throw nb::type_error(
-        (wanted + ": __init__ has not been called. Create it with " + wanted + "(...)").c_str());
+        (wanted() + ": __init__ has not been called. Create it with " + wanted() + "(...)").c_str());
   }
   return *nb::inst_ptr<std::remove_cv_t<T>>(self);
 }
