@@ -45,7 +45,7 @@ class GpuRows {
   }
 
   void row(const char* name, LodDraw draw, double pixels, bool seen = false) {
-    SceneLevels::Asset& asset = levels_.assets[0];
+    LeveledScene::Asset& asset = levels_.assets[0];
     asset.tree = draw == LodDraw::lod ? tree_ : nullptr;
     asset.visible = seen ? visible_ : nullptr;
     asset.visible_there = seen ? visible_there_.data() : nullptr;
@@ -75,7 +75,7 @@ class GpuRows {
   void batch_row(const char* name, LodDraw draw, double pixels, bool seen = false) {
     LodRow out(views_, draw);
     levels_.choice.pixels = std::max(pixels, 1e-3);
-    SceneLevels::Asset& asset = levels_.assets[0];
+    LeveledScene::Asset& asset = levels_.assets[0];
     asset.tree = tree_;
     asset.visible = seen ? visible_ : nullptr;
     asset.visible_there = seen ? visible_there_.data() : nullptr;
@@ -181,7 +181,7 @@ class GpuRows {
   Buffer<std::uint32_t, CudaBackend> visible_there_;
   Buffer<float, CudaBackend> memory_;
   DeviceTime time_;
-  SceneLevels levels_;
+  LeveledScene levels_;
   CutSets cut_;
   std::uint64_t drawn_ = 0;
 };

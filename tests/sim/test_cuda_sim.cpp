@@ -10,6 +10,7 @@
 #include "gsnav/backends/cuda.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
+#include "gsnav/scene/visible_sets.hpp"
 #include "gsnav/sim/basic_batch.hpp"
 #include "mesh_box.hpp"
 #include "ops/no_gpu.hpp"

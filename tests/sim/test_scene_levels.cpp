@@ -9,6 +9,7 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
+#include "gsnav/scene/visible_sets.hpp"
 #include "gsnav/sim/basic_batch.hpp"
 #include "lod/level_support.hpp"
 #include "same_bits.hpp"

@@ -16,7 +16,7 @@ namespace gsnav {
 
 /// One image to render: camera, sets, meshes, rules and output.
 struct ImageRequest : FrameJob<float> {
-  const SceneLevels* levels = nullptr;   ///< Levels of detail and visible sets of the assets, which are
+  const LeveledScene* levels = nullptr;  ///< Levels of detail and visible sets of the assets, which are
                                          ///< the first of `sets`. Null: draw everything.
   std::span<const BodyLevels> bodies{};  ///< Levels of detail of the avatars, which are the last of
                                          ///< `sets`.

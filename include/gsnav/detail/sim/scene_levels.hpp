@@ -84,7 +84,7 @@ class LodCells {
 
 /// Selects which part of a scene's assets is drawn: by level of detail (docs/concepts/scene.md), by
 /// visibility from the camera's cell, or both.
-struct SceneLevels {
+struct LeveledScene {
   /// Data of one asset.
   struct Asset {
     const LodTree* tree;                         ///< Level-of-detail tree. Null: no levels of levels.
@@ -110,14 +110,14 @@ class CutSets {
   /// @param sets Sets of the scene: assets first, then avatars.
   /// @param bodies Levels of detail of the avatars. Empty, or without an asset: the avatar's set is not
   /// changed.
-  std::span<const GaussianSet> select(const SceneLevels& levels, std::span<const GaussianSet> sets,
+  std::span<const GaussianSet> select(const LeveledScene& levels, std::span<const GaussianSet> sets,
                                       const Camera& camera, std::span<const BodyLevels> bodies = {}) {
     cuts_.assign(levels.assets.size(), nullptr);
     sets_.clear();
     to_place_.clear();
     looked_from_.clear();
     for (std::size_t a = 0; a < levels.assets.size(); ++a) {
-      const SceneLevels::Asset& asset = levels.assets[a];
+      const LeveledScene::Asset& asset = levels.assets[a];
       const auto cell = asset.visible != nullptr ? asset.visible->cell_of(camera, asset.world_from_asset)
                                                  : std::nullopt;
       View<const std::uint32_t> seen;
@@ -177,7 +177,7 @@ class CutSets {
 
  private:
   /// Changes the last set from host arrays to the backend's arrays.
-  void move(const SceneLevels::Asset& asset, std::size_t index, GaussianSet& set,
+  void move(const LeveledScene::Asset& asset, std::size_t index, GaussianSet& set,
             std::optional<std::size_t> cell) {
     const View<const std::uint32_t> drawn = set.selection.drawn_chunks;
     to_place_.push_back({sets_.size() - 1, index, drawn});

@@ -78,7 +78,7 @@ class SceneOnBackend {
   /// Meshes of the scene. The id of an instance is the index of its SceneMesh.
   MeshFrame meshes() const noexcept { return {instances_, scene_->light}; }
   /// How the assets are selected per camera. Null: draw them whole.
-  const SceneLevels* levels() const noexcept { return levels_.assets.empty() ? nullptr : &levels_; }
+  const LeveledScene* levels() const noexcept { return levels_.assets.empty() ? nullptr : &levels_; }
   /// Number of times that an avatar was posed so far.
   std::size_t pose_count() const noexcept { return pose_count_; }
 
@@ -208,7 +208,7 @@ class SceneOnBackend {
   std::vector<GaussianArrays<B>> merged_;  // Merged Gaussians of the trees, if the backend has its own
                                            // memory.
   std::vector<Buffer<std::uint32_t, B>> visible_;  // Bits of the visible sets, likewise.
-  SceneLevels levels_;
+  LeveledScene levels_;
   std::vector<MeshArrays<B>> mesh_arrays_;
   std::vector<MeshInstance> instances_;
   std::vector<std::shared_ptr<const AvatarArrays<B>>> bodies_;  // One per avatar.

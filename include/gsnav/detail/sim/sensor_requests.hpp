@@ -27,9 +27,9 @@ struct SensorView {
   const RenderConfig* config = nullptr;  ///< Render settings. The sensors choose `outputs`.
   std::size_t row = 0;                   ///< Row of the images.
   MeshFrame meshes{};                    ///< Meshes to draw. Semantic images contain their ids.
-  const SceneLevels* levels = nullptr;   ///< Levels of detail and visible sets of the assets, which are
-                                        ///< the first of `sets`. Null: draw everything. Semantic sensors
-                                        ///< always draw everything.
+  const LeveledScene* levels = nullptr;  ///< Levels of detail and visible sets of the assets, which are
+                                         ///< the first of `sets`. Null: draw everything. Semantic
+                                         ///< sensors always draw everything.
   std::span<const BodyLevels> bodies{};  ///< Levels of detail of the avatars.
 
   /// Number of sets and meshes that a semantic sensor distinguishes.
