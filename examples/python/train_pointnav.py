@@ -133,6 +133,16 @@ class Learner:
         self.act(t)
         self.hidden.copy_(hidden)
 
+    def record(self, seen: gsnav.BatchStep) -> None:
+        """Stores the result of a step. The simulator calls it while it draws into row `rows.at`."""
+        t, (reward, done, valid), start = self.rows.at, self.host_result.numpy(), self.ended
+        # After the end of an episode comes a step without effect, which begins the next episode.
+        reward[t - 1], valid[t - 1] = seen.rewards, ~start
+        self.seen, self.ended = seen, seen.terminated | seen.truncated
+        done[t - 1] = self.ended
+        self.observe(t, start)
+        self.finished += [seen.final_metrics] if len(seen.finished) else []
+
     def straggles(self, t: int) -> bool:
         """Whether enough other ranks have finished their rollouts, so that this one ends early."""
         a = self.args
@@ -143,34 +153,27 @@ class Learner:
     @torch.no_grad()
     def collect(self) -> np.ndarray:
         """Plays up to T steps. Returns the metrics of the episodes that ended."""
-        a, t, finished = self.args, 0, []
+        a, t = self.args, 0
+        self.finished: list[np.ndarray] = []
         torch.manual_seed(mixed(a.seed, self.update_count) >> 1)
         noise = torch.rand(a.rollout + 1, self.ranks * a.environments, ACTIONS, device=self.device)
-        mine = slice(self.rank * a.environments, (self.rank + 1) * a.environments)
-        self.noise.copy_(clear(noise[:, mine]))
-        reward, done, valid = self.host_result.numpy()
+        self.noise.copy_(clear(noise[:, self.rank * a.environments:][:, :a.environments]))
         self.clock = time.perf_counter()
         while t < a.rollout and not self.straggles(t):
             self.run("act", self.act, t)
             if self.device.type == "cuda":
                 torch.cuda.current_stream().synchronize()
             self.note("act")
-            self.rows.at = t + 1
-            self.seen = self.simulator.step(self.mirror.actions(self.host_action.numpy()))
-            self.note("simulate")
-            # After the end of an episode comes a step without effect, which begins the next episode.
-            reward[t], valid[t], start = self.seen.rewards, ~self.ended, self.ended
-            self.ended = self.seen.terminated | self.seen.truncated
-            done[t] = self.ended
             t += 1
-            self.observe(t, start)
-            finished += [self.seen.final_metrics] if len(self.seen.finished) else []
+            self.rows.at = t
+            self.simulator.step(self.mirror.actions(self.host_action.numpy()), self.record)
+            self.note("simulate")
         self.run("bootstrap", self.bootstrap, t)
-        valid[t:] = reward[t:] = self.host_start.numpy()[t + 1:] = 0
+        self.host_result.numpy()[::2, t:] = self.host_start.numpy()[t + 1:] = 0  # no reward, not valid
         if self.ranks > 1 and a.cut_off < 1:
             self.store.add(f"done {self.update_count}", 1)
         self.used = t
-        self.metrics = np.concatenate(finished) if finished else self.seen.final_metrics
+        self.metrics = np.concatenate(self.finished) if self.finished else self.seen.final_metrics
         self.digest = hashlib.sha256(self.digest + self.metrics.tobytes()).digest()
         return self.metrics
 
