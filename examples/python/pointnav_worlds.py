@@ -21,6 +21,7 @@ LEFT, RIGHT = int(gsnav.Action.turn_left), int(gsnav.Action.turn_right)
 SENSORS = {"depth": ("depth",), "rgb": ("rgb",), "rgbd": ("rgb", "depth")}  # images of an agent's sensor, in order
 CHANNELS = {"depth": 1, "rgb": 3, "rgbd": 4}  # numbers per pixel
 TRAIN_SEEDS, HELD_OUT_SEEDS = range(64), range(64, 80)
+MESH_DENSITY = 0.05  # largest density of flats of triangles
 METRICS = ("success", "spl", "soft_spl", "collision_rate", "psi", "steps")
 
 
@@ -37,7 +38,8 @@ class Worlds:
             plan = gsnav.FloorPlanOptions(seed=seed, rooms=args.rooms)
             mesh = args.worlds == "meshes" or args.worlds == "both" and seed % 2 == 1
             kind = gsnav.SurfaceKind.mesh if mesh else gsnav.SurfaceKind.gaussians
-            scene = gsnav.planned_simulator_scene(plan, args.people, seed, args.density, self.task, kind)
+            density = min(args.density, MESH_DENSITY) if mesh else args.density
+            scene = gsnav.planned_simulator_scene(plan, args.people, seed, density, self.task, kind)
             assert scene.navmesh is not None
             if self.lod is not None:
                 assets = scene.assets
@@ -110,7 +112,8 @@ def world_arguments(p: argparse.ArgumentParser) -> None:
     """Adds the arguments for the worlds and the quality of images."""
     p.add_argument("--device", default="best", help="device of gsnav and torch: best, cuda, cuda:1, cpu, ...")
     p.add_argument("--people", type=int, default=0, help="people in each flat")
-    p.add_argument("--density", type=float, default=0.05, help="factor on the number of Gaussians")
+    p.add_argument("--density", type=float, default=0.05, help="factor on the number of Gaussians. Flats of "
+                   "triangles take 0.05 at most, because it only changes how fine their colours are")
     p.add_argument("--rooms", type=int, default=4, help="rooms of a flat")
     p.add_argument("--worlds", default="gaussians", choices=["gaussians", "meshes", "both"],
                    help="what flats are made of; both: every other flat is a mesh")
