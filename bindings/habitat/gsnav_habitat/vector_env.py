@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Environments of habitat-baselines in the process of the trainer, which share scenes and renderers."""
 
+import atexit
 import collections
+import contextlib
 import copy
 import threading
+import weakref
 from typing import Any, Callable
 
 import numpy as np
@@ -116,6 +119,7 @@ class BatchVectorEnv(_theirs.VectorEnv):
                 worker.ask(("make", (make_env_fn, arguments)))
                 self._run()  # One after the other: they open the same scenes.
                 worker.take()
+            _open.add(self)
         except BaseException:
             for worker in self._everyone:
                 worker.ask((_theirs.CLOSE_COMMAND, None))
@@ -138,8 +142,22 @@ class BatchVectorEnv(_theirs.VectorEnv):
     def close(self) -> None:
         """Closes the environments."""
         if not self._is_closed:
-            super().close()
-            self._turns.close()
+            try:
+                super().close()
+            finally:
+                self._is_closed = True
+                self._turns.close()
+
+
+_open: "weakref.WeakSet[BatchVectorEnv]" = weakref.WeakSet()
+
+
+@atexit.register
+def _close_all() -> None:
+    """Closes what a program leaves open, after Ctrl-C for example. Later, no thread would answer."""
+    for envs in list(_open):
+        with contextlib.suppress(Exception):  # A step that was not read may have to draw, which is too late.
+            envs.close()
 
 
 class BatchVectorEnvFactory(_factory.HabitatVectorEnvFactory):

@@ -73,6 +73,29 @@ def test_measures_and_reward_are_those_of_the_simulator(pack, monkeypatch):
     env.close()
 
 
+# Ends as Ctrl-C does, while environments are open and the result of a step is not read.
+INTERRUPTED = """
+import sys
+from gsnav.habitat import BatchVectorEnvFactory
+from habitat_baselines.config.default import get_config
+
+envs = BatchVectorEnvFactory().construct_envs(get_config("pointnav/ppo_pointnav_example.yaml", sys.argv[1:]))
+envs.reset()
+envs.async_step_at(0, 1)
+raise KeyboardInterrupt
+"""
+
+
+def test_a_program_that_is_interrupted_ends_quietly(pack, tmp_path):
+    need_baselines()
+    (tmp_path / "interrupted.py").write_text(INTERRUPTED)
+    arguments = [*overrides_of(pack), "habitat_baselines.num_environments=2", *SMALL]
+    with pytest.raises(AssertionError) as failed:  # The status of a program after Ctrl-C is not 0.
+        run_module(["interrupted.py", *arguments], tmp_path)
+    text = str(failed.value)
+    assert "KeyboardInterrupt" in text and "Exception ignored" not in text
+
+
 def test_one_process_gives_the_bits_of_forkserver_workers(pack, tmp_path):
     need_baselines()
     script = str(pathlib.Path(__file__).parent / "compare_vector_envs.py")
