@@ -263,7 +263,7 @@ def test_a_cluster_of_two_nodes_one_killed(episodes, alone, tmp_path):
                 ray.kill(workers._actors[0])
             played.append(rollout)
         assert workers.deaths >= 1
-        assert "".join(r.line() + "\n" for r in played).encode() == alone[0].split(b"\n", 1)[1]
+        assert "".join(gsnav._journal.line(r) + "\n" for r in played).encode() == alone[0].split(b"\n", 1)[1]
         assert all(np.array_equal(a.observations["depth"], b.observations["depth"]) for a, b in zip(played, alone[1]))
         workers.close()
         cluster.add_node(num_cpus=2)
