@@ -30,7 +30,11 @@ ImageSource image_source(std::shared_ptr<PythonImageSource> source, const Device
                 call + " returned an array on another device: it must be " +
                     (on_gpu ? "on cuda:" + std::to_string(index) : std::string("in host memory"))};
       }
+      // Both: the object, and the memory that it has exported.
       source->given.append(made);
+      using Memory = decltype(array);
+      source->given.append(
+          nb::capsule(new Memory(array), [](void* p) noexcept { delete static_cast<Memory*>(p); }));
       return std::span<float>(array.data(), array.size());
     } catch (nb::python_error& e) {
       source->error.emplace(std::move(e));

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A batch draws into memory that a function gives."""
 
+import array
 import gc
+import weakref
 
 import numpy as np
 import pytest
@@ -90,3 +92,36 @@ def test_wrong_memory_is_refused_before_an_environment_moves(make, wrong, error,
 def test_the_source_must_be_callable(make):
     with pytest.raises(TypeError, match="image_source must be callable or None, got int"):
         make(3)
+
+
+def test_memory_lives_as_long_as_its_export(make):
+    freed, owned = [], []
+
+    class Lazy:
+        """Exports an array that nothing else owns."""
+
+        def __init__(self, floats):
+            self.floats = floats
+
+        def __dlpack__(self, **settings):
+            array = np.full(self.floats, 7, np.float32)
+            weakref.finalize(array, freed.append, self.floats)
+            return array.__dlpack__()
+
+        def __dlpack_device__(self):
+            return 1, 0
+
+    batch = make(lambda sensor, floats: Lazy(floats))
+    seen = batch.reset()
+    gc.collect()
+    assert not freed and not (seen.images["rgb"] == 7).all()
+
+    def source(sensor, floats):
+        owned.append(array.array("f", bytes(4 * floats)))
+        return owned[-1]
+
+    batch = make(source)
+    seen = batch.reset()
+    with pytest.raises(BufferError):
+        del owned[0][:]
+    assert seen.images["rgb"].any()
