@@ -40,17 +40,19 @@ nb::object noisy_colors(NoiseModel model, std::uint64_t seed, const Array<std::u
   const auto channels = image.ndim() == 3 ? image.shape(2) : 0;
   const auto shape =
       shape_of(image, "[H][W][3] or [H][W][4], contiguous", channels == 3 || channels == 4);
-  std::vector<std::uint8_t> out(image.data(), image.data() + image.size());
-  if (model.kind != NoiseKind::none) {
+  std::vector<std::uint8_t> out;
+  {
     const ReleaseGil release;
-    const std::size_t pixels = out.size() / channels;
-    std::vector<float> colors(3 * pixels);
-    std::vector<std::uint8_t> bytes(colors.size());
-    for (std::size_t i = 0; i < colors.size(); ++i)
-      colors[i] = static_cast<float>(out[i / 3 * channels + i % 3]) / 255.0f;
-    add_color_noise(model, seed, colors);
-    to_bytes(colors, bytes);
-    for (std::size_t i = 0; i < bytes.size(); ++i) out[i / 3 * channels + i % 3] = bytes[i];
+    out.assign(image.data(), image.data() + image.size());
+    if (model.kind != NoiseKind::none) {
+      std::vector<float> colors(3 * (out.size() / channels));
+      std::vector<std::uint8_t> bytes(colors.size());
+      for (std::size_t i = 0; i < colors.size(); ++i)
+        colors[i] = static_cast<float>(out[i / 3 * channels + i % 3]) / 255.0f;
+      add_color_noise(model, seed, colors);
+      to_bytes(colors, bytes);
+      for (std::size_t i = 0; i < bytes.size(); ++i) out[i / 3 * channels + i % 3] = bytes[i];
+    }
   }
   return array_from(std::move(out), shape);
 }
@@ -61,11 +63,14 @@ nb::object noisy_depth(NoiseModel model, std::uint64_t seed, const Array<float>&
   const auto shape = shape_of(image, "[H][W] or [H][W][1], contiguous and aligned",
                               (sides == 2 || (sides == 3 && image.shape(2) == 1)) &&
                                   image.shape(0) <= kMaxImageSide && image.shape(1) <= kMaxImageSide);
-  std::vector<float> out(image.data(), image.data() + image.size());
-  if (model.kind != NoiseKind::none) {
+  std::vector<float> out;
+  {
     const ReleaseGil release;
-    const std::vector<float> given(out);  // Other threads may change the image.
-    redwood_depth(model, seed, static_cast<int>(shape[0]), static_cast<int>(shape[1]), given, out);
+    out.assign(image.data(), image.data() + image.size());
+    if (model.kind != NoiseKind::none) {
+      const std::vector<float> given(out);  // Other threads may change the image.
+      redwood_depth(model, seed, static_cast<int>(shape[0]), static_cast<int>(shape[1]), given, out);
+    }
   }
   return array_from(std::move(out), shape);
 }
