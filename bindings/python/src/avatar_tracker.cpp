@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Moves and metrics among people for the distribution gsnav-habitat, whose agents and clock are free.
-#include <nanobind/stl/array.h>
 #include <nanobind/stl/shared_ptr.h>
 
 #include <array>

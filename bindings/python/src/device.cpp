@@ -3,11 +3,11 @@
 
 #include <nanobind/operators.h>
 #include <nanobind/stl/string.h>
-#include <nanobind/stl/vector.h>
 
 #include <functional>
 
 #include "bind.hpp"
+#include "list_casters.hpp"
 
 namespace gsnav::python {
 

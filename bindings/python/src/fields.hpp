@@ -3,7 +3,6 @@
 
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
-#include <nanobind/stl/vector.h>
 
 #include <functional>
 #include <optional>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "casters.hpp"
+#include "list_casters.hpp"
 
 namespace gsnav::python {
 
@@ -201,7 +201,9 @@ class Struct {
 
   static void fill(T& made, const std::string& name, const std::vector<Field>& fields,
                    const nb::dict& values) {
-    for (const auto& [key, value] : values) {
+    // A list of its own: code of the caller may change the dict while a value is converted.
+    for (const nb::handle item : nb::list(values.attr("items")())) {
+      const nb::handle key = item[0], value = item[1];
       const std::string wanted = nb::cast<std::string>(key);
       const Field* found = nullptr;
       std::string known;

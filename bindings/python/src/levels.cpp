@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Levels of detail and visible sets of clouds: building, reading and writing them.
-#include <nanobind/stl/array.h>
 #include <nanobind/stl/filesystem.h>
 
 #include "arrays.hpp"

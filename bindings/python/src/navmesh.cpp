@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/nav/navmesh.hpp"
 
-#include <nanobind/stl/array.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/shared_ptr.h>
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gsnav/detail/sim/task.hpp"
 
-#include <nanobind/stl/array.h>
-
 #include "arrays.hpp"
 #include "bind.hpp"
 #include "fields.hpp"
