@@ -94,12 +94,12 @@ Action action_from(nb::handle value, const char* what) {
     index = integer_of(value);
   }
   if (!index.is_valid()) {
-    PyErr_Clear();
+    drop_mistake();
     throw nb::type_error((where + ": expected an Action or an integer, got " + type_of(value)).c_str());
   }
   const long action = PyLong_AsLong(index.ptr());
   if (PyErr_Occurred() || action < 0 || action > static_cast<long>(Action::look_down)) {
-    PyErr_Clear();
+    drop_mistake();
     throw Error(Errc::invalid_argument, where + ": action " + text_of(index) +
                                             " is out of range: use 0 (stop) to 5 (look_down)");
   }
@@ -144,7 +144,7 @@ std::optional<std::vector<Action>> plain_actions(nb::handle source, std::size_t 
                                                  std::size_t count) noexcept {
   Py_buffer buffer;
   if (PyObject_GetBuffer(source.ptr(), &buffer, PyBUF_ND | PyBUF_FORMAT) != 0) {
-    PyErr_Clear();
+    drop_error();
     return {};
   }
   std::optional<std::vector<Action>> actions;

@@ -35,7 +35,9 @@ Call* call_of(nb::handle object) {
 void explain(PyObject* function, PyObject* const* args, std::size_t flagged, PyObject* names) {
   nb::python_error raised;
   try {
-    const std::string text = raised.matches(PyExc_TypeError) ? text_of(raised.value()) : std::string();
+    // One that functions of Python have passed is not of this call.
+    const bool here = raised.matches(PyExc_TypeError) && !raised.traceback().is_valid();
+    const std::string text = here ? text_of(raised.value()) : std::string();
     if (text.find("(): incompatible function arguments.") != std::string::npos) {
       nb::list given;
       // Python and nanobind keep flags in the upper bits.
@@ -48,7 +50,12 @@ void explain(PyObject* function, PyObject* const* args, std::size_t flagged, PyO
       PyErr_SetObject(PyExc_TypeError, better.ptr());
       return;
     }
-  } catch (const std::exception&) {  // The error of nanobind is better than none.
+  } catch (nb::python_error& e) {  // The error of nanobind is better than one of repr.
+    if (!e.matches(PyExc_Exception)) {
+      e.restore();
+      return;
+    }
+  } catch (const std::exception&) {
     PyErr_Clear();
   }
   raised.restore();

@@ -29,7 +29,7 @@ void set_viewmat(Camera& c, nb::handle value) {
   for (Py_ssize_t i = 0; good && i < rows; ++i) good = read_numbers(value[i], m[i], 4);
   good = good && m[3][0] == 0 && m[3][1] == 0 && m[3][2] == 0 && m[3][3] == 1;
   if (!good) {
-    PyErr_Clear();
+    drop_mistake();
     const std::string text =
         "Camera.viewmat: expected numbers of shape (4, 4) with the last row 0 0 0 1, or of shape (3, "
         "4), "

@@ -51,12 +51,25 @@ T element(const Array& array, std::size_t i) noexcept {
   return value;
 }
 
+/// Drops the error of a conversion that failed. Ctrl-C in the caller's code comes again at once.
+inline void drop_error() noexcept {
+  if (PyErr_Occurred() != nullptr && PyErr_ExceptionMatches(PyExc_KeyboardInterrupt) != 0)
+    PyErr_SetInterrupt();
+  PyErr_Clear();
+}
+/// Drops an error of Python, unless it ends more than the call, such as KeyboardInterrupt.
+inline void drop_mistake() {
+  if (PyErr_Occurred() != nullptr && PyErr_ExceptionMatches(PyExc_Exception) == 0)
+    nb::raise_python_error();
+  PyErr_Clear();
+}
+
 /// Whether nanobind can read the buffer of an object. numpy's scalars of dates and durations export one
 /// of a dimension without strides, which nanobind would read nevertheless.
 inline bool has_strides(nb::handle source) noexcept {
   Py_buffer view;
   if (!PyObject_CheckBuffer(source.ptr())) return true;
-  if (PyObject_GetBuffer(source.ptr(), &view, PyBUF_RECORDS_RO) != 0) return PyErr_Clear(), true;
+  if (PyObject_GetBuffer(source.ptr(), &view, PyBUF_RECORDS_RO) != 0) return drop_error(), true;
   const bool good = view.ndim == 0 || view.strides != nullptr;
   PyBuffer_Release(&view);
   return good;
@@ -92,7 +105,7 @@ inline bool is_complex(nb::handle source) noexcept {
       kind != nullptr && PyUnicode_Check(kind) && PyUnicode_CompareWithASCIIString(kind, "c") == 0;
   Py_XDECREF(kind);
   Py_XDECREF(type);
-  PyErr_Clear();
+  drop_error();
   return found;
 }
 
@@ -102,7 +115,7 @@ inline bool read_real(nb::handle source, bool convert, double& out) noexcept {
   if (is_complex(source)) return false;
   out = PyFloat_AsDouble(source.ptr());
   if (!PyErr_Occurred()) return true;
-  PyErr_Clear();
+  drop_error();
   return false;
 }
 
@@ -120,7 +133,7 @@ inline bool read_numbers(nb::handle source, double* out, Py_ssize_t count) noexc
     good = read_real(item, true, out[i]);
     Py_DECREF(item);
   }
-  PyErr_Clear();
+  drop_error();
   return good;
 }
 
@@ -249,7 +262,7 @@ struct type_caster<gsnav::python::DeviceArg> {
     if (PyUnicode_Check(source.ptr())) {
       Py_ssize_t size = 0;
       const char* const text = PyUnicode_AsUTF8AndSize(source.ptr(), &size);
-      if (text == nullptr) return PyErr_Clear(), false;
+      if (text == nullptr) return gsnav::python::drop_error(), false;
       // An empty name is an error of Device::parse, like any other unknown name.
       value.name = size == 0 ? std::string(" ") : std::string(text, static_cast<std::size_t>(size));
       return true;

@@ -61,7 +61,7 @@ void bind_options(nb::module_& m) {
 /// A name or path as text. Throws TypeError for anything else.
 std::string name_from(nb::handle name) {
   const nb::object text = nb::steal(PyOS_FSPath(name.ptr()));
-  if (!text.is_valid()) PyErr_Clear();
+  if (!text.is_valid()) drop_mistake();
   if (!text.is_valid() || !PyUnicode_Check(text.ptr())) {
     throw nb::type_error(
         ("open_scene: name must be a str or an os.PathLike, got " + type_of(name)).c_str());

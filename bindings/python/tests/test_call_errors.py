@@ -2,6 +2,7 @@
 """Messages for arguments of wrong types: they name the argument and its value."""
 
 import inspect
+import signal
 
 import numpy as np
 import pytest
@@ -74,3 +75,86 @@ def test_errors_of_functions_that_call_python_stay(people):
     batch = gsnav.BatchSimulator("serial", [people], gsnav.BatchConfig(sensors=[]), 1, source)
     with pytest.raises(TypeError, match="^load_navmesh: got .* = <odd>;"):
         batch.reset()
+
+
+@pytest.mark.parametrize("give", [
+    lambda evil, opened: gsnav.SensorSpec(resolution=evil),
+    lambda evil, opened: gsnav.navmesh_viewpoints(opened.scene.navmesh, evil, 1.0),
+    lambda evil, opened: gsnav.SimulatorScene(opened.scene, people=evil),
+])
+def test_a_list_that_changes_while_it_is_read(give, opened):
+    class Evil:
+        def __float__(self):
+            emptied.clear()
+            self.junk = [[0] * n for n in range(1, 300)]
+            return 1.0
+
+        __int__ = __index__ = __float__
+
+    emptied = []
+    for _ in range(20):
+        emptied[:] = [Evil(), *(10**6 + i for i in range(2000))]
+        with pytest.raises((TypeError, ValueError, IndexError, gsnav.Error)):
+            give(emptied, opened)
+
+
+def test_a_state_that_changes_while_it_is_read():
+    class Evil:
+        def __len__(self):
+            return 3
+
+        def __getitem__(self, i):
+            state.clear()
+            return 1.0
+
+    for _ in range(100):
+        state = {"position": Evil(), "yaw": 0.5}
+        pose = gsnav.AgentPose.__new__(gsnav.AgentPose)
+        pose.__setstate__(state)
+        assert pose.yaw == 0.5
+
+
+@pytest.mark.parametrize("method, call", [
+    ("__index__", lambda batch, value: batch.step([1, value])),
+    ("__fspath__", lambda batch, value: gsnav.open_scene(value)),
+    ("__float__", lambda batch, value: gsnav.AgentPose(yaw=value)),
+    ("__float__", lambda batch, value: gsnav.AgentPose(position=[0, value, 0])),
+    ("__repr__", lambda batch, value: gsnav.load_navmesh(value)),
+])
+def test_ctrl_c_in_code_of_an_argument_is_not_lost(method, call, opened):
+    class Interrupts:
+        pass
+
+    def interrupt(value):
+        signal.raise_signal(signal.SIGINT)
+        return "text" if method in ("__fspath__", "__repr__") else 1
+
+    setattr(Interrupts, method, interrupt)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    episodes = gsnav.generate_episodes(opened.scene.navmesh, 2, 1)
+    batch = gsnav.BatchSimulator("serial", [opened.scene], gsnav.BatchConfig(rendering=False), 2,
+                                 lambda e, k: episodes[e])
+    batch.reset()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            call(batch, Interrupts())
+            for _ in range(10):  # Ctrl-C may come a moment later.
+                pass
+        assert len(batch.step([1, 1]).rewards) == 2
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_an_error_of_a_callback_stays_as_it_is(opened):
+    words = "f(): incompatible function arguments. The following argument types are supported:\n    1. f(a: int)"
+
+    def wrong(step):
+        raise TypeError(words)
+
+    episodes = gsnav.generate_episodes(opened.scene.navmesh, 2, 1)
+    batch = gsnav.BatchSimulator("serial", [opened.scene], gsnav.BatchConfig(rendering=False), 2,
+                                 lambda e, k: episodes[e])
+    batch.reset()
+    with pytest.raises(TypeError) as raised:
+        batch.step([1, 1], wrong)
+    assert str(raised.value) == words and raised.traceback[-1].name == "wrong"
