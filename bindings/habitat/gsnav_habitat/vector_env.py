@@ -47,6 +47,15 @@ class _Worker:
         """Whether `take` has a result."""
         return bool(self._answers)
 
+    def end(self) -> None:
+        """Asks for the environment to be closed. Drops commands, and answers that were not read."""
+        for _, error in self._answers:
+            if error is not None:
+                _engine.logger.warning("BatchVectorEnv.close: an environment raised, unread: %r", error)
+        self._answers.clear()
+        self._asked.clear()
+        self.ask((_theirs.CLOSE_COMMAND, None))
+
     def join(self) -> None:
         """Closes the environment, after it was asked to."""
         self._turns.run([(self, self.work)])
@@ -56,9 +65,9 @@ class _Worker:
         while self._asked:
             command, data = self._asked.popleft()
             if command == _theirs.CLOSE_COMMAND:
-                if self._env is not None:
-                    self._env.close()
-                self._env = None
+                env, self._env = self._env, None
+                if env is not None:
+                    env.close()
                 return
             try:
                 self._answers.append((self._do(command, data), None))
@@ -112,8 +121,8 @@ class BatchVectorEnv(_theirs.VectorEnv):
         self._turns = Turns(min(cores, count), share=max(1, cores // count), together=-(-count // 4))
         self._everyone = [_Worker(self._turns, self._auto_reset_done) for _ in range(count)]
         self._workers = list(self._everyone)
-        reads = [_theirs._ReadWrapper(self._reader(worker), rank) for rank, worker in enumerate(self._everyone)]
-        writes = [_theirs._WriteWrapper(worker.ask, read) for worker, read in zip(self._everyone, reads)]
+        self._reads = [self._reader(worker, rank) for rank, worker in enumerate(self._everyone)]
+        writes = [_theirs._WriteWrapper(worker.ask, read) for worker, read in zip(self._everyone, self._reads)]
         try:
             for worker, arguments in zip(self._everyone, env_fn_args):
                 worker.ask(("make", (make_env_fn, arguments)))
@@ -126,22 +135,35 @@ class BatchVectorEnv(_theirs.VectorEnv):
             self._run()
             self._turns.close()
             raise
-        return reads, writes
+        return list(self._reads), writes
 
-    def _reader(self, worker: _Worker) -> Callable[[], Any]:
+    def _reader(self, worker: _Worker, rank: int) -> Callable[[], Any]:
         def read() -> Any:
-            if not worker.has_answer():
-                self._run()
-            return worker.take()
+            try:
+                if not worker.has_answer():
+                    self._run()
+                return worker.take()
+            except BaseException:  # _ReadWrapper waits on, also where no other answer comes.
+                wrapper.is_waiting = worker.is_asked() or worker.has_answer()
+                raise
 
-        return read
+        wrapper = _theirs._ReadWrapper(read, rank)
+        return wrapper
 
     def _run(self) -> None:
         self._turns.run([(worker, worker.work) for worker in self._everyone if worker.is_asked()])
 
     def close(self) -> None:
-        """Closes the environments."""
-        if not self._is_closed:
+        """Closes the environments. Drops results that were not read, and logs errors among them."""
+        if self._is_closed:
+            return
+        try:
+            for worker in self._everyone:
+                worker.end()
+            self._run()  # All close, and then the first error is raised.
+        finally:
+            for read in self._reads:
+                read.is_waiting = False
             try:
                 super().close()
             finally:

@@ -73,6 +73,31 @@ def test_measures_and_reward_are_those_of_the_simulator(pack, monkeypatch):
     env.close()
 
 
+def test_after_an_error_in_an_environment_close_frees_environments_and_threads(pack, caplog):
+    need_baselines()
+    import threading
+    import time
+
+    from gsnav.habitat import BatchVectorEnvFactory
+    from habitat_baselines.config.default import get_config
+
+    settings = [*overrides_of(pack), "habitat_baselines.num_environments=2", *SMALL]
+    config = get_config("pointnav/ppo_pointnav_example.yaml", settings)
+    before = set(threading.enumerate())
+    for actions in ([99, 1], [1, 99], [98, 99]):
+        with pytest.raises(AssertionError, match="Invalid action 9"):  # That of the environment, not of close.
+            with BatchVectorEnvFactory().construct_envs(config) as envs:
+                envs.reset()
+                envs.step(actions)
+        assert all(worker._env is None for worker in envs._everyone)
+        envs.close()
+    assert caplog.text.count("unread: AssertionError('Invalid action 99") == 1  # The second of two.
+    deadline = time.monotonic() + 10
+    while set(threading.enumerate()) - before and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert set(threading.enumerate()) - before == set()
+
+
 # Ends as Ctrl-C does, while environments are open and the result of a step is not read.
 INTERRUPTED = """
 import sys
