@@ -63,6 +63,8 @@ class SensorSpec:
             value = Vector3(*(float(x) for x in value))
         elif name == "resolution":
             value = [int(x) for x in value]
+        elif name == "hfov" and isinstance(value, Rad):
+            value = Deg(value)
         object.__setattr__(self, name, value)
 
     def __eq__(self, other: object) -> bool:
@@ -92,7 +94,7 @@ class VisualSensorSpec(SensorSpec):
 
 
 class CameraSensorSpec(VisualSensorSpec):
-    """A pinhole or orthographic camera. `hfov` in degrees."""
+    """A pinhole or orthographic camera. `hfov` is a number of degrees, a Deg or a Rad."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -83,6 +83,19 @@ def test_a_camera_tells_its_angle_of_view(stage):
             sensors["color_sensor"].hfov = mn.Deg(60)
 
 
+@pytest.mark.parametrize("hfov", [60.0, mn.Deg(60), mn.Rad(math.pi / 3)])
+def test_an_angle_of_view_in_either_unit_draws_that_angle(stage, hfov):
+    config = make_cfg({"scene": stage, "color_sensor": False, "depth_sensor": True, "hfov": hfov, "width": 32,
+                       "height": 32})  # fmt: skip
+    with habitat_sim.Simulator(config) as sim:
+        assert sim.agents[0].sensors["depth_sensor"].hfov == mn.Deg(60)
+        place(sim, [0, 0.07, 0])
+        depth = sim.get_sensor_observations()["depth_sensor"]
+        # As above: a row t pixels below the horizon sees the floor at 1.5 f / t.
+        f = 16 / math.tan(math.pi / 6)
+        assert np.allclose(depth[30, 12:20], 1.5 * f / 14.5, rtol=1e-3)
+
+
 def test_any_pose_is_taken_without_snapping(sim):
     agent = place(sim, [1.0, 7.5, 2.0], 1.1, (0.2, 0.9, -0.4))
     state = agent.get_state()
