@@ -98,8 +98,8 @@ def test_after_an_error_in_an_environment_close_frees_environments_and_threads(p
     assert set(threading.enumerate()) - before == set()
 
 
-# Ends as Ctrl-C does, while environments are open and the result of a step is not read.
-INTERRUPTED = """
+# Ends while environments are open and the result of a step is not read.
+LEFT_OPEN = """
 import sys
 from gsnav.habitat import BatchVectorEnvFactory
 from habitat_baselines.config.default import get_config
@@ -107,18 +107,25 @@ from habitat_baselines.config.default import get_config
 envs = BatchVectorEnvFactory().construct_envs(get_config("pointnav/ppo_pointnav_example.yaml", sys.argv[1:]))
 envs.reset()
 envs.async_step_at(0, 1)
-raise KeyboardInterrupt
 """
 
 
 def test_a_program_that_is_interrupted_ends_quietly(pack, tmp_path):
     need_baselines()
-    (tmp_path / "interrupted.py").write_text(INTERRUPTED)
+    (tmp_path / "interrupted.py").write_text(LEFT_OPEN + "raise KeyboardInterrupt")
     arguments = [*overrides_of(pack), "habitat_baselines.num_environments=2", *SMALL]
     with pytest.raises(AssertionError) as failed:  # The status of a program after Ctrl-C is not 0.
         run_module(["interrupted.py", *arguments], tmp_path)
     text = str(failed.value)
     assert "KeyboardInterrupt" in text and "Exception ignored" not in text
+
+
+def test_a_program_that_leaves_environments_open_ends_quietly(pack, tmp_path):
+    need_baselines()
+    (tmp_path / "left_open.py").write_text(LEFT_OPEN)
+    arguments = [*overrides_of(pack), "habitat_baselines.num_environments=2", *SMALL]
+    text = run_module(["left_open.py", *arguments], tmp_path)
+    assert "Exception ignored" not in text and "Traceback" not in text
 
 
 def test_one_process_gives_the_bits_of_forkserver_workers(pack, tmp_path):
