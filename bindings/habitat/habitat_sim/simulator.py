@@ -3,6 +3,7 @@
 
 import dataclasses
 import functools
+import math
 import os
 import random as _random
 import time
@@ -190,12 +191,16 @@ class Simulator(PeoplePart):
         """Performs an action of the default agent, or a dict of actions by agents, and draws.
 
         The clock advances by `dt` seconds before it draws, or by GSNAV_ACTION_SECONDS. Returns the observations with
-        "collided": whether the agent moved less far than it tried to. Raises AssertionError for an unknown action.
+        "collided": whether the agent moved less far than it tried to. Raises AssertionError for an unknown action, and
+        ValueError for a time or an actuation that is not finite or a negative time. Nothing has changed then.
         """
         single = not isinstance(action, dict)
         default = self.config.sim_cfg.default_agent_id
         actions = {default: action} if single else action
         start = time.time()
+        dt = _checked("step", dt)
+        for agent_id, a in actions.items():
+            self.get_agent(agent_id)._action(a)
         self._step_seconds = _action_seconds() or dt
         collided = {}
         for agent_id, a in actions.items():
@@ -229,14 +234,17 @@ class Simulator(PeoplePart):
         self._clock.advance(seconds)
 
     def step_physics(self, dt: float, scene_id: int = 0) -> None:
-        """Advances the clock by `dt` seconds. With GSNAV_ACTION_SECONDS, `step` has done so."""
+        """Advances the clock by `dt` seconds. With GSNAV_ACTION_SECONDS, `step` has done so. Raises ValueError for a
+        time that is negative or not finite."""
+        dt = _checked("step_physics", dt)
         if _action_seconds() is None:
             self._stand_people(dt, range(len(self.agents)))
             self._advance(dt)
 
     def step_world(self, dt: float = _STEP) -> float:
-        """Advances the clock by `dt` seconds and returns it."""
-        self._advance(dt)
+        """Advances the clock by `dt` seconds and returns it. Raises ValueError for a time that is negative or not
+        finite."""
+        self._advance(_checked("step_world", dt))
         return self._world_time
 
     def get_world_time(self) -> float:
@@ -360,6 +368,13 @@ for _name in ("get_rigid_object_manager", "get_articulated_object_manager", "get
               "create_rigid_constraint", "update_rigid_constraint", "remove_rigid_constraint", "get_debug_line_render",
               "add_trajectory_object", "remove_object", "load_keyframe", "save_current_scene_config"):  # fmt: skip
     setattr(Simulator, _name, _unserved(_name))
+
+
+def _checked(method: str, dt: float) -> float:
+    seconds = float(dt)
+    if not 0 <= seconds < math.inf:
+        raise ValueError(f"Simulator.{method}: dt = {dt}: must be 0 or more seconds, and finite")
+    return seconds
 
 
 def _action_seconds() -> float | None:

@@ -217,6 +217,30 @@ def test_reset_and_reconfigure(sim, pack):
     assert sim.pathfinder.navigable_area > area and "color_sensor" in sim.step("move_forward")
 
 
+@pytest.mark.parametrize("dt", [math.nan, math.inf, -1.0])
+def test_times_out_of_range_change_nothing(sim, dt):
+    before, pose = sim.get_world_time(), sim.get_agent(0).get_state()
+    for call in (lambda: sim.step("move_forward", dt), lambda: sim.step_physics(dt), lambda: sim.step_world(dt)):
+        with pytest.raises(ValueError, match=f"dt = {dt}"):
+            call()
+    assert sim.get_world_time() == before and sim.gaussian_time == 0.0 and sim.get_agent(0).get_state() == pose
+
+
+@pytest.mark.parametrize("fields", [{"amount": math.nan}, {"amount": mn.Deg(math.inf)},
+                                    {"amount": 0.25, "constraint": math.nan}])  # fmt: skip
+def test_actuations_that_are_not_finite_change_nothing(stage, fields):
+    config = make_cfg({"scene": stage, "width": 16, "height": 16})
+    config.agents.append(make_cfg({"width": 16, "height": 16}).agents[0])
+    config.agents[1].action_space["odd"] = habitat_sim.ActionSpec("turn_left", habitat_sim.ActuationSpec(**fields))
+    with habitat_sim.Simulator(config) as sim:
+        poses = [agent.get_state() for agent in sim.agents]
+        name = "amount" if len(fields) == 1 else "constraint"
+        for call in (lambda: sim.step({0: "move_forward", 1: "odd"}), lambda: sim.get_agent(1).act("odd")):
+            with pytest.raises(ValueError, match=f"ActuationSpec.{name} = .*(nan|inf)"):
+                call()
+        assert [agent.get_state() for agent in sim.agents] == poses and sim.get_world_time() == 0.0
+
+
 def test_two_agents(stage):
     config = make_cfg({"scene": stage, "width": 16, "height": 16})
     config.agents.append(make_cfg({"width": 16, "height": 16}).agents[0])

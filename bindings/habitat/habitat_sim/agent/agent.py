@@ -122,12 +122,19 @@ class Agent:
             SensorFactory.delete_sensor(sensor)
         SensorFactory.create_sensors(self.body, agent_config.sensor_specifications)
 
-    def act(self, action_id: Any) -> bool:
-        """Performs an action of the action space. Returns whether the body moved less far than it tried to.
-        Raises AssertionError for an unknown action."""
+    def _action(self, action_id: Any) -> ActionSpec:
+        """An action that can be performed, by its name. Raises the errors of `act`."""
         space = self.agent_config.action_space
         assert action_id in space, f"no action {action_id!r}; the actions are {list(space)}"
-        action = space[action_id]
+        action: ActionSpec = space[action_id]
+        if isinstance(action.actuation, ActuationSpec):
+            action.actuation._check(action.name)
+        return action
+
+    def act(self, action_id: Any) -> bool:
+        """Performs an action of the action space. Returns whether the body moved less far than it tried to.
+        Raises AssertionError for an unknown action, ValueError for an actuation that is not finite."""
+        action = self._action(action_id)
         if action.name == "stop" and action.actuation is None:
             return False
         if self.controls.is_body_action(action.name):

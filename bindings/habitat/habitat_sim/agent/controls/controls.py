@@ -2,10 +2,12 @@
 """Actions that move an agent or its sensors."""
 
 import dataclasses
+import math
+import numbers
 from typing import Any, Callable
 
 import gsnav_habitat as _shared
-from magnum import Vector3
+from magnum import Deg, Rad, Vector3
 
 from ...registry import registry
 
@@ -16,6 +18,12 @@ class ActuationSpec:
 
     amount: float
     constraint: float | None = None
+
+    def _check(self, action_name: str) -> None:
+        """Raises ValueError naming a field that is not finite."""
+        for name, value in (("amount", self.amount), ("constraint", self.constraint)):
+            if isinstance(value, (numbers.Real, Deg, Rad)) and not math.isfinite(float(value)):
+                raise ValueError(f"action {action_name!r}: ActuationSpec.{name} = {value}: must be finite")
 
 
 @dataclasses.dataclass
@@ -54,7 +62,9 @@ class ObjectControls:
 
     def action(self, obj: Any, action_name: str, actuation_spec: Any, apply_filter: bool = True) -> bool:
         """Performs an action on a node. Returns whether it moved less far than was asked for: the squared
-        lengths differ by more than 1e-5."""
+        lengths differ by more than 1e-5. Raises ValueError for an actuation that is not finite."""
+        if isinstance(actuation_spec, ActuationSpec):
+            actuation_spec._check(action_name)
         move = registry.get_move_fn(action_name)
         assert move is not None, f"there is no action {action_name!r}"
         start = obj.absolute_translation
