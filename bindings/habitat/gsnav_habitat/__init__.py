@@ -6,7 +6,8 @@ import functools
 import os
 import sys
 import warnings
-from typing import Any, Callable, NoReturn
+from importlib.machinery import PathFinder
+from typing import Any, Callable, Iterator, NoReturn
 
 # Distributions that own the names of this one. "magnum" on PyPI is a service of OpenStack.
 _RIVALS = ("habitat_sim", "magnum", "magnum_bindings")
@@ -24,11 +25,21 @@ def _distributions() -> dict[str, str]:
             continue
         for entry in entries:
             stem, dot, kind = entry.rpartition(".")
-            name, _, version = stem.partition("-")
+            name, _, version = (stem, "", "") if kind == "egg-link" else stem.partition("-")
             name = name.lower().replace("-", "_").replace(".", "_")
-            if dot and kind in ("dist-info", "egg-info", "egg-link") and name in (*_RIVALS, "gsnav_habitat"):
+            if dot and kind in ("dist-info", "egg-info", "egg-link", "egg") and name in (*_RIVALS, "gsnav_habitat"):
                 found.setdefault(name, version.split("-")[0])
     return found
+
+
+def _strangers() -> Iterator[str]:
+    """Descriptions of packages that Python finds before those of this distribution, with or without metadata."""
+    here = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
+    for package in ("habitat_sim", "magnum", "corrade"):
+        loaded = sys.modules.get(package)
+        spec = PathFinder.find_spec(package) if loaded is None else loaded.__spec__
+        if spec is not None and spec.origin and os.path.dirname(os.path.dirname(os.path.realpath(spec.origin))) != here:
+            yield f"{package.replace('_', '-')} of unknown version, in {os.path.dirname(spec.origin)},"
 
 
 def version() -> str:
@@ -42,12 +53,12 @@ def claim() -> None:
 
     A child process says nothing. Raises ImportError naming both distributions if there is another.
     """
-    for name in _RIVALS:
-        if name in _distributions():
-            raise ImportError(
-                f"The distributions gsnav-habitat {version()} and {name.replace('_', '-')} {_distributions()[name]} "
-                "both provide habitat_sim or magnum. Uninstall one of them."
-            )
+    rivals = [f"{name.replace('_', '-')} {_distributions()[name]}" for name in _RIVALS if name in _distributions()]
+    for rival in [*rivals, *_strangers()]:
+        raise ImportError(
+            f"The distributions gsnav-habitat {version()} and {rival.strip()} both provide habitat_sim or magnum. "
+            "Uninstall one of them."
+        )
     if os.environ.setdefault("GSNAV_HABITAT_NOTICE", str(os.getpid())) == str(os.getpid()):
         warnings.warn(
             f"habitat_sim is provided by gsnav (gsnav-habitat {version()}): its navigation part. Not affiliated with "

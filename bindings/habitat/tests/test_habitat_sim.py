@@ -352,6 +352,26 @@ def test_import_refuses_beside_another_distribution(tmp_path, name):
     assert name.split("-")[0].replace("_", "-") in result.stderr
 
 
+@pytest.mark.parametrize("entry, name", [
+    ("habitat-sim.egg-link", "habitat-sim"), ("habitat_sim.egg-info", "habitat-sim"),
+    ("habitat_sim-0.3.3-py3.12-linux-x86_64.egg", "habitat-sim 0.3.3"),
+])  # fmt: skip
+def test_import_refuses_beside_the_forms_that_setuptools_installs(tmp_path, entry, name):
+    (tmp_path / entry).write_text("")
+    result = run_python(f"import sys; sys.path.append({str(tmp_path)!r}); import habitat_sim")
+    assert f"and {name} both" in result.stderr and "ImportError: The distributions gsnav-habitat" in result.stderr
+
+
+@pytest.mark.parametrize("package, importing", [("magnum", "habitat_sim"), ("corrade", "habitat_sim"),
+                                                ("habitat_sim", "magnum")])  # fmt: skip
+def test_import_refuses_where_python_finds_a_package_without_metadata_first(tmp_path, package, importing):
+    (tmp_path / package).mkdir()
+    (tmp_path / package / "__init__.py").write_text("")
+    result = run_python(f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import {importing}")
+    assert "ImportError: The distributions gsnav-habitat" in result.stderr
+    assert package.replace("_", "-") in result.stderr and str(tmp_path / package) in result.stderr
+
+
 def test_the_distribution_has_the_version_of_the_library():
     root = pathlib.Path(__file__).resolve().parents[3]
     header = (root / "include/gsnav/version.hpp").read_text()
