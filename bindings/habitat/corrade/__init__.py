@@ -8,3 +8,4 @@ _shared.claim()
 __gsnav__ = True
 containers = _shared.unserved("corrade", "containers")
 pluginmanager = _shared.unserved("corrade", "pluginmanager")
+_shared.complete(__name__)

@@ -92,6 +92,13 @@ def missing(module: str) -> Callable[[str], NoReturn]:
     return look_up
 
 
+def complete(package: str) -> None:
+    """Lets unknown names of a package and of its public modules that are loaded raise NotServed."""
+    for name, module in list(sys.modules.items()):
+        if f"{name}.".startswith(f"{package}.") and "._" not in name:
+            vars(module).setdefault("__getattr__", missing(name))
+
+
 class _Unserved(type):
     """Type of placeholders. Their attributes and calls raise NotImplementedError."""
 

@@ -54,5 +54,5 @@ __version__ = gsnav_version = _shared.version()
 cuda_enabled = built_with_bullet = audio_enabled = vhacd_enabled = False
 stage_id = -1
 
-__getattr__ = _shared.missing("habitat_sim")
+_shared.complete(__name__)
 __all__ = [name for name in globals() if not name.startswith("_")]

@@ -3,11 +3,9 @@
 
 import math
 import sys
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
-
-import gsnav_habitat as _shared
 
 from . import _engine
 
@@ -211,16 +209,5 @@ def _setting(name: str) -> property:
     return property(read, write, doc=f"{name} of the scene's clock. gaussian_time_step has no effect.")
 
 
-def _unserved(name: str) -> Any:
-    def call(self: Any, *args: Any, **kwargs: Any) -> NoReturn:
-        raise NotImplementedError(_shared.message(f"habitat_sim.Simulator.{name}"))
-
-    call.__doc__ = "Not served by gsnav: raises NotImplementedError."
-    return call
-
-
 for _name in TIME_SETTINGS:
     setattr(PeoplePart, _name, _setting(_name))
-for _name in ("update_gaussian_avatar", "update_gaussian_avatar_pose", "update_gaussian_avatar_attributes",
-              "update_gaussian_avatar_bounds"):  # fmt: skip
-    setattr(PeoplePart, _name, _unserved(_name))

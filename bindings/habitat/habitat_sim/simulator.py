@@ -16,7 +16,7 @@ from magnum import Vector3
 
 from . import _draw, _engine
 from ._follower import GreedyGeodesicFollower
-from ._people import TIME_SETTINGS, PeoplePart, _unserved
+from ._people import TIME_SETTINGS, PeoplePart
 from .agent import Agent
 from .agent.agent import AgentState
 from .metadata import MetadataMediator, TemplateManager
@@ -90,6 +90,12 @@ class Simulator(PeoplePart):
         self._step_seconds, self._moved = _STEP, False
         self.metadata_mediator = config.metadata_mediator or MetadataMediator(config.sim_cfg)
         self._open(config)
+
+    def __getattr__(self, name: str) -> Any:
+        """Called for names that do not exist. Public ones are not served."""
+        if name.startswith("_") or hasattr(type(self), name):
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        raise _shared.NotServed(_shared.message(f"habitat_sim.Simulator.{name}"))
 
     # ---- Life
     def _open(self, config: Configuration) -> None:
@@ -358,16 +364,6 @@ class Simulator(PeoplePart):
         except (gsnav.NothingNavigable, gsnav.InvalidArgument):
             return False
         return True
-
-
-for _name in ("get_rigid_object_manager", "get_articulated_object_manager", "get_asset_template_manager",
-              "get_physics_template_manager", "get_stage_template_manager", "get_lighting_template_manager",
-              "get_light_setup", "set_light_setup", "cast_ray", "contact_test", "get_gravity", "set_gravity",
-              "perform_discrete_collision_detection", "get_physics_contact_points",
-              "get_physics_num_active_contact_points",
-              "create_rigid_constraint", "update_rigid_constraint", "remove_rigid_constraint", "get_debug_line_render",
-              "add_trajectory_object", "remove_object", "load_keyframe", "save_current_scene_config"):  # fmt: skip
-    setattr(Simulator, _name, _unserved(_name))
 
 
 def _checked(method: str, dt: float) -> float:

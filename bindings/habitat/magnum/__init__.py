@@ -20,6 +20,6 @@ __gsnav__ = True
 for _name in ("ImageView2D", "MutableImageView2D", "PixelFormat", "PixelStorage", "MeshPrimitive"):
     globals()[_name] = _shared.unserved("magnum", _name)
 
-__getattr__ = _shared.missing("magnum")
+_shared.complete(__name__)
 __all__ = ["Color3", "Color4", "Deg", "Matrix3", "Matrix4", "Quaternion", "Rad", "Range1D", "Range2D", "Range3D",
            "Vector2", "Vector3", "Vector4", "math", "trade"]  # fmt: skip

@@ -274,17 +274,26 @@ def test_sensors_that_are_not_served_say_so(stage, fields):
 
 def test_names_that_are_not_served_say_so(sim):
     for call in (habitat_sim.physics.RigidObjectManager, habitat_sim.ReplayRenderer, habitat_sim.gfx.DebugLineRender,
-                 habitat_sim._ext.habitat_sim_bindings.Configuration, sim.get_rigid_object_manager,
-                 sim.cast_ray):  # fmt: skip
+                 habitat_sim._ext.habitat_sim_bindings.Configuration, lambda: sim.get_rigid_object_manager(),
+                 lambda: sim.cast_ray()):  # fmt: skip
         with pytest.raises(NotImplementedError, match="gsnav serves navigation only: habitat_sim"):
             call()
     assert habitat_sim.__gsnav__ is True
     for where, name in ((habitat_sim, "no_such_name"), (habitat_sim.gfx, "no_such_name"), (mn, "no_such_name"),
                         (habitat_sim.AssetType, "GAUSSIAN_SPLATTING"), (habitat_sim.gfx.RenderTarget, "blit_depth_to"),
-                        (habitat_sim.physics.MotionType, "DYNAMIC")):  # fmt: skip
+                        (habitat_sim.physics.MotionType, "DYNAMIC"), (habitat_sim.nav, "no_such_name"),
+                        (habitat_sim.utils.common, "no_such_name"), (habitat_sim.agent.controls, "no_such_name"),
+                        (habitat_sim.utils.settings, "no_such_name"), (mn.math, "no_such_name")):  # fmt: skip
         with pytest.raises(NotImplementedError, match=f"gsnav serves navigation only: .*{name}"):
             getattr(where, name)
         assert not hasattr(where, name)
+    for name in ("navmesh_visualization", "frustum_culling", "renderer", "gfx_replay_manager", "set_object_bb_draw",
+                 "get_runtime_perf_stat_names", "get_runtime_perf_stat_values", "get_rigid_constraint_settings",
+                 "get_physics_simulation_library", "get_active_semantic_scene_graph", "cast_ray", "no_such_name",
+                 "update_gaussian_avatar_pose"):  # fmt: skip
+        with pytest.raises(NotImplementedError, match=f"gsnav serves navigation only: habitat_sim.Simulator.{name}$"):
+            getattr(sim, name)
+        assert not hasattr(sim, name)
     with pytest.raises(NotImplementedError, match="gsnav.*RenderInstanceHelper"):
         habitat_sim.RenderInstanceHelper(sim, use_xyzw_orientations=False)
     with pytest.raises(ImportError):

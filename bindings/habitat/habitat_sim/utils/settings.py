@@ -3,6 +3,8 @@
 
 from typing import Any
 
+import gsnav_habitat as _shared
+
 from .. import agent as _agent
 from .. import nav
 from ..sensor import (
@@ -91,3 +93,6 @@ def make_cfg(settings: dict[str, Any]) -> Configuration:
             spec.hfov = s["hfov"]
         agent.sensor_specifications.append(spec)
     return Configuration(sim, [agent])
+
+
+_shared.complete(__name__)
