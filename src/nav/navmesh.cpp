@@ -16,6 +16,19 @@ NavMesh::~NavMesh() = default;
 
 const NavMeshSettings& NavMesh::settings() const noexcept { return impl_->settings; }
 Aabb<double> NavMesh::bounds() const noexcept { return impl_->bounds; }
+Aabb<double> NavMesh::tile_bounds() const noexcept {
+  const dtNavMesh& detour = *impl_->mesh;
+  Aabb<double> box;
+  for (int t = 0; t < detour.getMaxTiles(); ++t) {
+    const dtMeshHeader* header = detour.getTile(t)->header;
+    if (header == nullptr) continue;
+    for (const float* p : {header->bmin, header->bmax}) {
+      box.add(impl_->origin +
+              Vec3d{static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])});
+    }
+  }
+  return box;
+}
 std::size_t NavMesh::polygon_count() const noexcept { return impl_->polys.polys.size(); }
 double NavMesh::navigable_area() const noexcept { return impl_->polys.total_area; }
 

@@ -42,8 +42,8 @@ Result<TopDownMap> NavMesh::top_down_map(double height, double metres_per_cell, 
   check.finite("height", height);
   check.need(max_height_delta >= 0, "max_height_delta", max_height_delta, "must be >= 0");
   if (!check.positive("metres_per_cell", metres_per_cell).status()) return check.status();
-  const Aabb<double> box = bounds();
   const bool corners = layout == TopDownLayout::habitat;
+  const Aabb<double> box = corners ? tile_bounds() : bounds();
   const auto cells = [&](double low, double high) {
     const double n = (high - low) / metres_per_cell;
     return corners ? std::floor(n + kWhole) : max(std::ceil(n), 1.0);

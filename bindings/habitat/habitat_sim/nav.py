@@ -193,8 +193,8 @@ class PathFinder:
         return self._mesh
 
     def get_bounds(self) -> tuple[Vector3, Vector3]:
-        """Corners of the bounding box of the surface, metres."""
-        box = self._need("get_bounds").bounds()
+        """Corners of the bounding box of the tiles, metres. It reaches beyond the surface, as maps do."""
+        box = self._need("get_bounds").tile_bounds()
         return Vector3(*box.low), Vector3(*box.high)
 
     def build_navmesh_vertices(self, island_index: int = -1) -> list[Vector3]:

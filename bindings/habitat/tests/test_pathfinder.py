@@ -2,6 +2,7 @@
 """PathFinder, paths, steps, maps and the follower on a rectangle and on two islands, against closed forms."""
 
 import math
+import struct
 
 import habitat_sim
 import numpy as np
@@ -21,14 +22,15 @@ def floor(x0, z0, x1, z1, y, first):
     ]
 
 
-def finder_of(*floors):
+def finder_of(*floors, **settings):
     vertices, triangles = [], []
     for rectangle in floors:
         v, t = floor(*rectangle, len(vertices))
         vertices += v
         triangles += t
     finder = habitat_sim.PathFinder()
-    finder._mesh = gsnav.NavMesh.build(gsnav.NavMeshSettings(), np.array(vertices, float), np.array(triangles))
+    made = gsnav.NavMeshSettings(**settings)
+    finder._mesh = gsnav.NavMesh.build(made, np.array(vertices, float), np.array(triangles))
     finder.seed(7)
     return finder
 
@@ -43,6 +45,29 @@ def room():
 def islands():
     """6 m by 6 m at height 0, and 3 m by 3 m at height 2."""
     return finder_of((0, 0, 6, 6, 0.0), (8, 0, 11, 3, 2.0))
+
+
+def walls(finder):
+    """Corners of the box of the surface."""
+    vertices = np.array([list(v) for v in finder.build_navmesh_vertices()])
+    return Vector3(*vertices.min(0)), Vector3(*vertices.max(0))
+
+
+def headers(path):
+    """Corners of the box of the tiles, from a .navmesh file of version 2: 4 numbers and 7 words, 18 fields of
+    settings, then tiles with a reference and a size. The corners are the floats 18 to 23 of a tile's header."""
+    data = path.read_bytes()
+    _, version, count = struct.unpack_from("<4sii", data)
+    assert version == 2
+    at, corners = data.index(b"VAND") - 8, []
+    for _ in range(count):
+        size = struct.unpack_from("<i", data, at + 4)[0]
+        assert data[at + 8 : at + 12] == b"VAND"
+        corners.append(struct.unpack_from("<6f", data, at + 8 + 72))
+        at += 8 + size
+    assert at == len(data)
+    corners = np.array(corners, np.float32)
+    return corners[:, :3].min(0), corners[:, 3:].max(0)
 
 
 def test_without_a_mesh():
@@ -100,7 +125,7 @@ def test_islands_by_index_and_by_point(islands):
 
 
 def test_a_step_slides_or_stops_at_a_wall(room):
-    high = room.get_bounds()[1]
+    high = walls(room)[1]
     slid = room.try_step([5, 0, 5], np.array([6, 0, 8]))
     cut = room.try_step_no_sliding(Vector3(5, 0, 5), [6, 0, 8])
     assert (
@@ -113,7 +138,7 @@ def test_a_step_slides_or_stops_at_a_wall(room):
 
 
 def test_walls(room):
-    low = room.get_bounds()[0]
+    low = walls(room)[0]
     assert room.distance_to_closest_obstacle([1.0, 0, 3]) == pytest.approx(1 - low.x, abs=1e-4)
     assert room.distance_to_closest_obstacle([5, 0, 3], max_search_radius=0.5) == 0.5
     hit = room.closest_obstacle_surface_point([1.0, 0, 3])
@@ -141,10 +166,37 @@ def test_paths(room, islands):
 def test_a_map_has_the_shape_of_habitats(room):
     low, high = room.get_bounds()
     view = room.get_topdown_view(0.1, 0.0)
-    assert (
-        view.dtype == bool and view.shape == (int((high.z - low.z) / 0.1), int((high.x - low.x) / 0.1)) and view.all()
-    )
-    assert not room.get_topdown_view(0.1, 1.0).any() and room.get_topdown_view(0.1, 1.0, eps=1.2).all()
+    assert view.dtype == bool and view.shape == (int((high.z - low.z) / 0.1), int((high.x - low.x) / 0.1))
+    # Cells are looked up at their corners, and the surface within a centimetre.
+    z, x = (low[k] + 0.1 * np.arange(n) for k, n in ((2, view.shape[0]), (0, view.shape[1])))
+    first, last = walls(room)
+
+    def within(margin):
+        inside = [(v >= first[k] - margin) & (v <= last[k] + margin) for k, v in ((2, z), (0, x))]
+        return np.outer(*inside)
+
+    assert view[within(0)].all() and not view[~within(0.011)].any() and not view.all()
+    assert not room.get_topdown_view(0.1, 1.0).any()
+    assert np.array_equal(room.get_topdown_view(0.1, 1.0, eps=1.2), view)
+
+
+@pytest.mark.parametrize("tile_size", [0, 64])
+def test_bounds_are_those_of_the_tiles_and_maps_hold_all_navigable_points(tmp_path, tile_size):
+    finder = finder_of((1000, -3, 1007, 4, 0.5), (1008, 0, 1011, 3, 2.0), tile_size=tile_size)
+    assert finder.save_nav_mesh(str(tmp_path / "a.navmesh"))
+    for _ in range(2):  # As it was built, and as it is read.
+        bounds = finder.get_bounds()
+        for had, want in zip(bounds, headers(tmp_path / "a.navmesh")):
+            assert np.array_equal(np.array(had, np.float32), want)
+        shape = finder.get_topdown_view(0.1, 0.5).shape
+        corners = finder.build_navmesh_vertices()
+        for p in [*corners, *(finder.get_random_navigable_point() for _ in range(200))]:
+            assert all(bounds[0][k] <= p[k] <= bounds[1][k] for k in (0, 2))
+            # The cell as Habitat-Lab's maps.to_grid has it: the box is divided by the cells.
+            row, column = (int((p[k] - bounds[0][k]) / ((bounds[1][k] - bounds[0][k]) / n))
+                           for k, n in ((2, shape[0]), (0, shape[1])))  # fmt: skip
+            assert row < shape[0] and column < shape[1]
+        assert finder.load_nav_mesh(str(tmp_path / "a.navmesh"))
 
 
 def test_settings(tmp_path):

@@ -238,6 +238,9 @@ void bind_mesh(nb::class_<NavMesh>& c) {
           "settings", [](const NavMesh& n) { return n.settings(); },
           "A copy of the settings that the mesh was built with.")
       .def("bounds", &NavMesh::bounds, "Bounding box of the navigable surface, metres.")
+      .def("tile_bounds", &NavMesh::tile_bounds,
+           "Box around the tiles, metres: that of the headers in a .navmesh file, Habitat-Sim's "
+           "get_bounds.")
       .def("polygon_count", &NavMesh::polygon_count, "Number of polygons.")
       .def("navigable_area", &NavMesh::navigable_area, "Area of the surface, square metres.")
       .def("surface", navmesh_surface, nb::arg("island") = nb::none(),

@@ -77,8 +77,9 @@ struct ObstacleHit {
 /// Grid layout of a top-down map.
 enum class TopDownLayout : std::uint8_t {
   centres,  ///< The grid covers the bounds. A cell is tested at its centre.
-  /// Habitat-Sim's get_topdown_view. Partial cells at the end of a row or column are dropped. A cell is
-  /// tested at its corner with the least x and z, with a tolerance of 1 cm on the ground plane.
+  /// Habitat-Sim's get_topdown_view. The grid covers NavMesh::tile_bounds(). Partial cells at the end
+  /// of a row or column are dropped. A cell is tested at its corner with the least x and z, with a
+  /// tolerance of 1 cm on the ground plane.
   habitat,
 };
 
@@ -192,6 +193,9 @@ class NavMesh {
   const NavMeshSettings& settings() const noexcept;
   /// Bounding box of the navigable surface, metres.
   Aabb<double> bounds() const noexcept;
+  /// Box around the tiles, metres: that of the headers in a .navmesh file, Habitat-Sim's get_bounds.
+  /// Settings of Recast such as agent_radius leave a margin between it and bounds().
+  Aabb<double> tile_bounds() const noexcept;
   /// Number of polygons.
   std::size_t polygon_count() const noexcept;
   /// Area of the surface, m².
