@@ -87,7 +87,7 @@ class LodCells {
 struct LeveledScene {
   /// Data of one asset.
   struct Asset {
-    const LodTree* tree;                         ///< Level-of-detail tree. Null: no levels of levels.
+    const LodTree* tree;                         ///< Level-of-detail tree. Null: no levels of detail.
     const GaussianCloud* cloud;                  ///< The Gaussians.
     Similarity world_from_asset;                 ///< Transform from the asset's frame to the world.
     GaussianRows cloud_there{}, merged_there{};  ///< Arrays of `cloud` and of the tree in the backend's
@@ -97,7 +97,7 @@ struct LeveledScene {
         nullptr;  ///< `visible->bits` in the backend's own memory. Null if it uses host memory.
   };
   std::vector<Asset> assets;  ///< In the order of the scene's sets. Empty: draw all assets whole.
-  LodChoice choice{};         ///< Settings of the levels of levels. Without hysteresis.
+  LodChoice choice{};         ///< Settings of the levels of detail. Without hysteresis.
   std::shared_ptr<LodCells> cells = std::make_shared<LodCells>();  ///< Cuts found so far.
 };
 
