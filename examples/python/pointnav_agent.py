@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from pointnav_curves import plot
 from pointnav_worlds import ACTIONS, LEFT, RIGHT, device_of
 from torch import Tensor, nn
 
@@ -178,17 +179,6 @@ def write_log(out: pathlib.Path, log: list[dict[str, float]]) -> None:
         writer.writeheader()
         writer.writerows(log)
     try:
-        import matplotlib
+        plot({"": log}, (("success", "spl"), ("reward", "entropy")), out / "curves.png")
     except ImportError:
         print("curves.png needs matplotlib, and is left out: pip install matplotlib", file=sys.stderr)
-        return
-    matplotlib.use("agg")
-    from matplotlib import pyplot
-    figure, axes = pyplot.subplots(1, 2, figsize=(10, 4))
-    frames = [row["frames"] for row in log]
-    for axis, names in zip(axes, (("success", "spl"), ("reward", "entropy"))):
-        for name in names:
-            axis.plot(frames, [row[name] for row in log], label=name)
-        axis.set_xlabel("environment steps"), axis.legend(), axis.grid(True)
-    figure.savefig(out / "curves.png", dpi=100)
-    pyplot.close(figure)

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Curves of several training runs in one picture."""
+
+import pathlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+FOLDER = pathlib.Path(__file__).parents[3] / "examples" / "python"
+
+
+def run(*words):
+    return subprocess.run([sys.executable, FOLDER / "pointnav_curves.py", *words], capture_output=True, text=True)
+
+
+def log_of(folder, spl):
+    folder.mkdir()
+    rows = [f"{i},{100 * (i + 1)},{value}" for i, value in enumerate(spl)]
+    (folder / "log.csv").write_text("\n".join(["update,frames,spl", *rows]))
+    return folder / "log.csv"
+
+
+def test_curves_are_moving_means_of_each_run(tmp_path, monkeypatch):
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    monkeypatch.syspath_prepend(FOLDER)
+    monkeypatch.setattr(pyplot, "close", lambda figure: None)
+    import pointnav_curves
+
+    runs = {n: np.random.default_rng(i).random(20).tolist() for i, n in enumerate(("meshes", "both"))}
+    logs = [log_of(tmp_path / name, spl) for name, spl in runs.items()]
+    monkeypatch.setattr(sys, "argv", ["curves", *map(str, logs), "--metrics", "spl", "--mean", "4",
+                                      "--out", str(tmp_path / "out.png")])
+    pointnav_curves.main()
+    lines = {line.get_label(): line.get_xydata() for line in pyplot.gcf().axes[0].lines}
+    assert set(lines) == set(runs)
+    for name, spl in runs.items():
+        np.testing.assert_allclose(lines[name][:, 1], np.convolve(spl, np.full(4, 0.25), "valid"))
+        np.testing.assert_allclose(lines[name][:, 0], np.arange(400, 2001, 100))
+    assert (tmp_path / "out.png").read_bytes()[:4] == b"\x89PNG"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["both", "meshes", "out.png"]
+
+
+def test_errors_name_the_file_and_the_field(tmp_path):
+    good, word = log_of(tmp_path / "good", [0.5] * 12), log_of(tmp_path / "word", [0.5, "high"])
+    empty = log_of(tmp_path / "empty", [])
+    for words, text in [((good,), "has no column success"), ((word, "--metrics", "spl"), "row 2: spl is 'high'"),
+                        ((empty,), "has no rows"), ((tmp_path / "none.csv",), "No such file"),
+                        ((good, "--metrics", "spl", "--mean", "13"), "--mean is 13"),
+                        ((good, "--metrics", "spl", "--mean", "0"), "--mean is 0")]:
+        tried = run(*words)
+        assert tried.returncode == 1 and text in tried.stderr and "Traceback" not in tried.stderr, tried.stderr
