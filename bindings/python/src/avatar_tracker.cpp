@@ -187,17 +187,21 @@ void bind_avatar_tracker(nb::module_& m) {
            "Walks from a point towards another during [t0, t1], seconds, and stops at walls and people. "
            "Returns the position that is reached, shape [3]: `start` if it is off the NavMesh. "
            "Equal points let the agent stand.")
-      .def("set_capsules", &A::set_capsules, nb::arg("capsules"),
+      .def("set_capsules", &A::set_capsules, nb::arg("capsules"), nb::call_guard<ReleaseGil>(),
            "Adds capsules that stand still, rows of x0, y0, z0, x1, y1, z1, radius in metres. They "
            "replace those of the last call, and count as one person more. Raises InvalidArgument for a "
            "value that is not finite or a negative radius.")
       .def(
           "capsules",
           [](const A& a, double time, std::optional<std::uint32_t> person) {
-            const auto rows = a.capsules(time, person);
+            std::vector<std::array<double, 7>> rows;
+            {
+              const ReleaseGil release;
+              rows = a.capsules(time, person);
+            }
             const std::size_t count = rows.size();
-            return array_copy(std::span(count > 0 ? rows.front().data() : nullptr, 7 * count),
-                              {count, 7});
+            const double* const first = count > 0 ? rows.front().data() : nullptr;
+            return array_copy(std::span(first, 7 * count), {count, 7});
           },
           nb::arg("time"), nb::arg("person") = nb::none(),
           nb::sig("def capsules(self, time: float, person: int | None = None) -> "
@@ -213,7 +217,7 @@ void bind_avatar_tracker(nb::module_& m) {
            nb::arg("slide") = true, nb::arg("radius") = -1.0, nb::arg("height") = -1.0,
            nb::call_guard<ReleaseGil>(),
            "Whether a person who stands as at a time would stop or deflect a move.")
-      .def("metrics", &A::metrics,
+      .def("metrics", &A::metrics, nb::call_guard<ReleaseGil>(),
            "Metrics of the actions since reset(). Those of a goal are 0, because there is none.")
       .def_prop_ro("action_clearance", &A::action_clearance,
                    "Smallest distance to a person in this action, metres.")

@@ -65,7 +65,7 @@ void bind_metrics(nb::module_& m) {
       .done();
   m.def(
       "summarize", [](const std::vector<EpisodeMetrics>& e) { return summarize(e); },
-      nb::arg("episodes"), "Means over episodes. All values are 0 if there are none.");
+      nb::arg("episodes"), Release(), "Means over episodes. All values are 0 if there are none.");
 }
 
 void bind_generation(nb::module_& m) {

@@ -46,26 +46,29 @@ std::shared_ptr<NavMesh> build_navmesh(NavMeshSettings settings, nb::handle vert
                                        nb::handle triangles, int threads, const nb::object& progress) {
   const auto v = rows_of_three<double>(vertices, "vertices", "f", "float64");
   const auto t = rows_of_three<std::uint32_t>(triangles, "triangles", "iu", "uint32");
+  const auto stopping = stopping_progress(progress);
+  const ReleaseGil release;
   std::vector<Vec3d> points(v.shape(0));
   for (std::size_t i = 0; i < points.size(); ++i) points[i] = {v(i, 0), v(i, 1), v(i, 2)};
   std::vector<NavMesh::Triangle> faces(t.shape(0));
   for (std::size_t i = 0; i < faces.size(); ++i) faces[i] = {t(i, 0), t(i, 1), t(i, 2)};
-  const auto stopping = stopping_progress(progress);
-  const ReleaseGil release;
   return std::make_shared<NavMesh>(NavMesh::build(settings, points, faces, threads, stopping).value());
 }
 
 nb::tuple navmesh_surface(const NavMesh& mesh, std::optional<std::size_t> island) {
-  NavMeshTriangles surface;
+  std::vector<double> numbers;
+  std::vector<std::uint32_t> indices;
   {
     const ReleaseGil release;
-    surface = mesh.surface(island);
+    const NavMeshTriangles surface = mesh.surface(island);
+    numbers.reserve(3 * surface.vertices.size());
+    for (const Vec3d& p : surface.vertices) numbers.insert(numbers.end(), {p.x, p.y, p.z});
+    indices.reserve(3 * surface.triangles.size());
+    for (const auto& t : surface.triangles) indices.insert(indices.end(), t.begin(), t.end());
   }
-  std::vector<std::uint32_t> indices;
-  indices.reserve(3 * surface.triangles.size());
-  for (const auto& t : surface.triangles) indices.insert(indices.end(), t.begin(), t.end());
-  return nb::make_tuple(point_array(surface.vertices),
-                        array_from(std::move(indices), {surface.triangles.size(), 3}));
+  const std::size_t points = numbers.size() / 3, triangles = indices.size() / 3;
+  return nb::make_tuple(array_from(std::move(numbers), {points, 3}),
+                        array_from(std::move(indices), {triangles, 3}));
 }
 
 }  // namespace gsnav::python

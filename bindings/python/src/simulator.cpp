@@ -170,7 +170,7 @@ void bind_state(nb::class_<PythonSimulator>& c) {
             locked(p, "Simulator.set_agent",
                    [&](Simulator& s) { s.set_agent(position, yaw, pitch).throw_if_error(); });
           },
-          nb::arg("position"), nb::arg("yaw"), nb::arg("pitch") = 0.0,
+          nb::arg("position"), nb::arg("yaw"), nb::arg("pitch") = 0.0, nb::call_guard<ReleaseGil>(),
           "Moves the agent. Position in metres, angles in radians. Raises NothingNavigable if the "
           "position "
           "is off the NavMesh, InvalidArgument if a value is not finite.")
