@@ -62,7 +62,7 @@ nb::object observe(PythonBatch& batch, const char* what, nb::handle meanwhile, c
     b.begun = true;
     try {
       made = nb::cast(step_arrays(s, b, batch.owner, unfilled));
-      if (!meanwhile.is_none()) call_python(nb::borrow(meanwhile), made);
+      if (!meanwhile.is_none()) meanwhile(made);
       if (dropped && unfilled.empty()) made.reset();
       return {};
     } catch (const std::exception&) {

@@ -15,7 +15,7 @@ EpisodeSource episode_source(std::shared_ptr<PythonSource> source) {
         const std::string call =
             "next_episode(" + std::to_string(environment) + ", " + std::to_string(count) + ")";
         try {
-          const nb::object made = call_python(source->function, environment, count);
+          const nb::object made = source->function(environment, count);
           BatchEpisode episode;
           if (nb::try_cast(made, episode, false)) return episode;
           if (nb::try_cast(made, episode.episode, false)) return episode;

@@ -2,38 +2,12 @@
 #pragma once
 
 #include <nanobind/nanobind.h>
-#include <unistd.h>
 
-#include <exception>
 #include <type_traits>
 
 namespace gsnav::python {
 
-/// Calls f, which takes the GIL. Python before 3.14 ends a thread that asks for the GIL at exit, by
-/// unwinding its stack. That would abort the process where it meets a noexcept function, so the thread
-/// sleeps until the process ends, as it does in later versions.
-template <class F>
-void take_gil(const F& f) noexcept {
-  try {
-    f();
-  } catch (...) {
-    for (;;) pause();
-  }
-}
-
-/// Calls a Python function from a function of C++ that called back, while the GIL is held. A thread that
-/// Python ends at exit inside the function sleeps, as in take_gil. Such an end is no std::exception,
-/// while all exceptions of the call are.
-template <class... Args>
-nanobind::object call_python(const nanobind::object& function, const Args&... args) {
-  try {
-    return function(args...);
-  } catch (const std::exception&) {
-    throw;
-  } catch (...) {
-    for (;;) pause();
-  }
-}
+// A thread that waits for the GIL when Python ends sleeps until the process ends (python_calls.cpp).
 
 /// Releases the GIL while it lives.
 class ReleaseGil {
@@ -41,9 +15,7 @@ class ReleaseGil {
   ReleaseGil() noexcept : state_(PyEval_SaveThread()) {}
   ReleaseGil(const ReleaseGil&) = delete;
   ReleaseGil& operator=(const ReleaseGil&) = delete;
-  ~ReleaseGil() {
-    take_gil([this] { PyEval_RestoreThread(state_); });
-  }
+  ~ReleaseGil() { PyEval_RestoreThread(state_); }
 
  private:
   PyThreadState* state_;
@@ -62,15 +34,13 @@ auto without_gil(R (C::*f)(A...) const) {
 /// Holds the GIL while it lives.
 class HoldGil {
  public:
-  HoldGil() noexcept {
-    take_gil([this] { state_ = PyGILState_Ensure(); });
-  }
+  HoldGil() noexcept : state_(PyGILState_Ensure()) {}
   HoldGil(const HoldGil&) = delete;
   HoldGil& operator=(const HoldGil&) = delete;
   ~HoldGil() { PyGILState_Release(state_); }
 
  private:
-  PyGILState_STATE state_{};
+  PyGILState_STATE state_;
 };
 
 }  // namespace gsnav::python

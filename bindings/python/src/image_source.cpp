@@ -18,7 +18,7 @@ ImageSource image_source(std::shared_ptr<PythonImageSource> source, const Device
     const std::string call =
         "image_source(" + std::to_string(sensor) + ", " + std::to_string(floats) + ")";
     try {
-      const nb::object made = call_python(source->function, sensor, floats);
+      const nb::object made = source->function(sensor, floats);
       AnyArray<nb::ndarray<float, nb::c_contig>> array;
       if (!nb::try_cast(made, array, false)) {
         return {Errc::invalid_argument,

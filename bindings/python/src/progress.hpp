@@ -14,7 +14,7 @@ inline std::function<void(double)> stopping_progress(const nb::object& progress)
   return [&progress](double share) {
     const HoldGil gil;
     if (PyErr_CheckSignals() != 0) throw nb::python_error();
-    if (!progress.is_none()) call_python(progress, share);
+    if (!progress.is_none()) progress(share);
   };
 }
 

@@ -80,7 +80,7 @@ OpenedScene open(nb::handle named, OpenOptions options, const nb::object& progre
     if (PyErr_CheckSignals() != 0) throw nb::python_error();
     if (progress.is_none()) return;
     try {
-      call_python(progress, task, share);
+      progress(task, share);
     } catch (nb::python_error& e) {
       if (!e.matches(PyExc_Exception)) throw;  // Such as Ctrl-C.
       e.discard_as_unraisable("gsnav.open_scene: progress");
