@@ -7,7 +7,8 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-LONGEST = 80
+LONGEST = 80  # characters of a value
+MOST = 12  # values of a message
 
 
 def short(value: Any) -> str:
@@ -48,18 +49,49 @@ def positional(signature: str) -> list[str]:
     return names
 
 
-def explained(function: Any, arguments: Sequence[Any], keywords: Sequence[str], text: str) -> str:
+def owner_of(function: Any) -> tuple[Any, str]:
+    """The class that has a method or a property with this function, and the name in it; None and "" without."""
+    from . import _gsnav
+
+    for owner in vars(_gsnav).values():
+        for name, value in vars(owner).items() if isinstance(owner, type) else ():
+            if any(f is function for f in (value, getattr(value, "fget", None), getattr(value, "fset", None))):
+                return owner, name
+    return None, ""
+
+
+def about_self(owner: type, name: str, given: Any, made: bool | None) -> str:
+    """The mistake in the first argument of a method, or ""."""
+    if not isinstance(given, owner):
+        return f"{owner.__name__}.{name}: expected a {owner.__name__} as self, got {short(given)}"
+    if name in ("__init__", "__setstate__"):
+        again = f"{owner.__name__}.{name}: this object has been made already; make another {owner.__name__}"
+        return again if made else ""
+    if made is False:
+        return f"{owner.__name__}.{name}: __init__ of this {owner.__name__} has not been called"
+    return ""
+
+
+def explained(function: Any, arguments: Sequence[Any], keywords: Sequence[str], text: str, made: bool | None) -> str:
     """The message for a call. It has the values of the arguments and the signatures of the function.
 
-    arguments: all values, those of `keywords` last. text: nanobind's message, which has the signatures.
+    arguments: all values, those of `keywords` last. text: nanobind's message, which has the signatures. made: whether
+    the first argument, an object of this module, has been made by __init__; None if it is no such object.
     """
     signatures = re.findall(r"^    \d+\. (.*)$", text, re.MULTILINE)
     names = max((positional(s) for s in signatures), key=len, default=[])
     first = names[:1] == ["self"]  # number of arguments that the caller does not write
     unnamed = len(arguments) - len(keywords)
     names += [f"argument {i + 1 - first}" for i in range(len(names), unnamed)]
+    owner, name = owner_of(function)
+    if first and owner is not None and unnamed > 0:
+        wrong = about_self(owner, name, arguments[0], made)
+        if wrong:
+            return wrong
     given = [*zip(names, arguments[:unnamed]), *zip(keywords, arguments[unnamed:])][first:]
-    values = ", ".join(f"{name} = {short(value)}" for name, value in given) or "no arguments"
+    values = ", ".join(f"{name[:LONGEST]} = {short(value)}" for name, value in given[:MOST]) or "no arguments"
+    if len(given) > MOST:
+        values += f" and {len(given) - MOST} more"
     wanted = " or ".join(f"({', '.join(parts(s)[first:])})" for s in signatures).replace("gsnav._gsnav.", "")
-    name = function.__qualname__ or text.split("(", 1)[0]  # A setter has no name.
-    return f"{name.removesuffix('.__init__')}: got {values}; expected {wanted}"
+    full = f"{owner.__name__}.{name}" if owner is not None else function.__qualname__
+    return f"{full.removesuffix('.__init__')}: got {values}; expected {wanted}"

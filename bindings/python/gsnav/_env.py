@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _task
+from ._call_errors import short
 from ._errors import ClosedEnvironment, InvalidArgument
 from ._gsnav import (
     Device,
@@ -106,7 +107,7 @@ class Env(BaseEnv):
         simulator = self.simulator
         action = _task.from_dlpack(action, "Env.step: action")
         if isinstance(action, (bool, np.bool_)) or action not in self.action_space:
-            raise InvalidArgument(f"Env.step: action {action!r}: use an integer from 0 (stop) to 3 (turn right)")
+            raise InvalidArgument(f"Env.step: action {short(action)}: use an integer from 0 (stop) to 3 (turn right)")
         seen = simulator.step(int(action))
         info = _task.info_dict(seen.info)
         terminated = truncated = False

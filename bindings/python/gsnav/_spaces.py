@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ._call_errors import short
+
 if TYPE_CHECKING:
     HAVE_GYMNASIUM = True
 else:
@@ -36,7 +38,7 @@ if TYPE_CHECKING or not HAVE_GYMNASIUM:
     def make_generator(seed: int | None = None) -> tuple[np.random.Generator, int]:
         """A generator with the numbers of Gymnasium's for the same seed, and the seed."""
         if seed is not None and (isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0):
-            raise ValueError(f"seed = {seed!r}: use an integer >= 0")
+            raise ValueError(f"seed = {short(seed)}: use an integer >= 0")
         sequence = np.random.SeedSequence(seed)
         entropy: Any = sequence.entropy
         return np.random.Generator(np.random.PCG64(sequence)), int(entropy)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from . import _memory
+from ._call_errors import short
 from ._errors import InvalidArgument, OutOfMemory
 from ._gsnav import (
     BatchEpisode,
@@ -65,7 +66,7 @@ def from_dlpack(value: Any, what: str) -> Any:
 def count(value: Any, what: str, least: int = 0) -> int:
     """An integer of at least `least`. A bool is none."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
-        raise TypeError(f"{what}: expected an integer, got {value!r}")
+        raise TypeError(f"{what}: expected an integer, got {short(value)}")
     if value < least:
         raise InvalidArgument(f"{what} = {value}: must be at least {least}")
     return int(value)
@@ -79,20 +80,20 @@ def checked_seed(seed: Any, what: str = "seed") -> int | None:
 def function(value: Any, what: str) -> None:
     """Raises TypeError if a value cannot be called."""
     if not callable(value):
-        raise TypeError(f"{what}: expected a function, got {value!r}")
+        raise TypeError(f"{what}: expected a function, got {short(value)}")
 
 
 def known(names: Iterable[str], present: Mapping[str, Any], what: str) -> None:
     """Raises InvalidArgument for a name that is not there."""
     for name in names:
         if name not in present:
-            raise InvalidArgument(f"{what}: there is no {name!r}; there are {', '.join(present)}")
+            raise InvalidArgument(f"{what}: there is no {short(name)}; there are {', '.join(present)}")
 
 
 def names(value: Any, what: str) -> list[str]:
     """A list of names."""
     if isinstance(value, str) or not isinstance(value, Iterable):
-        raise TypeError(f"{what}: expected a sequence of names, got {value!r}")
+        raise TypeError(f"{what}: expected a sequence of names, got {short(value)}")
     return list(value)
 
 
@@ -101,7 +102,7 @@ def option(options: Any, name: str) -> Any:
     if options is None:
         return None
     if not isinstance(options, Mapping):
-        raise TypeError(f"options: expected a dict or None, got {options!r}")
+        raise TypeError(f"options: expected a dict or None, got {short(options)}")
     return options.get(name)
 
 
@@ -125,7 +126,7 @@ def checked(value: Any, kinds: type | tuple[type, ...], what: str) -> None:
     kinds = kinds if isinstance(kinds, tuple) else (kinds,)
     if not isinstance(value, kinds):
         names = ["None" if kind is type(None) else kind.__name__ for kind in kinds]
-        raise TypeError(f"{what}: expected {' or '.join(names)}, got {value!r}")
+        raise TypeError(f"{what}: expected {' or '.join(names)}, got {short(value)}")
 
 
 def settings(config: Any) -> SimulatorConfig:
@@ -138,7 +139,7 @@ def scene_of(scene: Scene, config: SimulatorConfig) -> SimulatorScene:
     """The scene with a NavMesh. A name is opened, and a NavMesh is built for the agent if none is there."""
     if isinstance(scene, (str, os.PathLike)):
         if "\0" in str(os.fspath(scene)):
-            raise InvalidArgument(f"scene = {scene!r}: no name of a file has the character 0")
+            raise InvalidArgument(f"scene = {short(scene)}: no name of a file has the character 0")
         options = OpenOptions(navmesh="auto", agent_radius=config.task.agent_radius,
                               agent_height=config.task.agent_height)
         scene = open_scene(scene, options)
@@ -211,7 +212,7 @@ def action_space() -> Discrete:
 def rgb_sensor(config: SimulatorConfig, render_mode: str | None) -> str:
     """Name of the sensor whose image `render` returns."""
     if render_mode is not None and (not isinstance(render_mode, str) or render_mode != "rgb_array"):
-        raise InvalidArgument(f"render_mode = {render_mode!r}: use None or \"rgb_array\"")
+        raise InvalidArgument(f"render_mode = {short(render_mode)}: use None or \"rgb_array\"")
     names = [s.uuid for s in config.sensors if s.kind == SensorKind.rgb]
     if render_mode is not None and not names:
         raise InvalidArgument("render_mode = \"rgb_array\": add an RGB sensor to config.sensors")
@@ -246,7 +247,7 @@ class Episodes:
         self.given: list[BatchEpisode] | None = None  # Copies of the episodes.
         if episodes is not None:
             if isinstance(episodes, (str, Mapping)) or not isinstance(episodes, Iterable):
-                raise TypeError(f"episodes: expected a sequence of episodes, got {episodes!r}")
+                raise TypeError(f"episodes: expected a sequence of episodes, got {short(episodes)}")
             self.given = [self._checked(e, i) for i, e in enumerate(episodes)]
             if not self.given:
                 raise InvalidArgument("episodes: the list is empty; use None to sample episodes")

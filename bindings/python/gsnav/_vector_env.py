@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _task
+from ._call_errors import short
 from ._errors import ClosedEnvironment, InvalidArgument
 from ._gsnav import (
     AutoReset,
@@ -62,7 +63,7 @@ def checked_mode(mode: Any) -> AutoresetMode:
     try:
         return AutoresetMode(getattr(mode, "value", mode))
     except ValueError as e:
-        raise InvalidArgument(f"autoreset_mode = {mode!r}: use one of {', '.join(AUTO_RESETS)}") from e
+        raise InvalidArgument(f"autoreset_mode = {short(mode)}: use one of {', '.join(AUTO_RESETS)}") from e
 
 
 class VectorEnv(BaseVectorEnv):
@@ -248,13 +249,13 @@ class VectorEnv(BaseVectorEnv):
     @staticmethod
     def _array(actions: Any) -> npt.NDArray[Any]:
         if isinstance(actions, (list, tuple)) and not BOOLS.isdisjoint(map(type, actions)):
-            raise TypeError(f"VectorEnv.step: actions = {actions!r}: a bool is no action; use integers")
+            raise TypeError(f"VectorEnv.step: actions = {short(actions)}: a bool is no action; use integers")
         if isinstance(actions, np.ma.MaskedArray):
             raise TypeError("VectorEnv.step: actions are a masked array: use an array without a mask")
         try:
             return np.asarray(_task.from_dlpack(to_host(actions), "VectorEnv.step: actions"))
         except ValueError as error:
-            raise InvalidArgument(f"VectorEnv.step: actions = {actions!r}: {error}") from error
+            raise InvalidArgument(f"VectorEnv.step: actions = {short(actions)}: {error}") from error
 
     def _observation(self, step: BatchStep) -> Observation:
         made: Observation = {**step.images, **step.on_backend}

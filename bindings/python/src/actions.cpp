@@ -100,8 +100,8 @@ Action action_from(nb::handle value, const char* what) {
   const long action = PyLong_AsLong(index.ptr());
   if (PyErr_Occurred() || action < 0 || action > static_cast<long>(Action::look_down)) {
     drop_mistake();
-    throw Error(Errc::invalid_argument, where + ": action " + text_of(index) +
-                                            " is out of range: use 0 (stop) to 5 (look_down)");
+    throw Error(Errc::invalid_argument,
+                where + ": action " + shown(index) + " is out of range: use 0 (stop) to 5 (look_down)");
   }
   return static_cast<Action>(action);
 }

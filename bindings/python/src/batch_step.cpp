@@ -148,7 +148,7 @@ void bind_step(nb::module_& m) {
                                       .c_str());
             }
             const std::string known = text_of(nb::list(s.images.keys()));
-            throw nb::key_error(("no sensor \"" + uuid + "\"; the sensors are " + known).c_str());
+            throw nb::key_error(("no sensor \"" + cut(uuid) + "\"; the sensors are " + known).c_str());
           },
           nb::arg("uuid"),
           nb::sig("def __getitem__(self, uuid: str) -> numpy.typing.NDArray[numpy.float32]"),

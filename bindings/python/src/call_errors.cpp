@@ -44,9 +44,11 @@ void explain(PyObject* function, PyObject* const* args, std::size_t flagged, PyO
       const std::size_t count = (flagged & 0xFFFF) + (names == nullptr ? 0 : nb::len(nb::handle(names)));
       for (std::size_t i = 0; i < count; ++i) given.append(nb::handle(args[i]));
       const nb::object known = names == nullptr ? nb::object(nb::tuple()) : nb::borrow(names);
+      nb::object made = nb::none();  // Whether __init__ has made the first argument.
+      if (count > 0 && nb::inst_check(args[0])) made = nb::bool_(nb::inst_ready(args[0]));
       const nb::object explained = nb::module_::import_("gsnav._call_errors").attr("explained");
       const nb::object better =
-          explained(nb::borrow(function), given, known, nb::str(text.data(), text.size()));
+          explained(nb::borrow(function), given, known, nb::str(text.data(), text.size()), made);
       PyErr_SetObject(PyExc_TypeError, better.ptr());
       return;
     }
@@ -92,7 +94,9 @@ void mend(nb::handle object) {
 void mend_class(nb::handle type) {
   for (const nb::handle value : nb::object(type.attr("__dict__").attr("values")())) {
     mend(value);
-    if (nb::hasattr(value, "fset")) mend(nb::object(value.attr("fset")));
+    for (const char* of_property : {"fget", "fset"}) {
+      if (nb::hasattr(value, of_property)) mend(nb::object(value.attr(of_property)));
+    }
   }
 }
 

@@ -32,9 +32,8 @@ void set_viewmat(Camera& c, nb::handle value) {
     drop_mistake();
     const std::string text =
         "Camera.viewmat: expected numbers of shape (4, 4) with the last row 0 0 0 1, or of shape (3, "
-        "4), "
-        "got " +
-        text_of(nb::repr(value));
+        "4), got " +
+        shown(value);
     throw nb::value_error(text.c_str());
   }
   for (int i = 0; i < 3; ++i) {

@@ -146,6 +146,18 @@ inline std::string text_of(nb::handle object) {
   return utf8;
 }
 
+/// The start of a text of unknown length, for a message.
+inline std::string cut(std::string text, std::size_t most = 80) {
+  if (text.size() <= most) return text;
+  while (most > 0 && (static_cast<unsigned char>(text[most]) & 0xC0) == 0x80) --most;
+  return text.substr(0, most) + "...";
+}
+
+/// The value as short text, for a message.
+inline std::string shown(nb::handle value) {
+  return text_of(nb::module_::import_("gsnav._call_errors").attr("short")(value));
+}
+
 /// A new numpy array of these numbers, shape [count]. Null, with an exception set, if it fails.
 inline nb::object number_array(const double* numbers, std::size_t count) noexcept {
   try {

@@ -77,8 +77,7 @@ inline std::string type_of(nb::handle object) {
 /// The exception for a field that was given a value of another type.
 inline nb::builtin_exception wrong_type(const std::string& name, const std::string& field,
                                         const std::string& type, nb::handle value) {
-  return nb::type_error(
-      (name + "." + field + ": expected " + type + ", got " + text_of(nb::repr(value))).c_str());
+  return nb::type_error((name + "." + field + ": expected " + type + ", got " + shown(value)).c_str());
 }
 
 /// Adds a property for a member of type V. `type` names what it takes in `name`.`field`.
@@ -213,7 +212,7 @@ class Struct {
       }
       if (found == nullptr) {
         throw nb::type_error(
-            (name + " has no field \"" + wanted + "\". Its fields are " + known).c_str());
+            (name + " has no field \"" + cut(wanted) + "\". Its fields are " + known).c_str());
       }
       if (!found->set(made, value)) throw wrong_type(name, wanted, found->type, value);
     }

@@ -84,7 +84,7 @@ void bind_observations(nb::module_& m) {
          const nb::str key(uuid.data(), uuid.size());
          if (o.images.contains(key)) return o.images[key];
          const std::string known = text_of(nb::list(o.images.keys()));
-         throw nb::key_error(("no sensor \"" + uuid + "\"; the sensors are " + known).c_str());
+         throw nb::key_error(("no sensor \"" + cut(uuid) + "\"; the sensors are " + known).c_str());
        },
        nb::arg("uuid"),
        nb::sig("def __getitem__(self, uuid: str) -> numpy.typing.NDArray[numpy.float32]"),

@@ -22,14 +22,14 @@ def functions():
     """All functions of the compiled module, setters of properties included."""
     for owner in [_gsnav, *(c for c in vars(_gsnav).values() if inspect.isclass(c))]:
         for name, value in vars(owner).items():
-            for function in (value, getattr(value, "fset", None)):
+            for function in (value, getattr(value, "fget", None), getattr(value, "fset", None)):
                 if type(function).__name__ in ("nb_func", "nb_method"):
                     yield f"{owner.__name__}.{name}", function
 
 
 def test_no_function_gives_the_error_of_nanobind():
     names = [name for name, function in functions() if not complaint(function)]
-    assert len(list(functions())) > 300 and not names, names
+    assert len(list(functions())) > 500 and not names, names
 
 
 def complaint(function):
@@ -57,6 +57,68 @@ def test_arguments_and_values_are_named(call, words):
     with pytest.raises(TypeError) as raised:
         call()
     assert all(word in str(raised.value) for word in words), str(raised.value)
+
+
+TASK, POINT = gsnav.TaskConfig, (5, 0, 4)
+
+
+@pytest.mark.parametrize("call, message", [
+    (lambda: TASK.max_steps.fget(3), "TaskConfig.max_steps: expected a TaskConfig as self, got 3"),
+    (lambda: TASK.max_steps.fset(3, 4), "TaskConfig.max_steps: expected a TaskConfig as self, got 3"),
+    (lambda: gsnav.NavMesh.settings.fget(None), "NavMesh.settings: expected a NavMesh as self, got None"),
+    (lambda: gsnav.NavMesh.snap_point(5, POINT), "NavMesh.snap_point: expected a NavMesh as self, got 5"),
+    (lambda: gsnav.NavMesh.snap_point(), "NavMesh.snap_point: got no arguments; expected (point: "),
+    (lambda: gsnav.Renderer.__init__(5, "serial"), "Renderer.__init__: expected a Renderer as self, got 5"),
+])
+def test_a_wrong_self_is_named(call, message):
+    with pytest.raises(TypeError) as raised:
+        call()
+    assert str(raised.value).startswith(message), str(raised.value)
+
+
+@pytest.mark.filterwarnings("ignore:nanobind")
+def test_an_object_that_init_has_not_made():
+    for use in (lambda mesh: mesh.snap_point(POINT), lambda mesh: mesh.settings):
+        with pytest.raises(TypeError, match="^NavMesh.[a-z_]*: __init__ of this NavMesh has not been called$"):
+            use(gsnav.NavMesh.__new__(gsnav.NavMesh))
+
+
+@pytest.mark.filterwarnings("ignore:nanobind")
+def test_an_object_is_made_once(people):
+    pose, renderer = gsnav.AgentPose(yaw=1.0), gsnav.Renderer("serial", people)
+    for again in (lambda: pose.__init__(yaw=2.0), lambda: pose.__setstate__({"yaw": 2.0}),
+                  lambda: renderer.__init__("serial", people)):
+        with pytest.raises(TypeError, match="^(AgentPose|Renderer).*: this object has been made already; make another"):
+            again()
+    assert pose.yaw == 1.0 and renderer.render(gsnav.Camera()).rgb.shape == (256, 256, 3)
+
+
+TEXT, NUMBERS = "x" * 10**7, [1.5] * 10**6
+
+
+@pytest.mark.parametrize("call", [
+    lambda envs: gsnav.load_navmesh(NUMBERS), lambda envs: gsnav.Renderer("serial", TEXT), lambda envs: TASK(TEXT),
+    lambda envs: TASK(max_steps=TEXT), lambda envs: setattr(TASK(), "max_steps", NUMBERS),
+    lambda envs: TASK(**{TEXT: 1}),
+    lambda envs: gsnav.load_navmesh(TEXT), lambda envs: gsnav.load_navmesh(path=1, **{TEXT: 1}),
+    lambda envs: gsnav.load_navmesh(*range(10**5)),
+    lambda envs: gsnav.load_navmesh(**{f"k{i}": i for i in range(10**4)}),
+    lambda envs: gsnav.Device.parse(TEXT), lambda envs: setattr(gsnav.Camera(), "viewmat", NUMBERS),
+    lambda envs: gsnav.open_scene(TEXT), lambda envs: gsnav.OpenOptions(up=NUMBERS),
+    lambda envs: gsnav.AgentPose(yaw=TEXT), lambda envs: envs.simulator.step([10**4000] * 2),
+    lambda envs: gsnav.open_scene("default", gsnav.OpenOptions(up=TEXT)),
+    lambda envs: gsnav.SensorSpec(uuid=NUMBERS), lambda envs: envs.reset(options=NUMBERS), lambda envs: envs.step(TEXT),
+    lambda envs: envs.reset(seed=TEXT), lambda envs: envs.step(NUMBERS), lambda envs: gsnav.VectorEnv(TEXT),
+    lambda envs: gsnav.VectorEnv(2, TEXT), lambda envs: gsnav.VectorEnv(2, autoreset_mode=TEXT),
+    lambda envs: gsnav.VectorEnv(2, episodes=NUMBERS), lambda envs: gsnav.VectorEnv(2, render_mode=TEXT),
+    lambda envs: envs.simulator.step([1, 1])[TEXT], lambda envs: gsnav.Env(device=TEXT),
+])
+def test_a_long_argument_gives_a_short_message(call, people, small):
+    envs = gsnav.VectorEnv(2, people, config=small)
+    envs.reset(seed=1)
+    with pytest.raises((TypeError, ValueError, KeyError, IndexError, OSError)) as raised:
+        call(envs)
+    assert 0 < len(str(raised.value)) < 3000
 
 
 def test_a_value_without_text_is_named_by_its_type():
