@@ -99,7 +99,10 @@ class PeoplePart:
             return None
         now = self._clock.gaussian_time
         later = now + (seconds if self._clock.gaussian_auto_play else 0.0)
-        return tracker.move(_triple(start), _triple(end), now, later, bool(self.config.sim_cfg.allow_sliding))
+        start, end = _triple(start), _triple(end)
+        connected = self.pathfinder._connected(start, end)
+        at = tracker.move(start, end if connected else start, now, later, bool(self.config.sim_cfg.allow_sliding))
+        return at if connected else start  # As PathFinder.try_step.
 
     def _stand_people(self, seconds: float, agent_ids: Any) -> None:
         for agent_id in agent_ids:
@@ -128,7 +131,10 @@ class PeoplePart:
         self, agent_base_pos: Any, agent_radius: float = -1.0, agent_height: float = -1.0
     ) -> float:
         """Distance from the surface of an agent at a position to the nearest person, negative in overlap, infinite
-        without people. A size that is not positive is that of the default agent."""
+        without people. A size that is not positive is that of the default agent. Raises ValueError naming a number
+        that is not finite."""
+        _check_finite("distance_to_avatar_proxy_capsules", agent_base_pos=agent_base_pos, agent_radius=agent_radius,
+                      agent_height=agent_height)  # fmt: skip
         tracker = self._tracker(self.config.sim_cfg.default_agent_id)
         if tracker is None:
             return math.inf
@@ -139,7 +145,9 @@ class PeoplePart:
         agent_height: float = -1.0, block_eps: float = 1e-5,
     ) -> bool:  # fmt: skip
         """Whether a person, standing as now, would stop or deflect a move. The contact is exact: `block_eps` has no
-        effect."""
+        effect. Raises ValueError naming a number that is not finite."""
+        _check_finite("is_step_blocked_by_avatar_proxy_capsules", start=start, end=end, agent_radius=agent_radius,
+                      agent_height=agent_height)  # fmt: skip
         tracker = self._tracker(self.config.sim_cfg.default_agent_id)
         if tracker is None:
             return False
@@ -194,6 +202,12 @@ class PeoplePart:
     def gaussian_interval(self) -> tuple[float, float]:
         """gaussian_time_min and gaussian_time_max, seconds."""
         return self._clock.gaussian_time_min, self._clock.gaussian_time_max
+
+
+def _check_finite(method: str, **values: Any) -> None:
+    for name, value in values.items():
+        if not np.isfinite(np.asarray(value, dtype=np.float64)).all():
+            raise ValueError(f"Simulator.{method}: {name} = {value}: must be finite")
 
 
 def _setting(name: str) -> property:

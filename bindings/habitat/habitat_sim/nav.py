@@ -268,8 +268,12 @@ class PathFinder:
     def get_random_navigable_point_near(
         self, circle_center: Any, radius: float, max_tries: int = 100, island_index: int = -1
     ) -> Vector3:
-        """Random point within `radius` metres of another, uniform over that part. NaN if it is empty."""
+        """Random point within `radius` metres of another, uniform over that part. NaN if it is empty. The radius may be
+        infinite. Raises ValueError for one that is negative or NaN."""
         mesh = self._need("get_random_navigable_point_near")
+        _check_radius("get_random_navigable_point_near: radius", radius)
+        if math.isinf(radius) and np.isfinite(_triple(circle_center)).all():
+            return self.get_random_navigable_point(max_tries, island_index)
         island = None if island_index < 0 else island_index
         at = mesh.random_point_near(self._random(), _triple(circle_center), radius, island)
         return Vector3(_NAN) if at is None else Vector3(*at.position)
@@ -281,31 +285,43 @@ class PathFinder:
         self._capsules, self._walker = rows, None
 
     def try_step(self, start: Any, end: Any) -> Vector3:
-        """Position after a step that slides along walls. The start is snapped first; where it cannot be, the
-        result is `start`."""
+        """Position after a step that slides along walls. The start is snapped first. The result is `start` where start
+        or end cannot be snapped, and where they snap to two islands."""
         return self._step(start, end, True)
 
     def try_step_no_sliding(self, start: Any, end: Any) -> Vector3:
         """Position after a step that stops at the first wall. The rest is as for try_step."""
         return self._step(start, end, False)
 
+    def _connected(self, start: Any, end: Any) -> bool:
+        """Whether two points snap to one island. Habitat-Sim moves nothing where they do not."""
+        first, last = self._snap(start, -1), self._snap(end, -1)
+        if first is None or last is None:
+            return False
+        return first.poly == last.poly or self._mesh.island_of(first.poly) == self._mesh.island_of(last.poly)
+
     def _step(self, start: Any, end: Any, slide: bool) -> Vector3:
         mesh = self._need("try_step")
+        if not self._connected(start, end):
+            return Vector3(*_triple(start))
         if self._capsules:
             if self._walker is None or self._walker[0] is not mesh:
                 self._walker = mesh, _engine.walker(mesh, self._capsules)
             return Vector3(*self._walker[1].move(_triple(start), _triple(end), 0.0, 0.0, slide))
         at = _engine.library().try_step(mesh, _triple(start), _triple(end), slide)
-        return Vector3(*start) if at is None else Vector3(*at.position)
+        return Vector3(*_triple(start)) if at is None else Vector3(*at.position)
 
     # ---- Walls
     def distance_to_closest_obstacle(self, pt: Any, max_search_radius: float = 2.0) -> float:
-        """Ground distance to the nearest wall in metres, at most `max_search_radius`; infinite off the mesh."""
+        """Ground distance to the nearest wall in metres, at most `max_search_radius`; infinite off the mesh. Raises
+        ValueError for a radius that is negative or NaN."""
+        _check_radius("distance_to_closest_obstacle: max_search_radius", max_search_radius)
         return self._need("distance_to_closest_obstacle").distance_to_closest_obstacle(_triple(pt), max_search_radius)
 
     def closest_obstacle_surface_point(self, pt: Any, max_search_radius: float = 2.0) -> HitRecord:
         """The nearest wall. Without one in reach, the position is NaN and the distance that of
-        distance_to_closest_obstacle."""
+        distance_to_closest_obstacle. Raises ValueError for a radius that is negative or NaN."""
+        _check_radius("closest_obstacle_surface_point: max_search_radius", max_search_radius)
         hit = self._need("closest_obstacle_surface_point").closest_obstacle(_triple(pt), max_search_radius)
         if hit is None:
             return HitRecord([_NAN] * 3, [_NAN] * 3, self.distance_to_closest_obstacle(pt, max_search_radius))
@@ -341,6 +357,11 @@ class PathFinder:
         layout = _engine.library().TopDownLayout.habitat
         grid = self._need("get_topdown_view").top_down_map(height, meters_per_pixel, eps, layout)
         return np.array(grid.islands)
+
+
+def _check_radius(name: str, radius: float) -> None:
+    if not radius >= 0:
+        raise ValueError(f"PathFinder.{name} = {radius}: must be 0 or more metres")
 
 
 def _triple(point: Any) -> list[float]:

@@ -126,15 +126,47 @@ def test_islands_by_index_and_by_point(islands):
 
 def test_a_step_slides_or_stops_at_a_wall(room):
     high = walls(room)[1]
-    slid = room.try_step([5, 0, 5], np.array([6, 0, 8]))
-    cut = room.try_step_no_sliding(Vector3(5, 0, 5), [6, 0, 8])
+    slid = room.try_step([5, 0, 5], np.array([6, 0, 7.5]))
+    cut = room.try_step_no_sliding(Vector3(5, 0, 5), [6, 0, 7.5])
     assert (
         isinstance(slid, Vector3) and slid.x == pytest.approx(6, abs=1e-4) and slid.z == pytest.approx(high.z, abs=1e-4)
     )
-    t = (high.z - 5) / 3
+    t = (high.z - 5) / 2.5
     assert cut.x == pytest.approx(5 + t, abs=1e-4) and cut.z == pytest.approx(high.z, abs=1e-4)
     assert room.try_step([5, 0, 3], [5.25, 0, 3]) == [5.25, slid.y, 3]
     assert room.try_step([50, 0, 3], [51, 0, 3]) == [50, 0, 3]
+
+
+def test_a_step_to_nowhere_or_to_another_island_stays(room, islands):
+    """Ends snap within 2 m on the ground and 4 m in height."""
+    for step in (room.try_step, room.try_step_no_sliding):
+        assert step([5, 0, 3], [11.8, 0, 3]).x == pytest.approx(walls(room)[1].x, abs=1e-4)
+        for end in ([11.9, 0, 3], [5, 4.5, 3], [5, 0, 3e9], [5, 0, math.nan]):
+            assert step([5, 0.25, 3], end) == [5, 0.25, 3]
+    edge = max(v.x for v in islands.build_navmesh_vertices(0))
+    for step in (islands.try_step, islands.try_step_no_sliding):
+        assert step([5, 0, 1], [6.9, 0, 1]).x == pytest.approx(edge, abs=1e-4)
+        assert step([5, 0, 1], [9, 2, 1]) == [5, 0, 1]
+        assert step([9, 2, 1], [9.5, 2, 1]) == [9.5, step([9, 2, 1], [9, 2, 1]).y, 1]
+
+
+def test_radii_out_of_range_are_errors_and_an_infinite_one_is_none(room, islands):
+    for call in (room.distance_to_closest_obstacle, room.closest_obstacle_surface_point):
+        for radius in (-1, -1e-9, math.nan):
+            with pytest.raises(ValueError, match=f"{call.__name__}: max_search_radius = {radius}: must be 0 or more"):
+                call([5, 0, 3], radius)
+    assert room.distance_to_closest_obstacle([5, 0, 3], 0) == 0
+    assert room.distance_to_closest_obstacle([5, 0, 3], math.inf) == pytest.approx(3 - walls(room)[0].z, abs=1e-4)
+    for radius in (-1, math.nan):
+        with pytest.raises(ValueError, match=f"get_random_navigable_point_near: radius = {radius}: must be 0 or more"):
+            room.get_random_navigable_point_near([5, 0, 3], radius)
+    points = [islands.get_random_navigable_point_near([90, 0, 0], math.inf) for _ in range(200)]
+    found = [islands.get_island(p) for p in points]
+    share = islands.island_area(1) / islands.island_area()
+    assert set(found) == {0, 1} and abs(sum(found) / 200 - share) < 4 * math.sqrt(share * (1 - share) / 200)
+    near = islands.get_random_navigable_point_near([90, 0, 0], math.inf, island_index=1)
+    assert near.y == pytest.approx(2, abs=0.05)
+    assert math.isnan(islands.get_random_navigable_point_near([90, 0, math.nan], math.inf).x)
 
 
 def test_walls(room):

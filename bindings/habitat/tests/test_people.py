@@ -51,6 +51,38 @@ def test_distances_shrink_by_the_radius_and_change_with_time(sim):
     assert sim.get_gaussian_avatar_ids() == [0, 1, 2]
 
 
+@pytest.mark.parametrize("wrong", [math.nan, math.inf])
+def test_questions_with_numbers_that_are_not_finite_are_errors(sim, stage, monkeypatch, wrong):
+    monkeypatch.setenv("GSNAV_PEOPLE", "0")
+    with habitat_sim.Simulator(make_cfg({"scene": stage, "width": 8, "height": 8})) as alone:
+        for each in (sim, alone):
+            at = list(each.get_agent(0).get_state().position)
+            off = [at[0], wrong, at[2]]
+            for name, call in (
+                ("agent_base_pos", lambda: each.distance_to_avatar_proxy_capsules(off)),
+                ("agent_radius", lambda: each.distance_to_avatar_proxy_capsules(at, wrong)),
+                ("agent_height", lambda: each.distance_to_avatar_proxy_capsules(at, agent_height=wrong)),
+                ("start", lambda: each.is_step_blocked_by_avatar_proxy_capsules(off, at)),
+                ("end", lambda: each.is_step_blocked_by_avatar_proxy_capsules(at, off)),
+                ("agent_radius", lambda: each.is_step_blocked_by_avatar_proxy_capsules(at, at, True, wrong)),
+            ):
+                with pytest.raises(ValueError, match=f"avatar_proxy_capsules: {name} = .*{wrong}.*: must be finite"):
+                    call()
+
+
+def test_a_long_step_to_nowhere_stays_among_people_too(stage, people, monkeypatch):
+    for count in ("0", "3"):
+        monkeypatch.setenv("GSNAV_PEOPLE", count)
+        config = make_cfg({"scene": stage, "width": 8, "height": 8})
+        config.agents[0].action_space["leap"] = habitat_sim.ActionSpec("move_forward", habitat_sim.ActuationSpec(50.0))
+        with habitat_sim.Simulator(config) as made:
+            agent, off = made.get_agent(0), [0.0, 9.0, 0.0]
+            before = agent.get_state().position
+            assert made.step("leap")["collided"] and np.allclose(agent.get_state().position, before, atol=1e-5)
+            agent.set_state(habitat_sim.AgentState(off))
+            assert made.step("move_forward")["collided"] and np.allclose(agent.get_state().position, off, atol=1e-5)
+
+
 def test_people_stop_moves_and_count(sim):
     """Walk towards a person from 0.3 m in front of it until it blocks."""
     rng, blocked = gsnav.Rng(4), None
