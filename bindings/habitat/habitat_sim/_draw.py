@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Draws the images of sensors with gsnav.FreeSensors."""
 
+import dataclasses
 import functools
+import math
 from typing import Any
 
 import numpy as np
@@ -26,11 +28,13 @@ _MODELS = {
     SensorSubType.EQUIRECTANGULAR: ("equirectangular", EquirectangularSensorSpec),
     SensorSubType.FISHEYE: ("fisheye", FisheyeSensorDoubleSphereSpec),
 }
+_BLACK = (0.0, 0.0, 0.0)
 _CONVERTERS = 8  # Threads of the CPU that turn images from a GPU into arrays.
 
 
-def check(spec: Any) -> None:
-    """Raises NotImplementedError for a sensor that gsnav does not serve, ValueError for a value out of range."""
+def check(spec: Any, empty: bool) -> None:
+    """Raises NotImplementedError for a sensor that gsnav does not serve, in the empty scene or in others, and
+    ValueError for a value out of range."""
     what = f"sensor {spec.uuid!r}"
     if spec.sensor_type not in _KINDS:
         raise NotImplementedError(_shared.message(f"{what} with sensor_type {spec.sensor_type!r}"))
@@ -49,6 +53,21 @@ def check(spec: Any) -> None:
         raise NotImplementedError(_shared.message(f"{what} with gpu2gpu_transfer"))
     if len(spec.resolution) != 2 or min(spec.resolution) < 1:
         raise ValueError(f"{what}: resolution = {spec.resolution}: must be [height, width], each at least 1")
+    if spec.sensor_type == SensorType.COLOR:
+        _background(spec, empty)
+
+
+def _background(spec: Any, empty: bool = False) -> tuple[float, ...]:
+    """Colour of a sensor where nothing is drawn, red, green and blue in [0, 1]. Raises the errors of check."""
+    what, color = f"sensor {spec.uuid!r}", tuple(spec.clear_color)
+    if not all(map(math.isfinite, color)):
+        raise ValueError(f"{what}: clear_color = {spec.clear_color}: must be finite")
+    made = tuple(min(max(c, 0.0), 1.0) for c in color[:3])
+    if not empty and color[3] < 1:
+        raise NotImplementedError(_shared.message(f"{what} with clear_color = {spec.clear_color}, alpha is not 1"))
+    if not empty and spec.sensor_subtype == SensorSubType.FISHEYE and made != _BLACK:  # So is what no lens sees.
+        raise NotImplementedError(_shared.message(f"{what}, a fisheye, with clear_color = {spec.clear_color}"))
+    return made
 
 
 def _native(spec: Any) -> Any:
@@ -78,15 +97,36 @@ def _native(spec: Any) -> Any:
     return made
 
 
+@dataclasses.dataclass
+class _Group:
+    """Sensors that are drawn over one colour."""
+
+    background: tuple[float, ...]
+    sensors: list[Any]
+    natives: list[Any]  # Their specifications.
+    key: str
+
+
+def _groups(sensors: list[Any]) -> list[_Group]:
+    """Sensors by the colours behind them. Those without colours join the first ones."""
+    colors = [_background(s.specification()) if _is_color(s) else None for s in sensors]
+    first = next((c for c in colors if c is not None), _BLACK)
+    backgrounds, made = [first if c is None else c for c in colors], []
+    for color in dict.fromkeys(backgrounds):
+        members = [s for s, c in zip(sensors, backgrounds) if c == color]
+        natives = [_native(s.specification()) for s in members]
+        made.append(_Group(color, members, natives, repr((color, natives))))
+    return made
+
+
 class Painter:
     """Draws one stage on one device."""
 
     def __init__(self, stage: Any, device: Any) -> None:
         self._stage, self._device = stage, device
         self._together = _together(device)
-        self._sensors: list[Any] = []
-        self._natives: list[Any] = []  # Their specifications.
-        self._key = ""
+        self._drawn: Any = None  # Sensors and their clear colours.
+        self._groups: list[_Group] = []
 
     def of(self, stage: Any) -> "Painter":
         """A painter of another stage, on the same device."""
@@ -105,27 +145,34 @@ class Painter:
             else:
                 drawn.append(sensor)
         if drawn:
-            poses = [_pose(s) for s in drawn]
-            if self._sensors != drawn:
-                self._sensors, self._natives = drawn, [_native(s.specification()) for s in drawn]
-                self._key = repr(self._natives)
-            if self._together:
-                # Time matters among people only.
-                key = self._stage, self._key, self._device.index, seconds if self._stage.scene.avatar_count else 0.0
-                images.update(_turns.draw_together(key, poses, functools.partial(self._draw_places, seconds)))
-            else:
-                images.update(_turns.draw_alone(functools.partial(self._draw_place, seconds, poses)))
+            now = drawn, [tuple(s.specification().clear_color) for s in drawn]
+            if self._drawn != now:
+                self._groups, self._drawn = _groups(drawn), now
+            for group in self._groups:
+                images.update(self._draw_group(group, seconds))
         return {s.uuid: _noisy(images[s.uuid], s.specification()) for s in sensors}
 
-    def _draw_place(self, seconds: float, poses: list[Any]) -> dict[str, np.ndarray]:
+    def _draw_group(self, group: _Group, seconds: float) -> dict[str, np.ndarray]:
+        poses = [_pose(s) for s in group.sensors]
+        if not self._together:
+            return _turns.draw_alone(functools.partial(self._draw_place, group, seconds, poses))
+        # Time matters among people only.
+        key = self._stage, group.key, self._device.index, seconds if self._stage.scene.avatar_count else 0.0
+        return _turns.draw_together(key, poses, functools.partial(self._draw_places, group, seconds))
+
+    def _draw_place(self, group: _Group, seconds: float, poses: list[Any]) -> dict[str, np.ndarray]:
         """Images at the poses of one environment."""
-        with self._stage.drawer(self._device, self._key, self._natives) as drawer:
+        with self._stage.drawer(self._device, group.key, group.natives, group.background) as drawer:
             return dict(drawer.render(poses, seconds))
 
-    def _draw_places(self, seconds: float, places: list[Any]) -> list[dict[str, np.ndarray]]:
+    def _draw_places(self, group: _Group, seconds: float, places: list[Any]) -> list[dict[str, np.ndarray]]:
         """Images at the poses of each environment, drawn in one call."""
-        with self._stage.drawer(self._device, self._key, self._natives) as drawer:
+        with self._stage.drawer(self._device, group.key, group.natives, group.background) as drawer:
             return drawer.render_places(places, seconds, min(_engine.threads(), _CONVERTERS))
+
+
+def _is_color(sensor: Any) -> bool:
+    return bool(sensor.specification().sensor_type == SensorType.COLOR)
 
 
 def _together(device: Any) -> bool:

@@ -27,25 +27,27 @@ class Stage:
     def __init__(self, opened: Any) -> None:
         self.opened = opened
         self.scene = None if opened is None else opened.scene
-        self._idle: dict[Any, list[tuple[str, Any]]] = {}
+        self._idle: dict[Any, list[tuple[str, tuple[float, ...], Any]]] = {}
         self._parts: "weakref.WeakValueDictionary[Any, Stage]" = weakref.WeakValueDictionary()
         self._gpu = threading.Lock()
 
     @contextlib.contextmanager
-    def drawer(self, device: Any, key: str, specs: list[Any]) -> Iterator[Any]:
-        """A gsnav.FreeSensors of these gsnav.SensorSpec, for one thread at a time. Specifications with equal keys are
-        equal. A GPU has one drawer, a CPU one per thread."""
+    def drawer(self, device: Any, key: str, specs: list[Any], background: tuple[float, ...]) -> Iterator[Any]:
+        """A gsnav.FreeSensors of these gsnav.SensorSpec over a colour, for one thread at a time. Specifications with
+        equal keys are equal. A GPU has one drawer, a CPU one per thread."""
         with self._gpu if device.kind == library().DeviceKind.cuda else contextlib.nullcontext():
             with _lock:
                 idle = self._idle.setdefault(device, [])
-                fitting = [i for i, (had, _) in enumerate(idle) if had == key]
-                before, found = idle.pop(fitting[0] if fitting else -1) if idle else ("", None)
+                fitting = [i for i, (had, _, _) in enumerate(idle) if had == key]
+                before, behind, found = idle.pop(fitting[0] if fitting else -1) if idle else ("", (), None)
             if found is None:
                 found = library().FreeSensors(device, self.scene, specs)
             elif before != key:
                 found.set_sensors(specs)
+            if behind != background:
+                found.set_background(background)
             yield found
-            idle.append((key, found))  # Not after an error.
+            idle.append((key, background, found))  # Not after an error.
 
     def showing(self, people: list[int]) -> "Stage":
         """The scene with these of its people only, for drawing."""
@@ -83,6 +85,11 @@ def walker(mesh: Any, capsules: list[list[float]]) -> Any:
     return made
 
 
+def is_empty(name: Any) -> bool:
+    """Whether a scene's name stands for no scene."""
+    return str(name) in ("NONE", "")
+
+
 def stage(name: str, settings: Any, required: bool = False) -> Stage:
     """The scene of a name: a path, a name that gsnav.open_scene knows, or NONE for nothing.
 
@@ -90,7 +97,7 @@ def stage(name: str, settings: Any, required: bool = False) -> Stage:
     if the file has other settings and these are `required`. Raises FileNotFoundError naming the scene, InvalidArgument
     naming a required setting out of range, and the errors of gsnav.open_scene.
     """
-    if name in ("NONE", ""):
+    if is_empty(name):
         return Stage(None)
     gsnav = library()
     if required:

@@ -65,6 +65,8 @@ class SensorSpec:
             value = [int(x) for x in value]
         elif name == "hfov" and isinstance(value, Rad):
             value = Deg(value)
+        elif name == "clear_color":
+            value = value if isinstance(value, Color4) else Color4(*(float(x) for x in value))
         object.__setattr__(self, name, value)
 
     def __eq__(self, other: object) -> bool:
@@ -78,7 +80,8 @@ class SensorSpec:
 
 
 class VisualSensorSpec(SensorSpec):
-    """Fields of all cameras. `resolution` is [height, width]; `near` and `far` are in metres."""
+    """Fields of all cameras. `resolution` is [height, width]; `near` and `far` are in metres. `clear_color` is red,
+    green, blue and alpha of colour images where nothing is drawn."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -104,7 +104,7 @@ class Simulator(PeoplePart):
             raise RuntimeError("Configuration.agents is empty: a simulator needs an agent")
         for agent in config.agents:
             for spec in agent.sensor_specifications:
-                _draw.check(spec)
+                _draw.check(spec, _engine.is_empty(sim_cfg.scene_id))
         navigator = config.agents[sim_cfg.default_agent_id]
         settings = sim_cfg.navmesh_settings
         if settings is None:
@@ -295,7 +295,7 @@ class Simulator(PeoplePart):
 
     def create_sensor(self, spec: Any, scene_node: Any = None) -> Sensor:
         """Makes a sensor below a node, by default that of the default agent. Raises ValueError for a used name."""
-        _draw.check(spec)
+        _draw.check(spec, self._stage is not None and self._stage.scene is None)
         if spec.uuid in self.sensors:
             raise ValueError(f"SensorSpec.uuid {spec.uuid!r} is used twice")
         node = self._default_agent.scene_node if scene_node is None else scene_node

@@ -84,6 +84,14 @@ void set_sensors(PythonFreeSensors& self, std::vector<SensorSpec> specs) {
   self.pool = std::make_shared<ImagePool>(kMostUnused);
 }
 
+void set_background(PythonFreeSensors& self, const Vec3d& background) {
+  const Busy::Hold hold(self.busy, "FreeSensors.set_background");
+  RenderConfig changed = self.config;
+  changed.background = background;
+  self.renderer.set_config(changed).throw_if_error();
+  self.config = changed;
+}
+
 using PosePairs = std::vector<std::pair<Vec3d, Quatd>>;
 
 /// Writes the image of sensor i at a place: colours as bytes with alpha, other kinds as numbers.
@@ -209,6 +217,10 @@ void bind_free_sensors(nb::module_& m) {
                   "It is faster than numpy for pixels of an image [H][W][4].")
       .def("set_sensors", set_sensors, nb::arg("sensors"),
            "Replaces the sensors and keeps the renderer. Raises what the constructor raises.")
+      .def("set_background", set_background, nb::arg("background"), nb::call_guard<ReleaseGil>(),
+           "Sets the colour behind everything, red, green and blue in [0, 1]; at first it is "
+           "`options.render.background`. Pixels outside of a fisheye lens stay black. Raises "
+           "InvalidArgument for a number that is not finite.")
       .def(
           "render", draw_place, nb::arg("poses"), nb::arg("time") = 0.0,
           nb::sig(

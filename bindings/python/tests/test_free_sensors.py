@@ -85,3 +85,18 @@ def test_packed_colours_are_a_contiguous_copy(part):
 def test_packed_takes_colours_only(wrong):
     with pytest.raises(TypeError):
         gsnav.FreeSensors.packed(wrong)
+
+
+def test_the_background_shows_by_the_share_that_nothing_covers(opened):
+    sensors = gsnav.FreeSensors("cpu:1", opened, [SENSORS[0], SENSORS[2]])
+    outside = [([-3.0, 4.0, 3.0], [np.sqrt(0.5), 0, -np.sqrt(0.5), 0])] * 2
+    black = sensors.render(outside)
+    sensors.set_background([1, 0.5, 0])
+    colored = sensors.render(outside)
+    assert np.array_equal(black["alpha"], colored["alpha"])
+    added = colored["rgb"][..., :3].astype(int) - black["rgb"][..., :3]
+    empty = added[..., 0] == 255
+    assert empty.any() and not empty.all() and (added[empty] == [255, 128, 0]).all() and not added[..., 2].any()
+    with pytest.raises(gsnav.InvalidArgument, match="background"):
+        sensors.set_background([0, np.nan, 0])
+    assert np.array_equal(sensors.render(outside)["rgb"], colored["rgb"])
