@@ -81,6 +81,32 @@ class NotServed(NotImplementedError, AttributeError):
     """A name that gsnav does not serve. `hasattr` is False for it, as for names that do not exist."""
 
 
+class _Closed(type):
+    def __call__(cls, *args: Any, **kwargs: Any) -> Any:
+        made = super().__call__(*args, **kwargs)
+        made.__dict__["_complete"] = True
+        return made
+
+
+class Closed(metaclass=_Closed):
+    """Base of objects that have the names of their constructor only: reading or writing another one raises NotServed.
+    Objects of subclasses in other packages can be written freely."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if "_complete" in self.__dict__ and name not in self.__dict__ and name[0] != "_":
+            kind = type(self)
+            if not hasattr(kind, name) and kind.__module__.partition(".")[0] == "habitat_sim":
+                raise NotServed(message(f"{kind.__module__}.{kind.__qualname__}.{name}"))
+        object.__setattr__(self, name, value)
+
+    def __getattr__(self, name: str) -> Any:
+        """Called for names that do not exist, and after a property raised AttributeError."""
+        kind = type(self)
+        if name[0] == "_" or hasattr(kind, name):
+            return object.__getattribute__(self, name)  # Raises the usual error.
+        raise NotServed(message(f"{kind.__module__}.{kind.__qualname__}.{name}"))
+
+
 def missing(module: str) -> Callable[[str], NoReturn]:
     """The function __getattr__ of a module. It raises NotServed with the name."""
 

@@ -11,6 +11,7 @@ from typing import Any, Iterable
 
 import numpy as np
 
+import gsnav_habitat as _shared
 from magnum import Vector3
 
 from . import _engine
@@ -52,7 +53,7 @@ class NavMeshSettings:
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in self._DEFAULTS:
-            raise AttributeError(f"NavMeshSettings has no field {name!r}")
+            raise _shared.NotServed(_shared.message(f"habitat_sim.nav.NavMeshSettings has no field {name!r}"))
         self.__dict__[name] = type(self._DEFAULTS[name])(value)
 
     def __eq__(self, other: object) -> bool:
@@ -114,7 +115,7 @@ class GreedyFollowerCodes(enum.IntEnum):
     RIGHT = 2
 
 
-class _Path:
+class _Path(_shared.Closed):
     """Common part of the path requests. `find_path` fills `points` and `geodesic_distance` (metres)."""
 
     def __init__(self) -> None:

@@ -8,7 +8,7 @@ import gsnav_habitat as _shared
 from magnum import Quaternion, Rad, Vector3
 
 
-class RigidState:
+class RigidState(_shared.Closed):
     """A rotation and a translation, metres."""
 
     def __init__(self, rotation: Any = None, translation: Any = None) -> None:
@@ -16,7 +16,7 @@ class RigidState:
         self.translation = Vector3() if translation is None else Vector3(*(float(x) for x in translation))
 
 
-class VelocityControl:
+class VelocityControl(_shared.Closed):
     """Velocities that move a body: metres and radians per second, in the frame of the world or of the body."""
 
     def __init__(self) -> None:
@@ -27,7 +27,7 @@ class VelocityControl:
     def __setattr__(self, name: str, value: Any) -> None:
         if name.endswith("_velocity"):
             value = Vector3(*(float(x) for x in value))
-        object.__setattr__(self, name, value)
+        super().__setattr__(name, value)
 
     def integrate_transform(self, dt: float, rigid_state: RigidState) -> RigidState:
         """Pose after `dt` seconds: translated with the rotation of the beginning, then turned."""

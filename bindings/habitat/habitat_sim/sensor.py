@@ -46,7 +46,7 @@ class FisheyeSensorModelType(enum.IntEnum):
     DOUBLE_SPHERE = 0
 
 
-class SensorSpec:
+class SensorSpec(_shared.Closed):
     """Fields of all sensors. Lengths in metres, `orientation` in radians about X, then Y, then Z."""
 
     def __init__(self) -> None:
@@ -67,7 +67,7 @@ class SensorSpec:
             value = Deg(value)
         elif name == "clear_color":
             value = value if isinstance(value, Color4) else Color4(*(float(x) for x in value))
-        object.__setattr__(self, name, value)
+        super().__setattr__(name, value)
 
     def __eq__(self, other: object) -> bool:
         return type(self) is type(other) and self.__dict__ == other.__dict__
@@ -145,7 +145,7 @@ def _euler(angles: Any) -> Quaternion:
     return z * y * x
 
 
-class Sensor:
+class Sensor(_shared.Closed):
     """A sensor on a node. A sensor of a simulator can be drawn and read."""
 
     def __init__(self, node: SceneNode, spec: Any) -> None:

@@ -26,9 +26,13 @@ from .sensor import Sensor, SensorFactory
 from .utils.common import quat_from_angle_axis
 
 _STEP = 1.0 / 60.0  # Seconds.
+_FIELDS = {"agents", "config", "metadata_mediator", "pathfinder", "random"}
+# Names of Habitat-Sim's simulator that scripts may write and gsnav does not serve.
+_NOT_WRITTEN = {"active_dataset", "frustum_culling", "gfx_replay_manager", "navmesh_visualization", "renderer",
+                "semantic_color_map"}  # fmt: skip
 
 
-class SimulatorConfiguration:
+class SimulatorConfiguration(_shared.Closed):
     """Settings of a simulator. `gpu_device_id` is CUDA's number of a GPU; -1 is the CPU."""
 
     def __init__(self) -> None:
@@ -61,7 +65,7 @@ class SimulatorConfiguration:
 
 
 @dataclasses.dataclass
-class Configuration:
+class Configuration(_shared.Closed):
     """Settings of a simulator and its agents."""
 
     sim_cfg: Any = None
@@ -97,9 +101,18 @@ class Simulator(PeoplePart):
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         raise _shared.NotServed(_shared.message(f"habitat_sim.Simulator.{name}"))
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Refuses public names that do not exist. A subclass can have new names, but not those of Habitat-Sim."""
+        if name[0] != "_" and name not in _FIELDS and not hasattr(type(self), name):
+            if type(self) is Simulator or name in _NOT_WRITTEN:
+                raise _shared.NotServed(_shared.message(f"habitat_sim.Simulator.{name}"))
+        object.__setattr__(self, name, value)
+
     # ---- Life
     def _open(self, config: Configuration) -> None:
         sim_cfg = config.sim_cfg
+        if config.enable_batch_renderer:
+            raise NotImplementedError(_shared.message("Configuration.enable_batch_renderer"))
         if not config.agents:
             raise RuntimeError("Configuration.agents is empty: a simulator needs an agent")
         for agent in config.agents:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+import gsnav_habitat as _shared
 from magnum import Quaternion
 
 from .. import errors
@@ -80,7 +81,7 @@ def _default_actions() -> dict[Any, ActionSpec]:
 
 
 @dataclasses.dataclass
-class AgentConfiguration:
+class AgentConfiguration(_shared.Closed):
     """Settings of an agent. Lengths in metres."""
 
     height: float = 1.5
