@@ -9,14 +9,17 @@
 Both write FOLDER/data/datasets/pointnav/habitat-test-scenes/v1/{train,val,test}/*.json.gz, which the examples read.
 A NavMesh is written beside each scan that has none, for an agent of 0.1 m radius and 1.5 m height. The rooms are
 FOLDER/data/scene_datasets/habitat-test-scenes/*.glb and *.navmesh: tests that ask for the files by name then run;
-tests that compare with numbers of the real scenes fail. Needs the package gsnav.
+tests that compare with numbers of the real scenes fail. Each file is written aside and then renamed. Needs the
+package gsnav.
 """
 
 import argparse
+import contextlib
 import json
 import pathlib
 import struct
 import sys
+from typing import Iterator
 
 try:
     import gsnav
@@ -112,6 +115,17 @@ def navmesh(scene: int) -> gsnav.NavMesh:
     return gsnav.NavMesh.build(gsnav.NavMeshSettings(), np.concatenate(points), np.concatenate(faces))
 
 
+@contextlib.contextmanager
+def aside(path: pathlib.Path) -> Iterator[pathlib.Path]:
+    """Gives a path beside a file to write to. It becomes the file at the end, and is deleted after an error."""
+    part = path.with_name(f".part-{path.name}")
+    try:
+        yield part
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
 def episodes(mesh: gsnav.NavMesh, scene: str, count: int, first: int, seed: int) -> list[gsnav.PointNavEpisode]:
     """Episodes of a scene, numbered from `first`."""
     made = gsnav.generate_episodes(mesh, count, seed)
@@ -131,7 +145,8 @@ def save(root: pathlib.Path, places: list[tuple[gsnav.NavMesh, str]], train: int
         for i, (mesh, scene) in enumerate(places):
             share = count // len(places) + (i < count % len(places))
             rows += episodes(mesh, scene, share, len(rows), 10 * k + i)
-        gsnav.io.save_episodes(folder / f"{split}.json.gz", rows)
+        with aside(folder / f"{split}.json.gz") as part:
+            gsnav.io.save_episodes(part, rows)
 
 
 def make_of_scans(root: pathlib.Path, scans: list[pathlib.Path], train: int, others: int) -> None:
@@ -142,7 +157,8 @@ def make_of_scans(root: pathlib.Path, scans: list[pathlib.Path], train: int, oth
         mesh = opened.scene.navmesh
         beside = scan.with_suffix(".navmesh")
         if not beside.exists():
-            gsnav.save_navmesh(mesh, beside)
+            with aside(beside) as part:
+                gsnav.save_navmesh(mesh, part)
         print(f"{scan}: {mesh.navigable_area():.1f} m2 to stand on, NavMesh {opened.navmesh_source}")
         places.append((mesh, str(scan.resolve())))
     save(root, places, train, others)
@@ -154,11 +170,20 @@ def make(root: pathlib.Path, train: int, others: int) -> None:
     scenes.mkdir(parents=True, exist_ok=True)
     meshes = []
     for i, name in enumerate(SCENES):
-        (scenes / f"{name}.glb").write_bytes(glb(i))
         meshes.append(navmesh(i))
-        gsnav.save_navmesh(meshes[-1], scenes / f"{name}.navmesh")
+        with aside(scenes / f"{name}.glb") as part:
+            part.write_bytes(glb(i))
+        with aside(scenes / f"{name}.navmesh") as part:
+            gsnav.save_navmesh(meshes[-1], part)
     names = [f"data/scene_datasets/habitat-test-scenes/{name}.glb" for name in SCENES[:2]]
     save(root, list(zip(meshes, names)), train, others)
+
+
+def count(text: str) -> int:
+    """A number of episodes in an argument."""
+    if not text.isdecimal() or len(text) > 9 or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"{text}: must be a number from 1 to 999999999")
+    return int(text)
 
 
 def main() -> None:
@@ -166,15 +191,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=pathlib.Path, help="folder in which data/ is made")
     parser.add_argument("scan", type=pathlib.Path, nargs="*", help="scans (PLY, SPZ, SOG, glTF, ...)")
-    parser.add_argument("--train", type=int, default=10000, help="episodes of the split train")
-    parser.add_argument("--others", type=int, default=100, help="episodes of the splits val and test")
+    parser.add_argument("--train", type=count, default=10000, help="episodes of the split train")
+    parser.add_argument("--others", type=count, default=100, help="episodes of the splits val and test")
     arguments = parser.parse_args()
     try:
         if arguments.scan:
             make_of_scans(arguments.folder, arguments.scan, arguments.train, arguments.others)
         else:
             make(arguments.folder, arguments.train, arguments.others)
-    except gsnav.Error as e:
+    except (gsnav.Error, OSError) as e:
         sys.exit(f"make_habitat_pack.py: {e}")
     print(f"{arguments.folder / 'data'}: {len(arguments.scan) or len(SCENES)} scenes, {arguments.train} episodes of "
           f"train, {arguments.others} of val and of test")  # fmt: skip
