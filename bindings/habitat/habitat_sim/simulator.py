@@ -153,6 +153,10 @@ class Simulator(PeoplePart):
         if destroy:
             self.agents = []
 
+    def _need_open(self, what: str) -> None:
+        if self._stage is None:
+            raise RuntimeError(f"Simulator: {what}: the simulator is closed; reconfigure opens it again")
+
     def __enter__(self) -> "Simulator":
         return self
 
@@ -286,8 +290,7 @@ class Simulator(PeoplePart):
         return self._default_agent.sensors
 
     def _draw(self, sensors: Any) -> dict[str, np.ndarray]:
-        if self._painter is None:
-            raise RuntimeError("Simulator: it was closed; call reconfigure")
+        self._need_open("the sensors")
         for sensor in sensors:
             sensor._simulator = self
         return self._painter.draw(sensors, self._clock.gaussian_time)
@@ -377,6 +380,31 @@ class Simulator(PeoplePart):
         except (gsnav.NothingNavigable, gsnav.InvalidArgument):
             return False
         return True
+
+
+def _while_open(name: str, call: Any) -> Any:
+    @functools.wraps(call)
+    def checked(self: Any, *args: Any, **kwargs: Any) -> Any:
+        self._need_open(name)
+        return call(self, *args, **kwargs)
+
+    return checked
+
+
+def _guard(kind: type) -> None:
+    """Lets the public methods and properties of a class raise RuntimeError while the simulator is closed."""
+    for name, member in list(vars(kind).items()):
+        if name[0] == "_" or name in ("close", "reconfigure"):
+            continue
+        if isinstance(member, property):
+            parts = [call and _while_open(name, call) for call in (member.fget, member.fset, member.fdel)]
+            setattr(kind, name, property(*parts, doc=member.__doc__))
+        elif callable(member):
+            setattr(kind, name, _while_open(name, member))
+
+
+_guard(PeoplePart)
+_guard(Simulator)
 
 
 def _checked(method: str, dt: float) -> float:
