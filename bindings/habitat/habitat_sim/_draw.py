@@ -22,12 +22,13 @@ from .sensor import (
     SensorType,
 )
 
-_KINDS = {SensorType.COLOR: "rgb", SensorType.DEPTH: "depth", SensorType.SEMANTIC: "semantic"}
+_KINDS = {SensorType.COLOR: "rgb", SensorType.DEPTH: "depth", SensorType.SEMANTIC: "depth"}
 _MODELS = {
     SensorSubType.PINHOLE: ("pinhole", CameraSensorSpec),
     SensorSubType.EQUIRECTANGULAR: ("equirectangular", EquirectangularSensorSpec),
     SensorSubType.FISHEYE: ("fisheye", FisheyeSensorDoubleSphereSpec),
 }
+_NO_NOISE = ("None", "", None)
 _BLACK = (0.0, 0.0, 0.0)
 _CONVERTERS = 8  # Threads of the CPU that turn images from a GPU into arrays.
 
@@ -43,7 +44,7 @@ def check(spec: Any, empty: bool) -> None:
         raise NotImplementedError(
             _shared.message(f"{what} of type {type(spec).__name__} with sensor_subtype {spec.sensor_subtype!r}")
         )
-    if spec.noise_model:
+    if spec.noise_model not in _NO_NOISE:
         noise = registry.get_noise_model(spec.noise_model)
         if noise is None:
             raise NotImplementedError(_shared.message(f"{what} with noise_model {spec.noise_model!r}"))
@@ -53,8 +54,12 @@ def check(spec: Any, empty: bool) -> None:
         raise NotImplementedError(_shared.message(f"{what} with gpu2gpu_transfer"))
     if len(spec.resolution) != 2 or min(spec.resolution) < 1:
         raise ValueError(f"{what}: resolution = {spec.resolution}: must be [height, width], each at least 1")
+    for name in ("position", "orientation"):
+        if not all(map(math.isfinite, getattr(spec, name))):
+            raise ValueError(f"{what}: {name} = {getattr(spec, name)}: must be finite")
     if spec.sensor_type == SensorType.COLOR:
         _background(spec, empty)
+    _native(spec).validate()
 
 
 def _background(spec: Any, empty: bool = False) -> tuple[float, ...]:
@@ -70,19 +75,28 @@ def _background(spec: Any, empty: bool = False) -> tuple[float, ...]:
     return made
 
 
+def _number(spec: Any, name: str) -> float:
+    value = getattr(spec, name)
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"sensor {spec.uuid!r}: {name} = {value!r}: must be a number") from None
+
+
 def _native(spec: Any) -> Any:
-    """The gsnav.SensorSpec of a sensor that is not semantic. Its pose is given at each render."""
+    """The gsnav.SensorSpec of a sensor. Its pose is given at each render. A semantic sensor becomes one of depth, whose
+    other fields have the same ranges."""
     gsnav = _engine.library()
     made = gsnav.SensorSpec(
         uuid=spec.uuid,
         kind=getattr(gsnav.SensorKind, _KINDS[spec.sensor_type]),
         model=getattr(gsnav.SensorModel, _MODELS[spec.sensor_subtype][0]),
         resolution=spec.resolution,
-        near_plane=float(spec.near),
-        far_plane=float(spec.far),
+        near_plane=_number(spec, "near"),
+        far_plane=_number(spec, "far"),
     )
     if hasattr(spec, "hfov"):
-        made.hfov = float(spec.hfov)
+        made.hfov = _number(spec, "hfov")
     if spec.sensor_subtype == SensorSubType.FISHEYE:
         if spec.sensor_model_type != FisheyeSensorModelType.DOUBLE_SPHERE:
             raise ValueError(
@@ -196,6 +210,6 @@ def _nothing(spec: Any) -> np.ndarray:
 
 
 def _noisy(image: np.ndarray, spec: Any) -> np.ndarray:
-    if spec.noise_model in ("None", ""):
+    if spec.noise_model in _NO_NOISE:
         return image
     return registry.get_noise_model(spec.noise_model)(**dict(spec.noise_model_kwargs))(image)

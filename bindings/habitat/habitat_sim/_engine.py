@@ -12,6 +12,7 @@ from gsnav_habitat import _turns
 
 logger = logging.getLogger("habitat_sim")
 _lock = threading.Lock()
+_MOST_PEOPLE = 1000  # As gsnav.open_scene.
 
 
 def library() -> Any:
@@ -116,8 +117,8 @@ def stage(name: str, settings: Any, required: bool = False) -> Stage:
 def _people() -> int:
     """GSNAV_PEOPLE: how many procedural people walk in each scene. 0: those that belong to it."""
     text = os.environ.get("GSNAV_PEOPLE", "0")
-    if not text.isdecimal():
-        raise ValueError(f"GSNAV_PEOPLE = {text}: must be a number of people")
+    if not text.isdecimal() or len(text) > 4 or int(text) > _MOST_PEOPLE:
+        raise ValueError(f"GSNAV_PEOPLE = {text}: must be a number of people in [0, {_MOST_PEOPLE}]")
     return int(text)
 
 

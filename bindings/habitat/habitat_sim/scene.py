@@ -1,12 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """A tree of nodes with rigid poses, which carries agents and sensors. gsnav serves no objects and no labels."""
 
+import math
 from typing import Any, Iterator
 
 import numpy as np
 
 import gsnav_habitat as _shared
 from magnum import Matrix4, Quaternion, Vector3
+
+
+def _unit(value: Any, what: str) -> Quaternion:
+    """A rotation of any length as one of length 1. Raises ValueError naming `what` if it has no direction."""
+    rotation = Quaternion._of(value)
+    length = rotation.length()
+    if not 0 < length < math.inf:
+        raise ValueError(f"{what} = {value}: is not finite, or has length 0")
+    return rotation.normalized()
 
 
 class SceneNode:
@@ -71,7 +81,7 @@ class SceneNode:
 
     @rotation.setter
     def rotation(self, value: Any) -> None:
-        self._put(self._translation, Quaternion._of(value).normalized())
+        self._put(self._translation, _unit(value, "SceneNode.rotation"))
 
     @property
     def transformation(self) -> Matrix4:

@@ -4,6 +4,7 @@
 import dataclasses
 import functools
 import math
+import numbers
 import os
 import random as _random
 import time
@@ -118,6 +119,11 @@ class Simulator(PeoplePart):
         for agent in config.agents:
             for spec in agent.sensor_specifications:
                 _draw.check(spec, _engine.is_empty(sim_cfg.scene_id))
+        if not 0 <= sim_cfg.default_agent_id < len(config.agents):
+            raise ValueError(
+                f"SimulatorConfiguration.default_agent_id = {sim_cfg.default_agent_id}: there are "
+                f"{len(config.agents)} agents, from 0"
+            )
         navigator = config.agents[sim_cfg.default_agent_id]
         settings = sim_cfg.navmesh_settings
         if settings is None:
@@ -174,8 +180,11 @@ class Simulator(PeoplePart):
         return self.get_agent(self.config.sim_cfg.default_agent_id)
 
     def get_agent(self, agent_id: int) -> Agent:
-        """An agent by its number."""
-        return self.agents[agent_id]
+        """An agent by its number. Raises IndexError naming a number that no agent has."""
+        try:
+            return self.agents[agent_id]
+        except IndexError:
+            raise IndexError(f"Simulator: no agent {agent_id}; there are {len(self.agents)}") from None
 
     def initialize_agent(self, agent_id: int, initial_state: AgentState | None = None) -> Agent:
         """Places an agent, by default at a random point of the NavMesh with a random heading."""
@@ -301,7 +310,7 @@ class Simulator(PeoplePart):
         Colour uint8 [height][width][4], depth float32 [height][width] in metres with 0 for no return, semantic uint32
         [height][width]. Row 0 is the top. The arrays are new.
         """
-        if isinstance(agent_ids, int):
+        if isinstance(agent_ids, numbers.Integral):
             return self._draw(list(self.get_agent(agent_ids).sensors.values()))
         return {i: self._draw(list(self.get_agent(i).sensors.values())) for i in agent_ids}
 

@@ -10,7 +10,7 @@ import gsnav_habitat as _shared
 from magnum import Quaternion
 
 from .. import errors
-from ..scene import SceneNode
+from ..scene import SceneNode, _unit
 from ..sensor import CameraSensorSpec, SensorFactory
 from ..utils.common import quat_from_coeffs, quat_from_magnum
 from .controls import ActionSpec, ActuationSpec, ObjectControls
@@ -157,12 +157,15 @@ class Agent:
 
         The sensors keep their poses relative to the body, or take those of their specifications if `reset_sensors`
         is set. Without `infer_sensor_states`, those named in `state.sensor_states` then take the poses given there.
-        Raises ValueError for a pose that is not finite.
+        Raises ValueError for a pose that is not finite, and for a rotation of length 0.
         """
         for pose in (state, *state.sensor_states.values()):
-            rotation = Quaternion._of(pose.rotation)
-            if not (np.isfinite(pose.position).all() and np.isfinite(list(rotation.xyzw)).all()):
-                raise ValueError(f"set_state: position {pose.position} or rotation {pose.rotation} is not finite")
+            what = f"set_state: {type(pose).__name__}"
+            _unit(pose.rotation, f"{what}.rotation")
+            if pose.position.shape != (3,):
+                raise ValueError(f"{what}.position = {pose.position}: must be three numbers")
+            if not np.isfinite(pose.position).all():
+                raise ValueError(f"{what}.position = {pose.position}: is not finite")
         self.body._place(state.position, Quaternion._of(state.rotation).normalized())
         for uuid, sensor in self.sensors.items():
             if reset_sensors:
