@@ -10,6 +10,7 @@
 
 #include "gsnav/core/rng.hpp"
 #include "gsnav/detail/avatar/trajectory.hpp"
+#include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/detail/demo/humanoid.hpp"
 #include "gsnav/detail/scene/placed_meshes.hpp"
@@ -67,6 +68,10 @@ double closest(const Way& a, const std::vector<Way>& others) {
   return least;
 }
 
+Status check_people(const char* subject, const char* field, std::size_t count) {
+  return detail::FieldCheck(subject).in(field, count, 0, static_cast<double>(kMaxPeople)).status();
+}
+
 /// A flat with its NavMesh, and people who walk in it.
 Result<SimulatorScene> inhabited(Result<DefaultScene> flat, std::size_t people, std::uint64_t seed,
                                  double people_density, const TaskConfig& task) {
@@ -114,6 +119,7 @@ Vec3d person_color(std::size_t index) noexcept {
 
 Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::size_t count,
                                                 std::uint64_t seed, double density) {
+  if (Status s = check_people("walking_people: ", "count", count); !s) return s;
   if (!std::isfinite(density)) return {Errc::invalid_argument, "walking_people: density is not finite"};
   std::vector<Way> ways;
   std::vector<AvatarActor> people;
@@ -148,12 +154,14 @@ Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::si
 
 Result<SimulatorScene> default_simulator_scene(std::size_t people, std::uint64_t seed, double density,
                                                const TaskConfig& task) {
+  if (Status s = check_people("default_simulator_scene: ", "people", people); !s) return s;
   return inhabited(make_default_scene(density), people, seed, 1.0, task);
 }
 
 Result<SimulatorScene> planned_simulator_scene(const FloorPlanOptions& plan, std::size_t people,
                                                std::uint64_t seed, double density,
                                                const TaskConfig& task, SurfaceKind kind) {
+  if (Status s = check_people("planned_simulator_scene: ", "people", people); !s) return s;
   const auto drawn = make_floor_plan(plan);
   if (!drawn) return drawn.status();
   SceneSampling sampling;

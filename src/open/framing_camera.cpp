@@ -6,6 +6,7 @@
 
 #include "gsnav/core/rng.hpp"
 #include "gsnav/detail/demo/default_scene.hpp"
+#include "gsnav/detail/image/field_of_view.hpp"
 #include "gsnav/detail/image/validate_camera.hpp"
 #include "gsnav/detail/open/open_scene.hpp"
 #include "gsnav/detail/scene/placed_meshes.hpp"
@@ -55,7 +56,7 @@ Status validate(const OpenedScene& scene, int width, int height, double hfov) {
   if (width < 1 || height < 1 || width > kMaxImageSide || height > kMaxImageSide)
     return bad("an image of " + std::to_string(width) + " x " + std::to_string(height) +
                " pixels: sides must be in [1, 16384]");
-  if (!(hfov > 0 && hfov < 180)) return bad("hfov = " + std::to_string(hfov) + ": must be in (0, 180)");
+  if (Status s = detail::validate_hfov("", hfov); !s) return s;
   const auto drawn = [](const SceneMesh& mesh) {
     return std::ranges::any_of(mesh.surface->instances, [&](const TexturedScene::Instance& i) {
       return !mesh.surface->meshes.mesh(i.part).geometry.vertices.empty();

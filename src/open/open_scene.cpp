@@ -25,6 +25,7 @@ Status validate(const OpenOptions& o) {
     for (const auto& [field, at] : {std::pair{"crop.low", o.crop->low}, {"crop.high", o.crop->high}})
       check.need(!std::isnan(at[k]), field, at[k], "must be a number");
   }
+  check.in("people", o.people, 0, static_cast<double>(kMaxPeople));
   if (!check.in("density", o.density, 0.05, 20).status()) return check.status();
   if (o.up != "auto" && o.up != "keep") {
     if (const auto turned = upright(o.up); !turned)

@@ -5,8 +5,12 @@
 #include <functional>
 #include <utility>
 
+#include "gsnav/detail/core/field_check.hpp"
+
 namespace gsnav {
 namespace {
+
+constexpr double kMaxEnvironments = 1 << 20;  // a million, far above the memory of their images
 
 Status bad(std::string what) { return {Errc::invalid_argument, std::move(what)}; }
 
@@ -31,7 +35,8 @@ Result<BatchWorld> BatchWorld::create(BatchPlaces places, const TaskConfig& conf
                                       std::size_t environments, EpisodeSource next_episode) {
   if (Status s = validate(config); !s) return s;
   if (places.count == 0 || !places.get) return bad("BatchWorld: no scene");
-  if (environments == 0) return bad("BatchWorld: environments = 0: must be >= 1");
+  detail::FieldCheck check("BatchWorld: ");
+  if (Status s = check.in("environments", environments, 1, kMaxEnvironments).status(); !s) return s;
   if (!next_episode) return bad("BatchWorld: no source of episodes");
   BatchWorld b;
   b.places_ = std::move(places);

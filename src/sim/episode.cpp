@@ -7,6 +7,7 @@ namespace gsnav {
 namespace {
 
 constexpr double kTwoPi = 6.283185307179586;
+constexpr double kMaxEpisodes = 1e7;  // of one call
 
 /// Islands with a radius of at least `least_radius`.
 std::vector<std::size_t> wide_islands(const NavMesh& navmesh, double least_radius) {
@@ -81,6 +82,8 @@ Result<PointNavEpisode> generate_episode(const NavMesh& navmesh, Rng& rng, const
 
 Result<std::vector<PointNavEpisode>> generate_episodes(const NavMesh& navmesh, std::size_t count,
                                                        std::uint64_t seed, const EpisodeRules& rules) {
+  detail::FieldCheck check("generate_episodes: ");
+  if (const Status s = check.in("count", count, 0, kMaxEpisodes).status(); !s) return s;
   Rng rng(seed);
   std::vector<PointNavEpisode> episodes;
   episodes.reserve(count);

@@ -153,6 +153,8 @@ TEST_CASE("bad cameras name their field") {
   CHECK(names(message([](Camera& c) { c.width = 0; }), "width"));
   CHECK(names(message([](Camera& c) { c.height = 100000; }), "height"));
   CHECK(names(message([](Camera& c) { c.fx = -1; }), "fx"));
+  CHECK(names(message([](Camera& c) { c.set_hfov(256, 256, 180); }), "fx"));
+  CHECK(message([](Camera& c) { c.set_hfov(256, 256, 179.999); }).empty());
   CHECK(names(message([](Camera& c) { c.fy = std::numeric_limits<double>::infinity(); }), "fy"));
   CHECK(names(message([](Camera& c) { c.near_plane = 0; }), "near_plane"));
   CHECK(names(message([](Camera& c) { c.cx = std::nan(""); }), "cx = nan"));

@@ -263,8 +263,9 @@ class PathFinder:
     def get_random_navigable_point(self, max_tries: int = 10, island_index: int = -1) -> Vector3:
         """Random point, uniform over the surface or one island. NaN for an island that does not exist."""
         mesh = self._need("get_random_navigable_point")
-        at = mesh.random_point(self._random(), None if island_index < 0 else island_index)
-        return Vector3(_NAN) if at.poly == _engine.library().NO_POLY else Vector3(*at.position)
+        if island_index >= mesh.island_count():
+            return Vector3(_NAN)
+        return Vector3(*mesh.random_point(self._random(), None if island_index < 0 else island_index).position)
 
     def get_random_navigable_point_near(
         self, circle_center: Any, radius: float, max_tries: int = 100, island_index: int = -1
@@ -273,6 +274,8 @@ class PathFinder:
         infinite. Raises ValueError for one that is negative or NaN."""
         mesh = self._need("get_random_navigable_point_near")
         _check_radius("get_random_navigable_point_near: radius", radius)
+        if island_index >= mesh.island_count():
+            return Vector3(_NAN)
         if math.isinf(radius) and np.isfinite(_triple(circle_center)).all():
             return self.get_random_navigable_point(max_tries, island_index)
         island = None if island_index < 0 else island_index

@@ -108,6 +108,8 @@ Action action_from(nb::handle value, const char* what) {
 
 BatchActions batch_actions(nb::handle source, std::size_t environments) {
   Array array;
+  if (is_masked(source))
+    throw nb::type_error("actions: expected an array without a mask, got a masked array");
   if (!PyList_Check(source.ptr()) && !PyTuple_Check(source.ptr())) {
     if (nb::try_cast(source, array, false)) return from_array(array, environments);
     const nb::object copy = array_from_device(source);
@@ -143,6 +145,7 @@ BatchActions batch_actions(nb::handle source, std::size_t environments) {
 std::optional<std::vector<Action>> plain_actions(nb::handle source, std::size_t environments,
                                                  std::size_t count) noexcept {
   Py_buffer buffer;
+  if (is_masked(source)) return {};
   if (PyObject_GetBuffer(source.ptr(), &buffer, PyBUF_ND | PyBUF_FORMAT) != 0) {
     drop_error();
     return {};
@@ -161,6 +164,8 @@ std::optional<std::vector<Action>> plain_actions(nb::handle source, std::size_t 
 std::vector<std::uint8_t> reset_mask(nb::handle source, std::size_t environments) {
   if (source.is_none()) return {};
   Array array;
+  if (is_masked(source))
+    throw nb::type_error("mask: expected an array of bool without a mask, got a masked array");
   if (!nb::try_cast(source, array, false)) {
     throw nb::type_error(("mask: expected an array of bool, got " + type_of(source)).c_str());
   }

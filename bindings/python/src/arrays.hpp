@@ -86,6 +86,7 @@ nb::object array_view(const T* data, const std::vector<std::size_t>& shape, nb::
 
 /// The numpy array of an argument. It shares memory where it can.
 inline nb::object numpy_array(nb::handle source) {
+  if (is_masked(source)) throw nb::type_error("expected an array without a mask, got a masked array");
   // Objects that are seen by DLPack only are not arrays to asarray.
   const bool foreign = !nb::hasattr(source, "__array__") && nb::hasattr(source, "__dlpack__");
   return nb::module_::import_("numpy").attr(foreign ? "from_dlpack" : "asarray")(source);

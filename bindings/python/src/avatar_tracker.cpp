@@ -54,10 +54,14 @@ class AvatarTracker {
 
   Vec3d move(const Vec3d& start, const Vec3d& end, double t0, double t1, bool slide) {
     const Busy::Hold hold(busy_, "AvatarTracker.move");
+    finite("move: start", start);
+    finite("move: end", end);
+    finite("move: t0", t0);
+    finite("move: t1", t1);
     const CapsuleSet bodies = bodies_in(t0, t1);
     const NavMesh& mesh = *scene_->navmesh;
     const std::optional<NavPoint> from = mesh.snap_point(start);
-    if (!from || !is_finite(end)) return start;
+    if (!from) return start;
     const AgentState agent{from->position, radius_, height_, from->poly};
     const StepResult r = step(mesh, agent, end - from->position, bodies, {.slide = slide});
     if (r.blocked_by == BlockedBy::invalid) return start;
@@ -81,6 +85,7 @@ class AvatarTracker {
 
   std::vector<std::array<double, 7>> capsules(double time, std::optional<std::uint32_t> person) const {
     const Busy::Hold hold(busy_, "AvatarTracker.capsules");
+    finite("capsules: time", time);
     const CapsuleSet now = bodies_in(time, time);
     std::vector<std::array<double, 7>> rows;
     for (const DynamicCapsule& c : now.capsules()) {
@@ -92,6 +97,8 @@ class AvatarTracker {
 
   double distance(const Vec3d& base, double time, double radius, double height) const {
     const Busy::Hold hold(busy_, "AvatarTracker.distance");
+    finite("distance: position", base);
+    finite("distance: time", time);
     const CapsuleSet now = bodies_in(time, time);
     return clearance({base, radius > 0 ? radius : radius_, height > 0 ? height : height_}, now, time)
         .distance;
@@ -100,9 +107,12 @@ class AvatarTracker {
   bool blocked(const Vec3d& start, const Vec3d& end, double time, bool slide, double radius,
                double height) const {
     const Busy::Hold hold(busy_, "AvatarTracker.blocked");
+    finite("blocked: start", start);
+    finite("blocked: end", end);
+    finite("blocked: time", time);
     const CapsuleSet now = bodies_in(time, time);
     const std::optional<NavPoint> from = scene_->navmesh->snap_point(start);
-    if (!from || !is_finite(end)) return false;
+    if (!from) return false;
     const AgentState agent{from->position, radius > 0 ? radius : radius_, height > 0 ? height : height_,
                            from->poly};
     const StepResult r = step(*scene_->navmesh, agent, end - from->position, now, {.slide = slide});
@@ -132,6 +142,16 @@ class AvatarTracker {
   [[noreturn]] static void fail(const std::string& what) {
     Status(Errc::invalid_argument, "AvatarTracker: " + what).throw_if_error();
     throw std::logic_error(what);
+  }
+
+  static void finite(const char* field, double value) {
+    check_finite((std::string("AvatarTracker.") + field).c_str(), value);
+  }
+  static void finite(const char* field, const Vec3d& v) {
+    if (is_finite(v)) return;
+    throw Error(Errc::invalid_argument, std::string("AvatarTracker.") + field + " = (" +
+                                            std::to_string(v.x) + ", " + std::to_string(v.y) + ", " +
+                                            std::to_string(v.z) + "): must be finite");
   }
 
   StepRecord record() const {
@@ -186,7 +206,8 @@ void bind_avatar_tracker(nb::module_& m) {
            nb::arg("slide") = true, nb::call_guard<ReleaseGil>(),
            "Walks from a point towards another during [t0, t1], seconds, and stops at walls and people. "
            "Returns the position that is reached, shape [3]: `start` if it is off the NavMesh. "
-           "Equal points let the agent stand.")
+           "Equal points let the agent stand. Raises InvalidArgument for a value that is not finite, as "
+           "all methods do.")
       .def("set_capsules", &A::set_capsules, nb::arg("capsules"), nb::call_guard<ReleaseGil>(),
            "Adds capsules that stand still, rows of x0, y0, z0, x1, y1, z1, radius in metres. They "
            "replace those of the last call, and count as one person more. Raises InvalidArgument for a "

@@ -6,6 +6,7 @@
 #include "arrays.hpp"
 #include "bind.hpp"
 #include "fields.hpp"
+#include "gsnav/detail/image/field_of_view.hpp"
 #include "gsnav/io.hpp"
 
 namespace gsnav::python {
@@ -70,14 +71,26 @@ void bind_camera(nb::module_& m) {
           "or [3][4].");
   camera.done()
       .def_static(
-          "look_at", &Camera::look_at, nb::arg("eye"), nb::arg("target"), nb::arg("up"),
-          nb::arg("width"), nb::arg("height"), nb::arg("hfov_degrees"),
+          "look_at",
+          [](const Vec3d& eye, const Vec3d& target, const Vec3d& up, int width, int height,
+             double hfov) {
+            detail::validate_hfov("Camera.look_at: ", hfov).throw_if_error();
+            return Camera::look_at(eye, target, up, width, height, hfov);
+          },
+          nb::arg("eye"), nb::arg("target"), nb::arg("up"), nb::arg("width"), nb::arg("height"),
+          nb::arg("hfov_degrees"),
           "Camera at `eye` that looks at `target`, in metres. `up` points upwards in the image and "
-          "must not be parallel to the view direction. Image size in pixels.")
-      .def("set_hfov", &Camera::set_hfov, nb::arg("width"), nb::arg("height"), nb::arg("hfov_degrees"),
-           nb::rv_policy::none,
-           "Sets an image size with square pixels, a horizontal field of view in degrees and a centred "
-           "principal point. Returns the camera.")
+          "must not be parallel to the view direction. Image size in pixels. Raises InvalidArgument for "
+          "a field of view outside (0, 180) degrees.")
+      .def(
+          "set_hfov",
+          [](Camera& c, int width, int height, double hfov) -> Camera& {
+            detail::validate_hfov("Camera.set_hfov: ", hfov).throw_if_error();
+            return c.set_hfov(width, height, hfov);
+          },
+          nb::arg("width"), nb::arg("height"), nb::arg("hfov_degrees"), nb::rv_policy::none,
+          "Sets an image size with square pixels, a horizontal field of view in degrees and a centred "
+          "principal point. Returns the camera. Raises InvalidArgument as look_at does.")
       .def_prop_ro("position", &Camera::position, "Camera position in the world, metres, shape [3].");
 
   // The module gsnav.io has these two.

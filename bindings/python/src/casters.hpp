@@ -95,18 +95,37 @@ inline bool read_array(nb::handle source, double* out, Py_ssize_t count) noexcep
   return true;
 }
 
-/// Whether an object is a complex number or array. Python would drop its imaginary part with a warning.
-inline bool is_complex(nb::handle source) noexcept {
-  if (PyFloat_Check(source.ptr()) || PyLong_Check(source.ptr())) return false;
-  if (PyComplex_Check(source.ptr())) return true;
+/// Whether an object is a number or array of numpy of this kind, such as "c" for complex numbers.
+inline bool has_kind(nb::handle source, const char* wanted) noexcept {
   PyObject* const type = PyObject_GetAttrString(source.ptr(), "dtype");
   PyObject* const kind = type == nullptr ? nullptr : PyObject_GetAttrString(type, "kind");
   const bool found =
-      kind != nullptr && PyUnicode_Check(kind) && PyUnicode_CompareWithASCIIString(kind, "c") == 0;
+      kind != nullptr && PyUnicode_Check(kind) && PyUnicode_CompareWithASCIIString(kind, wanted) == 0;
   Py_XDECREF(kind);
   Py_XDECREF(type);
   drop_error();
   return found;
+}
+
+/// Whether an object is a complex number or array. Python would drop its imaginary part with a warning.
+inline bool is_complex(nb::handle source) noexcept {
+  if (PyFloat_Check(source.ptr()) || PyLong_Check(source.ptr())) return false;
+  return PyComplex_Check(source.ptr()) || has_kind(source, "c");
+}
+
+/// Whether an object is a bool. Python would take it for the number 0 or 1.
+inline bool is_bool(nb::handle source) noexcept {
+  if (PyFloat_Check(source.ptr())) return false;
+  return PyLong_Check(source.ptr()) ? PyBool_Check(source.ptr()) : has_kind(source, "b");
+}
+
+/// Whether an object is an array of numpy with a mask, which nothing here would look at.
+inline bool is_masked(nb::handle source) noexcept {
+  static PyObject* const plain = PyObject_GetAttrString(nb::module_::import_("numpy").ptr(), "ndarray");
+  if (reinterpret_cast<PyObject*>(Py_TYPE(source.ptr())) == plain) return false;
+  const bool masked = nb::hasattr(source, "mask") && nb::hasattr(source, "filled");
+  drop_error();
+  return masked;
 }
 
 /// Reads a real number. `convert`: also from objects that Python can convert to float.
@@ -119,18 +138,23 @@ inline bool read_real(nb::handle source, bool convert, double& out) noexcept {
   return false;
 }
 
-/// Reads `count` numbers from a sequence or array. Returns false if it is anything else.
+/// Reads `count` numbers from a sequence or array. Returns false if it is anything else, such as bools,
+/// bytes or an array with a mask.
 inline bool read_numbers(nb::handle source, double* out, Py_ssize_t count) noexcept {
-  if (!PyList_Check(source.ptr()) && !PyTuple_Check(source.ptr()) && read_array(source, out, count))
-    return true;
-  if (PyUnicode_Check(source.ptr()) || !PySequence_Check(source.ptr())) return false;
+  if (!PyList_Check(source.ptr()) && !PyTuple_Check(source.ptr())) {
+    if (is_masked(source)) return false;
+    if (read_array(source, out, count)) return true;
+  }
+  if (PyUnicode_Check(source.ptr()) || PyBytes_Check(source.ptr()) || PyByteArray_Check(source.ptr()) ||
+      !PySequence_Check(source.ptr()))
+    return false;
   const Py_ssize_t size = PySequence_Size(source.ptr());
   bool good = size == count;
   for (Py_ssize_t i = 0; good && i < count; ++i) {
     PyObject* const item = PySequence_GetItem(source.ptr(), i);
     good = item != nullptr;
     if (!good) break;
-    good = read_real(item, true, out[i]);
+    good = !is_bool(item) && read_real(item, true, out[i]);
     Py_DECREF(item);
   }
   drop_error();

@@ -13,6 +13,7 @@ NB_MODULE(_gsnav_of_main, m) {
   // Objects that a daemon thread or a caller's own circle holds at exit are no error of this module.
   nb::set_leak_warnings(std::getenv("GSNAV_LEAK_WARNINGS") != nullptr);
   nb::module_::import_("numpy");  // Without it, this is an ImportError.
+  is_masked(nb::none());          // It remembers a type of numpy, before there are threads.
   loaded = true;
   m.doc() = "Compiled part of gsnav. Import gsnav instead.";
   bind_errors(m);

@@ -128,8 +128,17 @@ void bind_settings_of_mesh(nb::module_& m) {
           nb::sig("def __eq__(self, other: object, /) -> bool"));
 }
 
+/// Throws gsnav::Error for an island that does not exist.
+void check_island(const NavMesh& mesh, const char* what, std::optional<std::size_t> island) {
+  const std::size_t count = mesh.island_count();
+  if (!island || *island < count) return;
+  throw Error(Errc::invalid_argument, std::string(what) + ": island = " + std::to_string(*island) +
+                                          ": must be in [0, " + std::to_string(count - 1) + "]");
+}
+
 std::optional<NavPoint> random_point_near(const NavMesh& mesh, Rng& rng, const Vec3d& point,
                                           double radius, std::optional<std::size_t> island) {
+  check_island(mesh, "NavMesh.random_point_near", island);
   Rng own = rng;  // Other threads may use `rng` while the GIL is released.
   std::optional<NavPoint> found;
   {
@@ -153,8 +162,15 @@ void bind_points(nb::class_<NavMesh>& c) {
            "Height of the surface of a polygon at the ground position of `point`, metres. NaN for an "
            "unknown "
            "polygon.")
-      .def("random_point", &NavMesh::random_point, nb::arg("rng"), nb::arg("island") = nb::none(),
-           "Random point, uniform over the area of the surface or of one island.")
+      .def(
+          "random_point",
+          [](const NavMesh& n, Rng& rng, std::optional<std::size_t> island) {
+            check_island(n, "NavMesh.random_point", island);
+            return n.random_point(rng, island);
+          },
+          nb::arg("rng"), nb::arg("island") = nb::none(),
+          "Random point, uniform over the area of the surface or of one island. Raises InvalidArgument "
+          "for an island that does not exist, as all functions with this argument do.")
       .def("random_point_near", random_point_near, nb::arg("rng"), nb::arg("point"), nb::arg("radius"),
            nb::arg("island") = nb::none(),
            "Random point, uniform over the surface within `radius` metres. None if that part is empty.")
@@ -243,10 +259,16 @@ void bind_mesh(nb::class_<NavMesh>& c) {
            "get_bounds.")
       .def("polygon_count", &NavMesh::polygon_count, "Number of polygons.")
       .def("navigable_area", &NavMesh::navigable_area, "Area of the surface, square metres.")
-      .def("surface", navmesh_surface, nb::arg("island") = nb::none(),
-           nb::sig("def surface(self, island: int | None = None) -> "
-                   "tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint32]]"),
-           "The surface as an indexed mesh: vertices float64 [V][3] in metres, triangles uint32 [T][3].")
+      .def(
+          "surface",
+          [](const NavMesh& n, std::optional<std::size_t> island) {
+            check_island(n, "NavMesh.surface", island);
+            return navmesh_surface(n, island);
+          },
+          nb::arg("island") = nb::none(),
+          nb::sig("def surface(self, island: int | None = None) -> "
+                  "tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint32]]"),
+          "The surface as an indexed mesh: vertices float64 [V][3] in metres, triangles uint32 [T][3].")
       .def("island_count", &NavMesh::island_count, "Number of islands, numbered by decreasing area.")
       .def(
           "island_of",
@@ -255,9 +277,21 @@ void bind_mesh(nb::class_<NavMesh>& c) {
             return island == kNoIsland ? std::nullopt : std::optional(island);
           },
           nb::arg("poly"), "Island of a polygon. None if it is no polygon of this mesh.")
-      .def("island_area", &NavMesh::island_area, nb::arg("island"), "Area of an island, square metres.")
-      .def("island_radius", &NavMesh::island_radius, nb::arg("island"),
-           "Largest ground-plane distance of a vertex from the centroid of the island, metres.");
+      .def(
+          "island_area",
+          [](const NavMesh& n, std::size_t island) {
+            check_island(n, "NavMesh.island_area", island);
+            return n.island_area(island);
+          },
+          nb::arg("island"), "Area of an island, square metres.")
+      .def(
+          "island_radius",
+          [](const NavMesh& n, std::size_t island) {
+            check_island(n, "NavMesh.island_radius", island);
+            return n.island_radius(island);
+          },
+          nb::arg("island"),
+          "Largest ground-plane distance of a vertex from the centroid of the island, metres.");
 }
 
 }  // namespace

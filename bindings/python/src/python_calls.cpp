@@ -24,10 +24,10 @@ auto call(const F& f) {
 }  // namespace
 
 // The linker gives these names. CMakeLists.txt reads the functions from the lines that begin so.
-#define GSNAV_WRAP(result, name, parameters, arguments)            \
-  extern "C" result __real_##name parameters;                      \
-  extern "C" result __wrap_##name parameters;                      \
-  extern "C" result __wrap_##name parameters {                     \
+#define GSNAV_WRAP(result, name, parameters, arguments)               \
+  extern "C" result __real_##name parameters;                         \
+  extern "C" result __wrap_##name parameters;                         \
+  extern "C" result __wrap_##name parameters {                        \
     return call([&]() -> result { return __real_##name arguments; }); \
   }
 
@@ -52,7 +52,8 @@ GSNAV_WRAP(Object, PyObject_GetIter, (Object a), (a))
 GSNAV_WRAP(Object, PyObject_Repr, (Object a), (a))
 GSNAV_WRAP(Object, PyObject_RichCompare, (Object a, Object b, int op), (a, b, op))
 GSNAV_WRAP(Object, PyObject_Str, (Object a), (a))
-GSNAV_WRAP(Object, PyObject_Vectorcall, (Object f, Object const* a, std::size_t n, Object k), (f, a, n, k))
+GSNAV_WRAP(Object, PyObject_Vectorcall, (Object f, Object const* a, std::size_t n, Object k),
+           (f, a, n, k))
 GSNAV_WRAP(Object, PyObject_VectorcallMethod, (Object f, Object const* a, std::size_t n, Object k),
            (f, a, n, k))
 GSNAV_WRAP(Object, PySequence_GetItem, (Object a, Size i), (a, i))

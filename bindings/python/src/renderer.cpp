@@ -84,6 +84,10 @@ PythonFrames render(PythonRenderer& self, const std::vector<Camera>& cameras, do
   const Busy::Hold hold(self.busy, "Renderer.render");
   check_fork(self.renderer.device(), "Renderer.render");
   check_finite("Renderer.render: time", time);
+  if (cameras.empty()) {
+    throw Error(Errc::invalid_argument,
+                "Renderer.render: cameras = []: there is no camera; give one or more");
+  }
   FrameArrays arrays(cameras.size(), single);
   std::span<const Camera> left(cameras);
   const std::size_t most = part_of(self, left);

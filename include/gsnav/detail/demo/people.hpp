@@ -14,13 +14,16 @@ namespace gsnav {
 /// Colour of the clothes of person `index`, also used for marks in maps. Display-referred.
 Vec3d person_color(std::size_t index) noexcept;
 
+/// Largest number of people that walking_people makes.
+inline constexpr std::size_t kMaxPeople = 1000;
+
 /// People on random paths over the largest island of `walkways`. Use a NavMesh for a body wider than
 /// that of the agent, so that their shoulders stay clear of furniture. Paths keep 0.75 m from earlier
 /// paths where possible. All paths have one period, so every round is the same. The same arguments give
 /// the same people.
 /// @param density factor on the number of their Gaussians, within HumanoidOptions' range.
 /// @return the people, or nothing_navigable if there is no place for any, or invalid_argument if density
-/// is not finite.
+/// is not finite or count is above kMaxPeople.
 Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::size_t count,
                                                 std::uint64_t seed, double density = 1.0);
 

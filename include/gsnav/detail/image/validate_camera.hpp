@@ -20,6 +20,11 @@ inline Status validate(const Camera& c) {
   if (c.height < 1 || c.height > kMaxImageSide) return bad("height", c.height, "must be in [1, 16384]");
   if (!(c.fx > 0 && is_finite(c.fx))) return bad("fx", c.fx, "must be positive");
   if (!(c.fy > 0 && is_finite(c.fy))) return bad("fy", c.fy, "must be positive");
+  // tan(90 degrees) of doubles is finite: set_hfov(180) gives focal lengths near 0.
+  constexpr double kLeast = 1e-9;
+  const char* const flat = "must exceed a 10^-9th of the side: 180 degrees cannot be seen";
+  if (!(c.fx > kLeast * c.width)) return bad("fx", c.fx, flat);
+  if (!(c.fy > kLeast * c.height)) return bad("fy", c.fy, flat);
   if (!is_finite(c.cx)) return bad("cx", c.cx, "must be finite");
   if (!is_finite(c.cy)) return bad("cy", c.cy, "must be finite");
   if (!(c.near_plane > 0 && is_finite(c.near_plane))) {

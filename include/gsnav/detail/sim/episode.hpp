@@ -40,7 +40,7 @@ Result<PointNavEpisode> generate_episode(const NavMesh& navmesh, Rng& rng,
                                          const EpisodeRules& rules = {});
 
 /// Samples `count` episodes with ids "0", "1", ...
-/// @return the errors of generate_episode.
+/// @return the errors of generate_episode; invalid_argument for a count above 10^7.
 Result<std::vector<PointNavEpisode>> generate_episodes(const NavMesh& navmesh, std::size_t count,
                                                        std::uint64_t seed,
                                                        const EpisodeRules& rules = {});
