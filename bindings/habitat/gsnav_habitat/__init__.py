@@ -93,9 +93,9 @@ class Closed(metaclass=_Closed):
     Objects of subclasses in other packages can be written freely."""
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if "_complete" in self.__dict__ and name not in self.__dict__ and name[0] != "_":
+        if name not in self.__dict__ and "_complete" in self.__dict__:
             kind = type(self)
-            if not hasattr(kind, name) and kind.__module__.partition(".")[0] == "habitat_sim":
+            if name[0] != "_" and not hasattr(kind, name) and kind.__module__.partition(".")[0] == "habitat_sim":
                 raise NotServed(message(f"{kind.__module__}.{kind.__qualname__}.{name}"))
         object.__setattr__(self, name, value)
 

@@ -159,7 +159,7 @@ class Painter:
             else:
                 drawn.append(sensor)
         if drawn:
-            now = drawn, [tuple(s.specification().clear_color) for s in drawn]
+            now = drawn, [s._spec.clear_color._v.tobytes() for s in drawn]
             if self._drawn != now:
                 self._groups, self._drawn = _groups(drawn), now
             for group in self._groups:

@@ -77,7 +77,7 @@ class PeoplePart:
     def _tracker(self, agent_id: int) -> Any:
         """The agent's tracker on the present NavMesh, or None without a NavMesh or without people and capsules."""
         scene, mesh = (None, None) if self._stage is None else (self._stage.scene, self.pathfinder._mesh)
-        if self._stage is None or mesh is None or not (self._capsules or self.get_gaussian_avatar_ids()):
+        if mesh is None or not (self._capsules or (scene is not None and scene.avatar_count)):
             return None
         found = self._trackers.get(agent_id)
         if found is None or found[0] is not mesh:

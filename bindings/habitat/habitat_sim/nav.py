@@ -6,6 +6,7 @@ Distances are the shortest on the surface, where Detour's are somewhat longer.
 """
 
 import enum
+import functools
 import math
 from typing import Any, Iterable
 
@@ -239,7 +240,7 @@ class PathFinder:
 
     # ---- Points
     def _snap(self, point: Any, island_index: int) -> Any:
-        options = _engine.library().SnapOptions(half_extents=_REACH, island=None if island_index < 0 else island_index)
+        options = _snapping(None if island_index < 0 else island_index)
         return self._need("snap_point").snap_point(_triple(point), options)
 
     def snap_point(self, point: Any, island_index: int = -1) -> Vector3:
@@ -361,6 +362,11 @@ class PathFinder:
         layout = _engine.library().TopDownLayout.habitat
         grid = self._need("get_topdown_view").top_down_map(height, meters_per_pixel, eps, layout)
         return np.array(grid.islands)
+
+
+@functools.lru_cache(maxsize=16)
+def _snapping(island: int | None) -> Any:
+    return _engine.library().SnapOptions(half_extents=_REACH, island=island)
 
 
 def _check_radius(name: str, radius: float) -> None:

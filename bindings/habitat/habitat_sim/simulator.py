@@ -301,7 +301,8 @@ class Simulator(PeoplePart):
     def _draw(self, sensors: Any) -> dict[str, np.ndarray]:
         self._need_open("the sensors")
         for sensor in sensors:
-            sensor._simulator = self
+            if sensor._simulator is not self:
+                sensor._simulator = self
         return self._painter.draw(sensors, self._clock.gaussian_time)
 
     def get_sensor_observations(self, agent_ids: Any = 0) -> Any:
@@ -394,7 +395,8 @@ class Simulator(PeoplePart):
 def _while_open(name: str, call: Any) -> Any:
     @functools.wraps(call)
     def checked(self: Any, *args: Any, **kwargs: Any) -> Any:
-        self._need_open(name)
+        if self._stage is None:
+            self._need_open(name)
         return call(self, *args, **kwargs)
 
     return checked
