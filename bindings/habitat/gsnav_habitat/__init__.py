@@ -88,9 +88,9 @@ class _Closed(type):
         return made
 
 
-class Closed(metaclass=_Closed):
-    """Base of objects that have the names of their constructor only: reading or writing another one raises NotServed.
-    Objects of subclasses in other packages can be written freely."""
+class Sealed(metaclass=_Closed):
+    """Base of objects that have the names of their constructor only: writing another one raises NotServed. Objects of
+    subclasses in other packages can be written freely."""
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in self.__dict__ and "_complete" in self.__dict__:
@@ -98,6 +98,11 @@ class Closed(metaclass=_Closed):
             if name[0] != "_" and not hasattr(kind, name) and kind.__module__.partition(".")[0] == "habitat_sim":
                 raise NotServed(message(f"{kind.__module__}.{kind.__qualname__}.{name}"))
         object.__setattr__(self, name, value)
+
+
+class Closed(Sealed):
+    """Sealed objects whose other names also raise NotServed when they are read. Python reads the names that exist more
+    slowly then."""
 
     def __getattr__(self, name: str) -> Any:
         """Called for names that do not exist, and after a property raised AttributeError."""

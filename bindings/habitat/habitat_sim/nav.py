@@ -146,7 +146,7 @@ class MultiGoalShortestPath(_Path):
         self.closest_end_point_index = -1
 
 
-class PathFinder:
+class PathFinder(_shared.Closed):
     """A NavMesh with Habitat-Sim's queries. Random points depend on `seed` alone."""
 
     def __init__(self) -> None:

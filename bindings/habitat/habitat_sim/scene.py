@@ -19,9 +19,11 @@ def _unit(value: Any, what: str) -> Quaternion:
     return rotation.normalized()
 
 
-class SceneNode:
+class SceneNode(_shared.Sealed):
     """A node with a rotation and a translation relative to its parent, metres."""
 
+    _translation: Vector3
+    _rotation: Quaternion
     _world: "tuple[Vector3, Quaternion] | None"
 
     def __init__(self, parent: "SceneNode | None" = None) -> None:
@@ -56,12 +58,12 @@ class SceneNode:
 
     # ---- Pose relative to the parent
     def _put(self, translation: Vector3, rotation: Quaternion) -> None:
-        self._translation, self._rotation = translation, rotation
+        self.__dict__.update(_translation=translation, _rotation=rotation)  # Past __setattr__, because it is frequent.
         self._forget()
 
     def _forget(self) -> None:
         """Poses in the world are kept until a node above changes."""
-        self._world = None
+        self.__dict__["_world"] = None
         for child in self.children:
             child._forget()
 
@@ -144,10 +146,13 @@ class SceneNode:
     def _in_world(self) -> tuple[Vector3, Quaternion]:
         if self._world is None:
             if self.parent is None:
-                self._world = self._translation, self._rotation
+                self.__dict__["_world"] = self._translation, self._rotation
             else:
                 at, turn = self.parent._in_world()
-                self._world = at + turn.transform_vector(self._translation), (turn * self._rotation).normalized()
+                self.__dict__["_world"] = (
+                    at + turn.transform_vector(self._translation),
+                    (turn * self._rotation).normalized(),
+                )
         return self._world
 
     @property

@@ -92,8 +92,12 @@ def test_subclasses_of_settings_elsewhere_are_open():
     assert made.anything == 1
 
 
-def test_sensors_and_the_batch_renderer(sim, stage):
+def test_sensors_nodes_and_the_batch_renderer(sim, stage):
     sensor = sim.get_sensor("color_sensor")
+    for made, name in ((sensor.node, "semantic_id"), (sim.pathfinder, "no_such_name")):
+        with pytest.raises(NotImplementedError, match=f"gsnav.*{type(made).__name__}.{name}"):
+            setattr(made, name, 1)
+        assert not hasattr(made, name)
     for name in ("near_plane_dist", "zoom", "framebuffer_size"):
         with pytest.raises(NotImplementedError, match=f"gsnav.*Sensor.{name}"):
             setattr(sensor, name, 1)
