@@ -50,6 +50,11 @@ def check(spec: Any, empty: bool) -> None:
             raise NotImplementedError(_shared.message(f"{what} with noise_model {spec.noise_model!r}"))
         if not noise.is_valid_sensor_type(spec.sensor_type):
             raise ValueError(f"{what}: noise_model = {spec.noise_model!r} is not for {spec.sensor_type!r}")
+        try:
+            noise(**dict(spec.noise_model_kwargs))
+        except (TypeError, ValueError) as error:
+            kind = TypeError if isinstance(error, TypeError) else ValueError
+            raise kind(f"{what}: noise_model_kwargs = {dict(spec.noise_model_kwargs)}: {error}") from error
     if spec.gpu2gpu_transfer:
         raise NotImplementedError(_shared.message(f"{what} with gpu2gpu_transfer"))
     if len(spec.resolution) != 2 or min(spec.resolution) < 1:

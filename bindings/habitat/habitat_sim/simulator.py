@@ -429,7 +429,10 @@ def _action_seconds() -> float | None:
     text = os.environ.get("GSNAV_ACTION_SECONDS")
     if not text:
         return None
-    seconds = float(text)
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
     if not 0 < seconds < 3600:
         raise ValueError(f"GSNAV_ACTION_SECONDS = {text}: must be in (0, 3600) seconds")
     return seconds

@@ -37,8 +37,10 @@ def bytes_of(color):
 SKY, GREEN = [0.2, 0.4, 1.0, 1.0], mn.Color4(0, 1, 0)
 
 
+@pytest.mark.parametrize("together", [False, True])  # In one call for many environments, as on a GPU.
 @pytest.mark.parametrize("spec", [habitat_sim.CameraSensorSpec, habitat_sim.EquirectangularSensorSpec])
-def test_each_sensor_has_its_colour_behind_the_scene(stage, spec):
+def test_each_sensor_has_its_colour_behind_the_scene(stage, spec, together, monkeypatch):
+    monkeypatch.setattr("habitat_sim._draw._together", lambda device: together)
     specs = [camera("plain", spec=spec), camera("sky", spec=spec, clear_color=SKY),
              camera("green", spec=spec, clear_color=GREEN), camera("depth", DEPTH, spec)]  # fmt: skip
     with simulator(stage, *specs) as sim:

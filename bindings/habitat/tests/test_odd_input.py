@@ -68,6 +68,22 @@ def test_no_noise_can_be_none(stage):
         assert sim.get_sensor_observations()["color_sensor"].shape == (8, 8, 4)
 
 
+@pytest.mark.parametrize("settings", [{"bogus": 1}, {"sigma": "a"}])
+def test_settings_of_noise_are_checked_with_the_sensor(stage, settings):
+    config = small(stage, noise_model="GaussianNoiseModel", noise_model_kwargs=settings)
+    with pytest.raises((TypeError, ValueError), match=f"color_sensor.*noise_model_kwargs = .*{list(settings)[0]}"):
+        habitat_sim.Simulator(config)
+
+
+@pytest.mark.parametrize("text", ["a", "0", "nan", "inf", "1s"])
+def test_the_time_of_an_action_names_its_variable(sim, monkeypatch, text):
+    before = sim.get_agent(0).get_state(), sim.get_world_time()
+    monkeypatch.setenv("GSNAV_ACTION_SECONDS", text)
+    with pytest.raises(ValueError, match=f"GSNAV_ACTION_SECONDS = {text}: must be in .0, 3600. seconds"):
+        sim.step("move_forward")
+    assert (sim.get_agent(0).get_state(), sim.get_world_time()) == before
+
+
 def test_numbers_of_agents(sim, stage):
     zero = np.int64(0)
     assert set(sim.get_sensor_observations(zero)) == {"color_sensor", "depth_sensor"}
