@@ -43,7 +43,7 @@ void translate(const std::exception_ptr& pointer, void*) {
   } catch (const Error& e) {
     const nb::object known = nb::module_::import_("gsnav._errors").attr("BY_CODE");
     const nb::object type = known[name_of(e.code())];
-    PyErr_SetString(type.ptr(), cut(e.what(), 2000).c_str());
+    PyErr_SetString(type.ptr(), cut(e.what(), 8000).c_str());
   }
 }
 
