@@ -81,14 +81,14 @@ class NotServed(NotImplementedError, AttributeError):
     """A name that gsnav does not serve. `hasattr` is False for it, as for names that do not exist."""
 
 
-class _Closed(type):
+class _Sealing(type):
     def __call__(cls, *args: Any, **kwargs: Any) -> Any:
         made = super().__call__(*args, **kwargs)
         made.__dict__["_complete"] = True
         return made
 
 
-class Sealed(metaclass=_Closed):
+class Sealed(metaclass=_Sealing):
     """Base of objects that have the names of their constructor only: writing another one raises NotServed. Objects of
     subclasses in other packages can be written freely."""
 
@@ -100,9 +100,9 @@ class Sealed(metaclass=_Closed):
         object.__setattr__(self, name, value)
 
 
-class Closed(Sealed):
-    """Sealed objects whose other names also raise NotServed when they are read. Python reads the names that exist more
-    slowly then."""
+class FullySealed(Sealed):
+    """Sealed objects of which reading another name raises NotServed too. All reads of them are slower, so SceneNode,
+    which is read most, is not one."""
 
     def __getattr__(self, name: str) -> Any:
         """Called for names that do not exist, and after a property raised AttributeError."""

@@ -116,7 +116,7 @@ class GreedyFollowerCodes(enum.IntEnum):
     RIGHT = 2
 
 
-class _Path(_shared.Closed):
+class _Path(_shared.FullySealed):
     """Common part of the path requests. `find_path` fills `points` and `geodesic_distance` (metres)."""
 
     def __init__(self) -> None:
@@ -146,7 +146,7 @@ class MultiGoalShortestPath(_Path):
         self.closest_end_point_index = -1
 
 
-class PathFinder(_shared.Closed):
+class PathFinder(_shared.FullySealed):
     """A NavMesh with Habitat-Sim's queries. Random points depend on `seed` alone."""
 
     def __init__(self) -> None:

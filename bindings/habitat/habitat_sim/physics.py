@@ -8,7 +8,7 @@ import gsnav_habitat as _shared
 from magnum import Quaternion, Rad, Vector3
 
 
-class RigidState(_shared.Closed):
+class RigidState(_shared.FullySealed):
     """A rotation and a translation, metres."""
 
     def __init__(self, rotation: Any = None, translation: Any = None) -> None:
@@ -16,7 +16,7 @@ class RigidState(_shared.Closed):
         self.translation = Vector3() if translation is None else Vector3(*(float(x) for x in translation))
 
 
-class VelocityControl(_shared.Closed):
+class VelocityControl(_shared.FullySealed):
     """Velocities that move a body: metres and radians per second, in the frame of the world or of the body."""
 
     def __init__(self) -> None:

@@ -46,7 +46,7 @@ class FisheyeSensorModelType(enum.IntEnum):
     DOUBLE_SPHERE = 0
 
 
-class SensorSpec(_shared.Closed):
+class SensorSpec(_shared.FullySealed):
     """Fields of all sensors. Lengths in metres, `orientation` in radians about X, then Y, then Z."""
 
     def __init__(self) -> None:
@@ -145,7 +145,7 @@ def _euler(angles: Any) -> Quaternion:
     return z * y * x
 
 
-class Sensor(_shared.Closed):
+class Sensor(_shared.FullySealed):
     """A sensor on a node. A sensor of a simulator can be drawn and read."""
 
     def __init__(self, node: SceneNode, spec: Any) -> None:

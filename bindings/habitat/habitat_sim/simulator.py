@@ -33,7 +33,7 @@ _NOT_WRITTEN = {"active_dataset", "frustum_culling", "gfx_replay_manager", "navm
                 "semantic_color_map"}  # fmt: skip
 
 
-class SimulatorConfiguration(_shared.Closed):
+class SimulatorConfiguration(_shared.FullySealed):
     """Settings of a simulator. `gpu_device_id` is CUDA's number of a GPU; -1 is the CPU."""
 
     def __init__(self) -> None:
@@ -66,7 +66,7 @@ class SimulatorConfiguration(_shared.Closed):
 
 
 @dataclasses.dataclass
-class Configuration(_shared.Closed):
+class Configuration(_shared.FullySealed):
     """Settings of a simulator and its agents."""
 
     sim_cfg: Any = None

@@ -81,7 +81,7 @@ def _default_actions() -> dict[Any, ActionSpec]:
 
 
 @dataclasses.dataclass
-class AgentConfiguration(_shared.Closed):
+class AgentConfiguration(_shared.FullySealed):
     """Settings of an agent. Lengths in metres."""
 
     height: float = 1.5
