@@ -56,8 +56,8 @@ class AvatarTracker {
     const Busy::Hold hold(busy_, "AvatarTracker.move");
     finite("move: start", start);
     finite("move: end", end);
-    finite("move: t0", t0);
-    finite("move: t1", t1);
+    check_finite("AvatarTracker.move: t0", t0);
+    check_finite("AvatarTracker.move: t1", t1);
     const CapsuleSet bodies = bodies_in(t0, t1);
     const NavMesh& mesh = *scene_->navmesh;
     const std::optional<NavPoint> from = mesh.snap_point(start);
@@ -85,7 +85,7 @@ class AvatarTracker {
 
   std::vector<std::array<double, 7>> capsules(double time, std::optional<std::uint32_t> person) const {
     const Busy::Hold hold(busy_, "AvatarTracker.capsules");
-    finite("capsules: time", time);
+    check_finite("AvatarTracker.capsules: time", time);
     const CapsuleSet now = bodies_in(time, time);
     std::vector<std::array<double, 7>> rows;
     for (const DynamicCapsule& c : now.capsules()) {
@@ -98,7 +98,7 @@ class AvatarTracker {
   double distance(const Vec3d& base, double time, double radius, double height) const {
     const Busy::Hold hold(busy_, "AvatarTracker.distance");
     finite("distance: position", base);
-    finite("distance: time", time);
+    check_finite("AvatarTracker.distance: time", time);
     const CapsuleSet now = bodies_in(time, time);
     return clearance({base, radius > 0 ? radius : radius_, height > 0 ? height : height_}, now, time)
         .distance;
@@ -109,7 +109,7 @@ class AvatarTracker {
     const Busy::Hold hold(busy_, "AvatarTracker.blocked");
     finite("blocked: start", start);
     finite("blocked: end", end);
-    finite("blocked: time", time);
+    check_finite("AvatarTracker.blocked: time", time);
     const CapsuleSet now = bodies_in(time, time);
     const std::optional<NavPoint> from = scene_->navmesh->snap_point(start);
     if (!from) return false;
@@ -144,9 +144,6 @@ class AvatarTracker {
     throw std::logic_error(what);
   }
 
-  static void finite(const char* field, double value) {
-    check_finite((std::string("AvatarTracker.") + field).c_str(), value);
-  }
   static void finite(const char* field, const Vec3d& v) {
     if (is_finite(v)) return;
     throw Error(Errc::invalid_argument, std::string("AvatarTracker.") + field + " = (" +

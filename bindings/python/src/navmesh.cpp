@@ -136,6 +136,15 @@ void check_island(const NavMesh& mesh, const char* what, std::optional<std::size
                                           ": must be in [0, " + std::to_string(count - 1) + "]");
 }
 
+/// A function that returns a number of an island that exists.
+template <class Method>
+auto of_island(const char* what, Method method) {
+  return [what, method](const NavMesh& mesh, std::size_t island) {
+    check_island(mesh, what, island);
+    return (mesh.*method)(island);
+  };
+}
+
 std::optional<NavPoint> random_point_near(const NavMesh& mesh, Rng& rng, const Vec3d& point,
                                           double radius, std::optional<std::size_t> island) {
   check_island(mesh, "NavMesh.random_point_near", island);
@@ -277,21 +286,11 @@ void bind_mesh(nb::class_<NavMesh>& c) {
             return island == kNoIsland ? std::nullopt : std::optional(island);
           },
           nb::arg("poly"), "Island of a polygon. None if it is no polygon of this mesh.")
-      .def(
-          "island_area",
-          [](const NavMesh& n, std::size_t island) {
-            check_island(n, "NavMesh.island_area", island);
-            return n.island_area(island);
-          },
-          nb::arg("island"), "Area of an island, square metres.")
-      .def(
-          "island_radius",
-          [](const NavMesh& n, std::size_t island) {
-            check_island(n, "NavMesh.island_radius", island);
-            return n.island_radius(island);
-          },
-          nb::arg("island"),
-          "Largest ground-plane distance of a vertex from the centroid of the island, metres.");
+      .def("island_area", of_island("NavMesh.island_area", &NavMesh::island_area), nb::arg("island"),
+           "Area of an island, square metres.")
+      .def("island_radius", of_island("NavMesh.island_radius", &NavMesh::island_radius),
+           nb::arg("island"),
+           "Largest ground-plane distance of a vertex from the centroid of the island, metres.");
 }
 
 }  // namespace
