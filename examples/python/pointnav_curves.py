@@ -3,7 +3,8 @@
 
     pointnav_curves.py meshes/log.csv gaussians/log.csv both/log.csv --metrics success spl --out curves.png
 
-A run is named after the folder of its log, or after the log where the folder has several.
+A run is named after the folder of its log, or after the log where the folder has several. Runs whose names would be
+equal have the paths of their logs.
 """
 
 from __future__ import annotations
@@ -73,7 +74,8 @@ def main() -> None:
     except (OSError, ValueError) as e:
         sys.exit(f"pointnav_curves.py: {e}")
     folders = [log.parent for log in logs]
-    runs = {log.parent.name if folders.count(log.parent) == 1 else log.stem: rows for log, rows in logs.items()}
+    names = [log.parent.name if folders.count(log.parent) == 1 else log.stem for log in logs]
+    runs = {name if names.count(name) == 1 else str(log): rows for name, (log, rows) in zip(names, logs.items())}
     for log, rows in logs.items():
         missing = [m for m in ("frames", *args.metrics) if m not in rows[0]]
         if missing:

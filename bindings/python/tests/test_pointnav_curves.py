@@ -22,24 +22,42 @@ def log_of(folder, spl):
     return folder / "log.csv"
 
 
-def test_curves_are_moving_means_of_each_run(tmp_path, monkeypatch):
+@pytest.fixture
+def lines_of(tmp_path, monkeypatch):
+    """Draws logs, and returns the lines by their names."""
     pyplot = pytest.importorskip("matplotlib.pyplot")
     monkeypatch.syspath_prepend(FOLDER)
     monkeypatch.setattr(pyplot, "close", lambda figure: None)
     import pointnav_curves
 
+    def draw(logs):
+        monkeypatch.setattr(sys, "argv", ["curves", *map(str, logs), "--metrics", "spl", "--mean", "4",
+                                          "--out", str(tmp_path / "out.png")])
+        pointnav_curves.main()
+        return {line.get_label(): line.get_xydata() for line in pyplot.gcf().axes[0].lines}
+
+    return draw
+
+
+def test_curves_are_moving_means_of_each_run(tmp_path, lines_of):
     runs = {n: np.random.default_rng(i).random(20).tolist() for i, n in enumerate(("meshes", "both"))}
-    logs = [log_of(tmp_path / name, spl) for name, spl in runs.items()]
-    monkeypatch.setattr(sys, "argv", ["curves", *map(str, logs), "--metrics", "spl", "--mean", "4",
-                                      "--out", str(tmp_path / "out.png")])
-    pointnav_curves.main()
-    lines = {line.get_label(): line.get_xydata() for line in pyplot.gcf().axes[0].lines}
+    lines = lines_of([log_of(tmp_path / name, spl) for name, spl in runs.items()])
     assert set(lines) == set(runs)
     for name, spl in runs.items():
         np.testing.assert_allclose(lines[name][:, 1], np.convolve(spl, np.full(4, 0.25), "valid"))
         np.testing.assert_allclose(lines[name][:, 0], np.arange(400, 2001, 100))
     assert (tmp_path / "out.png").read_bytes()[:4] == b"\x89PNG"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["both", "meshes", "out.png"]
+
+
+def test_no_run_is_lost_where_names_are_equal(tmp_path, lines_of):
+    logs = []
+    for i, place in enumerate(("a", "b")):
+        (tmp_path / place).mkdir()
+        logs.append(log_of(tmp_path / place / "run", [0.1 + i] * 5))
+    lines = lines_of([*logs, log_of(tmp_path / "other", [5] * 5)])
+    assert {name: line[0, 1] for name, line in lines.items()} == pytest.approx(
+        {str(logs[0]): 0.1, str(logs[1]): 1.1, "other": 5})
 
 
 def test_errors_name_the_file_and_the_field(tmp_path):
