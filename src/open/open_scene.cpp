@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "gsnav/detail/core/field_check.hpp"
+#include "gsnav/detail/demo/people.hpp"
 #include "gsnav/detail/scene/up_axis.hpp"
 #include "parts.hpp"
 
