@@ -128,16 +128,22 @@ class Quaternion:
         """Whether the squared length differs from 1 by less than 2e-5."""
         return abs(self.dot() - 1) < 2e-5
 
+    def _need_unit(self, method: str) -> None:
+        if not self.is_normalized():
+            raise ValueError(f"Quaternion.{method}: {self!r} does not have length 1")
+
     def normalized(self) -> "Quaternion":
         """The quaternion with length 1."""
         return self / self.length()
 
     def angle(self) -> Rad:
-        """Angle of the rotation, 0 to 2 pi."""
+        """Angle of the rotation, 0 to 2 pi. Raises ValueError unless the length is 1."""
+        self._need_unit("angle")
         return Rad(2 * math.acos(max(-1.0, min(1.0, self._q[3]))))
 
     def axis(self) -> Vector3:
-        """Axis of the rotation; NaN for no rotation."""
+        """Axis of the rotation; NaN for no rotation. Raises ValueError unless the length is 1."""
+        self._need_unit("axis")
         return self.vector.normalized()
 
     def conjugated(self) -> "Quaternion":
@@ -150,16 +156,21 @@ class Quaternion:
         return self.conjugated() / self.dot()
 
     def inverted_normalized(self) -> "Quaternion":
-        """The inverse of a quaternion of length 1."""
+        """The inverse of a quaternion of length 1. Raises ValueError for another length."""
+        self._need_unit("inverted_normalized")
         return self.conjugated()
 
     # ---- Rotating
     def transform_vector(self, vector: Any) -> Vector3:
         """The vector rotated by this quaternion of any length but 0."""
-        return self.normalized().transform_vector_normalized(vector)
+        return self.normalized()._turned(vector)
 
     def transform_vector_normalized(self, vector: Any) -> Vector3:
-        """The vector rotated by this quaternion of length 1."""
+        """The vector rotated by this quaternion of length 1. Raises ValueError for another length."""
+        self._need_unit("transform_vector_normalized")
+        return self._turned(vector)
+
+    def _turned(self, vector: Any) -> Vector3:
         a, b, c = Vector3._of(vector)._v
         x, y, z, w = self._q
         tx, ty, tz = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
@@ -169,7 +180,7 @@ class Quaternion:
         """The rotation as a Matrix3."""
         from ._matrix import Matrix3
 
-        return Matrix3(*(self.transform_vector_normalized(a) for a in ((1, 0, 0), (0, 1, 0), (0, 0, 1))))
+        return Matrix3(*(self._turned(a) for a in ((1, 0, 0), (0, 1, 0), (0, 0, 1))))
 
     # ---- Operators
     def _with(self, values: Any) -> "Quaternion":

@@ -189,6 +189,13 @@ class _Vector:
         line = self._of(line)
         return line * (self.dot(line) / line.dot())
 
+    def projected_onto_normalized(self, line: Any) -> Any:
+        """Projection onto the line through the origin along `line`. Raises ValueError unless its length is 1."""
+        line = self._of(line)
+        if not line.is_normalized():
+            raise ValueError(f"projected_onto_normalized: {line!r} does not have length 1")
+        return line * self.dot(line)
+
     def sum(self) -> float:
         """Sum of the components."""
         return sum(self._v)

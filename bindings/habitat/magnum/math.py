@@ -82,7 +82,8 @@ def lerp(a: Any, b: Any, t: float) -> Any:
 
 
 def slerp(a: Quaternion, b: Quaternion, t: float) -> Quaternion:
-    """Spherical interpolation of two quaternions of length 1."""
+    """Spherical interpolation of two quaternions of length 1. Raises ValueError for another length."""
+    a._need_unit("slerp"), b._need_unit("slerp")
     cosine = dot(a, b)
     if abs(cosine) >= 1 - 1e-6:
         return Quaternion(a.vector, a.scalar)

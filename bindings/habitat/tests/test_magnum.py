@@ -117,6 +117,13 @@ def test_quaternion_parts_constructors_and_errors():
     assert q.xyzw == [1, 2, 3, 4] and q.wxyz == [4, 1, 2, 3] and q.dot() == 30
     assert mn.Quaternion() == mn.Quaternion.identity_init() == mn.Quaternion(mn.Vector3(), 1)
     assert pickle.loads(pickle.dumps(q)) == q and copy.deepcopy(q) == q
+    long = mn.Quaternion(mn.Vector3(2, 0, 0), 2)
+    for call in (long.inverted_normalized, long.angle, long.axis, lambda: long.transform_vector_normalized([0, 1, 0]),
+                 lambda: mn.math.slerp(long, mn.Quaternion(), 0.5), lambda: mn.math.slerp(mn.Quaternion(), long, 0.5),
+                 lambda: mn.Vector3(1, 2, 3).projected_onto_normalized([0, 2, 0])):  # fmt: skip
+        with pytest.raises(ValueError, match="does not have length 1"):
+            call()
+    assert mn.Vector3(1, 2, 3).projected_onto_normalized([0, 1, 0]) == mn.Vector3(0, 2, 0)
     half = mn.math.slerp(mn.Quaternion(), mn.Quaternion.rotation(mn.Deg(80), mn.Vector3.z_axis()), 0.5)
     assert half == mn.Quaternion.rotation(mn.Deg(40), mn.Vector3.z_axis())
     assert half.angle() == mn.Deg(40) and half.axis() == [0, 0, 1]
