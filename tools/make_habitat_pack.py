@@ -153,6 +153,8 @@ def make_of_scans(root: pathlib.Path, scans: list[pathlib.Path], train: int, oth
     """Writes episodes in scans below a folder, and a NavMesh beside each scan that has none."""
     places = []
     for scan in scans:
+        if not scan.exists():
+            raise OSError(f"{scan}: no such file")  # Names of scenes that gsnav makes are none either.
         opened = gsnav.open_scene(scan, gsnav.OpenOptions(navmesh="auto"))
         mesh = opened.scene.navmesh
         beside = scan.with_suffix(".navmesh")
