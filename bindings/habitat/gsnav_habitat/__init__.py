@@ -33,13 +33,18 @@ def _distributions() -> dict[str, str]:
 
 
 def _strangers() -> Iterator[str]:
-    """Descriptions of packages that Python finds before those of this distribution, with or without metadata."""
+    """Descriptions of packages of other distributions on the path, with or without metadata."""
     here = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
     for package in ("habitat_sim", "magnum", "corrade"):
         loaded = sys.modules.get(package)
         spec = PathFinder.find_spec(package) if loaded is None else loaded.__spec__
-        if spec is not None and spec.origin and os.path.dirname(os.path.dirname(os.path.realpath(spec.origin))) != here:
-            yield f"{package.replace('_', '-')} of unknown version, in {os.path.dirname(spec.origin)},"
+        found = [] if spec is None or not spec.origin else [os.path.dirname(spec.origin)]
+        for folder in sys.path:  # Those that Python would find later.
+            if os.path.isfile(os.path.join(folder, package, "__init__.py")):
+                found.append(os.path.join(folder, package))
+        for folder in found:
+            if os.path.dirname(os.path.realpath(folder)) != here:
+                yield f"{package.replace('_', '-')} of unknown version, in {folder},"
 
 
 def version() -> str:
@@ -59,6 +64,7 @@ def claim() -> None:
             f"The distributions gsnav-habitat {version()} and {rival.strip()} both provide habitat_sim or magnum. "
             "Uninstall one of them."
         )
+    sys.meta_path.append(_UnservedModules)
     if os.environ.setdefault("GSNAV_HABITAT_NOTICE", str(os.getpid())) == str(os.getpid()):
         warnings.warn(
             f"habitat_sim is provided by gsnav (gsnav-habitat {version()}): its navigation part. Not affiliated with "
@@ -81,11 +87,52 @@ class NotServed(NotImplementedError, AttributeError):
     """A name that gsnav does not serve. `hasattr` is False for it, as for names that do not exist."""
 
 
+class NotServedImport(NotImplementedError, ImportError):
+    """A module, or a name that is imported from one, that gsnav does not serve."""
+
+
+class _UnservedModules:
+    """The last finder of modules. It raises NotServedImport for those of Habitat-Sim that no finder found, and so for
+    `from habitat_sim import name` too, which looks for a module of that name."""
+
+    @staticmethod
+    def find_spec(name: str, path: Any = None, target: Any = None) -> None:
+        """Finds nothing."""
+        root, _, rest = name.partition(".")
+        if root in ("habitat_sim", "magnum", "corrade") and rest and rest.rpartition(".")[2][0] != "_":
+            raise NotServedImport(message(name))
+
+
+class _UnservedMember:
+    """An attribute of a class that gsnav does not serve. Reading and writing it raise NotServed."""
+
+    def __init__(self, name: str) -> None:
+        self._message = message(name)
+
+    def __get__(self, of: Any, kind: Any = None) -> NoReturn:
+        raise NotServed(self._message)
+
+    def __set__(self, of: Any, value: Any) -> NoReturn:
+        raise NotServed(self._message)
+
+
+def unserved_members(owner: type, *names: str) -> None:
+    """Lets reading and writing these attributes of a class and of its objects raise NotServed."""
+    for name in names:
+        setattr(owner, name, _UnservedMember(f"{owner.__module__}.{owner.__qualname__}.{name}"))
+
+
 class _Sealing(type):
     def __call__(cls, *args: Any, **kwargs: Any) -> Any:
         made = super().__call__(*args, **kwargs)
         made.__dict__["_complete"] = True
         return made
+
+    def __getattr__(cls, name: str) -> NoReturn:
+        """Called for names that a class does not have."""
+        if name[0] == "_":
+            raise AttributeError(f"type object {cls.__name__!r} has no attribute {name!r}")
+        raise NotServed(message(f"{cls.__module__}.{cls.__qualname__}.{name}"))
 
 
 class Sealed(metaclass=_Sealing):
@@ -128,6 +175,7 @@ def complete(package: str) -> None:
     for name, module in list(sys.modules.items()):
         if f"{name}.".startswith(f"{package}.") and "._" not in name:
             vars(module).setdefault("__getattr__", missing(name))
+            vars(module).setdefault("__path__", [])  # So that _UnservedModules is asked for names that are imported.
 
 
 class _Unserved(type):

@@ -210,7 +210,7 @@ def _nothing(spec: Any) -> np.ndarray:
     if spec.sensor_type == SensorType.DEPTH:
         return np.zeros(shape, np.float32)
     out = np.empty((*shape, 4), np.uint8)
-    out[...] = np.round(255 * np.clip(np.array(spec.clear_color), 0, 1))
+    out[...] = np.floor(255 * np.clip(np.array(spec.clear_color), 0, 1) + np.float32(0.5))  # As images of scenes.
     return out
 
 

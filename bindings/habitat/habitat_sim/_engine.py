@@ -78,10 +78,21 @@ def _stamp(name: str) -> Any:
     return status.st_mtime_ns, status.st_size
 
 
+def capsule(what: str, radius: float, height: float) -> tuple[float, float]:
+    """Radius and height of a body among people, metres. Raises ValueError for a body that is wider than high."""
+    if float(radius) > float(height) / 2:
+        raise ValueError(
+            f"{what}: radius = {radius}, height = {height}: among people a body is a capsule within its height, so the "
+            "radius must be at most half of the height"
+        )
+    return float(radius), float(height)
+
+
 def walker(mesh: Any, capsules: list[list[float]]) -> Any:
     """A gsnav.AvatarTracker among capsules, of the agent that a NavMesh was built for."""
     gsnav, body = library(), mesh.settings
-    made = gsnav.AvatarTracker(gsnav.SimulatorScene(navmesh=mesh), body.agent_radius, body.agent_height)
+    radius, height = capsule("NavMeshSettings", body.agent_radius, body.agent_height)
+    made = gsnav.AvatarTracker(gsnav.SimulatorScene(navmesh=mesh), radius, height)
     made.set_capsules(capsules)
     return made
 
@@ -98,6 +109,7 @@ def stage(name: str, settings: Any, required: bool = False) -> Stage:
     if the file has other settings and these are `required`. Raises FileNotFoundError naming the scene, InvalidArgument
     naming a required setting out of range, and the errors of gsnav.open_scene.
     """
+    people = _people()
     if is_empty(name):
         return Stage(None)
     gsnav = library()
@@ -106,7 +118,7 @@ def stage(name: str, settings: Any, required: bool = False) -> Stage:
     stem, extension = os.path.splitext(name)
     beside = next((p for p in (stem + ".navmesh", name + ".navmesh") if extension and os.path.isfile(p)), None)
     key = (os.path.abspath(name), _stamp(name), beside, beside and _stamp(beside),
-           repr(settings) if required or not beside else None, _people())  # fmt: skip
+           repr(settings) if required or not beside else None, people)  # fmt: skip
     with _lock:
         found = _stages.get(key)
         if found is None:
@@ -116,7 +128,7 @@ def stage(name: str, settings: Any, required: bool = False) -> Stage:
 
 def _people() -> int:
     """GSNAV_PEOPLE: how many procedural people walk in each scene. 0: those that belong to it."""
-    text = os.environ.get("GSNAV_PEOPLE", "0")
+    text = os.environ.get("GSNAV_PEOPLE") or "0"
     if not text.isdecimal() or len(text) > 4 or int(text) > _MOST_PEOPLE:
         raise ValueError(f"GSNAV_PEOPLE = {text}: must be a number of people in [0, {_MOST_PEOPLE}]")
     return int(text)

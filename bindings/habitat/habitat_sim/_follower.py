@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 
+import gsnav_habitat as _shared
+
 from . import _engine, errors
 
 
-class GreedyGeodesicFollower:
+class GreedyGeodesicFollower(_shared.FullySealed):
     """Policy that follows the shortest path with an agent's own actions.
 
     `next_action_along(goal)` returns one of the four keys; `find_path(goal)` all of them, the stop key last.

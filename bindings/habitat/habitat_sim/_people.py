@@ -2,12 +2,15 @@
 """People of a scene: the part of a simulator that has the names of Habitat-GS, and metrics of agents among people."""
 
 import math
+import numbers
 import sys
 from typing import Any
 
 import numpy as np
 
 from . import _engine
+
+_FARTHEST = 1e9  # Metres.
 
 # Settings of the scene's clock with their defaults. Times in seconds.
 TIME_SETTINGS = {
@@ -65,8 +68,8 @@ class PeoplePart:
     _painter: Any
     _capsules: list[list[float]]
 
-    def _open_people(self) -> None:
-        self._clock = Clock(self.config.sim_cfg)
+    def _open_people(self, clock: Clock) -> None:
+        self._clock = clock
         self._trackers = {}
         self._hidden: set[int] = set()
         self.clear_navmesh_dynamic_capsules()
@@ -82,10 +85,21 @@ class PeoplePart:
         found = self._trackers.get(agent_id)
         if found is None or found[0] is not mesh:
             gsnav, body = _engine.library(), self.agents[agent_id].agent_config
-            made = gsnav.AvatarTracker(gsnav.SimulatorScene(scene, mesh), float(body.radius), float(body.height))
+            radius, height = _engine.capsule("AgentConfiguration", body.radius, body.height)
+            made = gsnav.AvatarTracker(gsnav.SimulatorScene(scene, mesh), radius, height)
             made.set_capsules(self._capsules)
             found = self._trackers[agent_id] = (mesh, made)
         return found[1]
+
+    def _tracker_for(self, method: str, radius: float, height: float) -> Any:
+        """The default agent's tracker, for a query of a body of these sizes."""
+        default = self.config.sim_cfg.default_agent_id
+        tracker = self._tracker(default)
+        if tracker is not None:
+            body = self.agents[default].agent_config
+            sizes = radius if radius > 0 else body.radius, height if height > 0 else body.height
+            _engine.capsule(f"Simulator.{method}", *sizes)
+        return tracker
 
     def _begin_people(self, agent_id: int) -> None:
         tracker = self._tracker(agent_id)
@@ -132,10 +146,10 @@ class PeoplePart:
     ) -> float:
         """Distance from the surface of an agent at a position to the nearest person, negative in overlap, infinite
         without people. A size that is not positive is that of the default agent. Raises ValueError naming a number
-        that is not finite."""
-        _check_finite("distance_to_avatar_proxy_capsules", agent_base_pos=agent_base_pos, agent_radius=agent_radius,
+        that is beyond 1e9 or not finite, and for a body wider than it is high."""
+        _check_length("distance_to_avatar_proxy_capsules", agent_base_pos=agent_base_pos, agent_radius=agent_radius,
                       agent_height=agent_height)  # fmt: skip
-        tracker = self._tracker(self.config.sim_cfg.default_agent_id)
+        tracker = self._tracker_for("distance_to_avatar_proxy_capsules", agent_radius, agent_height)
         if tracker is None:
             return math.inf
         return tracker.distance(_triple(agent_base_pos), self._clock.gaussian_time, agent_radius, agent_height)
@@ -145,10 +159,10 @@ class PeoplePart:
         agent_height: float = -1.0, block_eps: float = 1e-5,
     ) -> bool:  # fmt: skip
         """Whether a person, standing as now, would stop or deflect a move. The contact is exact: `block_eps` has no
-        effect. Raises ValueError naming a number that is not finite."""
-        _check_finite("is_step_blocked_by_avatar_proxy_capsules", start=start, end=end, agent_radius=agent_radius,
-                      agent_height=agent_height)  # fmt: skip
-        tracker = self._tracker(self.config.sim_cfg.default_agent_id)
+        effect. Raises the errors of distance_to_avatar_proxy_capsules."""
+        _check_length("is_step_blocked_by_avatar_proxy_capsules", start=start, end=end, agent_radius=agent_radius,
+                      agent_height=agent_height, block_eps=block_eps)  # fmt: skip
+        tracker = self._tracker_for("is_step_blocked_by_avatar_proxy_capsules", agent_radius, agent_height)
         if tracker is None:
             return False
         return tracker.blocked(
@@ -160,15 +174,15 @@ class PeoplePart:
 
         `capsules`: numbers [N][7], rows of x0, y0, z0, x1, y1, z1, radius in metres. They replace those of the last
         call, stand still, and count as one person in measures. Steps of the PathFinder stop at them too. Raises
-        ValueError for another shape, a value that is not finite or a negative radius.
+        ValueError for another shape, a value that is beyond 1e9 or not finite, or a negative radius.
         """
         rows = np.asarray(capsules, dtype=np.float64)
         if rows.size == 0:
             rows = rows.reshape(0, 7)
         if rows.ndim != 2 or rows.shape[1] != 7:
             raise ValueError(f"set_navmesh_dynamic_capsules: shape {rows.shape}: must be (n, 7)")
-        if not np.isfinite(rows).all() or (rows[:, 6] < 0).any():
-            raise ValueError("set_navmesh_dynamic_capsules: values must be finite, and radii 0 or more")
+        if not (np.abs(rows) <= _FARTHEST).all() or (rows[:, 6] < 0).any():
+            raise ValueError("set_navmesh_dynamic_capsules: values must be within 1e9 m, and radii 0 or more")
         self._capsules = rows.tolist()
         for _, tracker in self._trackers.values():
             tracker.set_capsules(self._capsules)
@@ -180,7 +194,9 @@ class PeoplePart:
 
     def set_gaussian_avatar_visible(self, avatar_id: int, visible: bool) -> bool:
         """Draws a person, or leaves it out of images. It stops agents and counts in measures either way. Returns
-        False for a number that no person has."""
+        False for a number that no person has. Raises TypeError unless the number is an integer."""
+        if isinstance(avatar_id, (bool, np.bool_)) or not isinstance(avatar_id, numbers.Integral):
+            raise TypeError(f"set_gaussian_avatar_visible: avatar_id = {avatar_id!r}: must be an integer")
         ids = self.get_gaussian_avatar_ids()
         if avatar_id not in ids:
             return False
@@ -204,10 +220,10 @@ class PeoplePart:
         return self._clock.gaussian_time_min, self._clock.gaussian_time_max
 
 
-def _check_finite(method: str, **values: Any) -> None:
+def _check_length(method: str, **values: Any) -> None:
     for name, value in values.items():
-        if not np.isfinite(np.asarray(value, dtype=np.float64)).all():
-            raise ValueError(f"Simulator.{method}: {name} = {value}: must be finite")
+        if not (np.abs(np.asarray(value, dtype=np.float64)) <= _FARTHEST).all():
+            raise ValueError(f"Simulator.{method}: {name} = {value}: must be finite and within 1e9 m")
 
 
 def _setting(name: str) -> property:

@@ -5,8 +5,10 @@ from typing import Any, Iterable
 
 import numpy as np
 
+import gsnav_habitat as _shared
 
-class GaussianAvatar:
+
+class GaussianAvatar(_shared.FullySealed):
     """A person of a scene."""
 
     def __init__(self, sim: Any, avatar_id: int) -> None:
@@ -16,6 +18,7 @@ class GaussianAvatar:
     def get_navmesh_capsules(self) -> np.ndarray:
         """Capsules that stop agents, at the present time: float32 [N][7], x0, y0, z0, x1, y1, z1, radius in metres.
         There are none while the person is absent, or in a scene without a NavMesh."""
+        self.sim._need_open("get_navmesh_capsules")
         tracker = self.sim._tracker(self.sim.config.sim_cfg.default_agent_id)
         if tracker is None:
             return np.empty((0, 7), np.float32)
@@ -26,7 +29,7 @@ class GaussianAvatar:
         return len(self.get_navmesh_capsules()) > 0
 
 
-class GaussianAvatarManager:
+class GaussianAvatarManager(_shared.FullySealed):
     """All people of a scene."""
 
     def __init__(self, avatars: Iterable[GaussianAvatar]) -> None:

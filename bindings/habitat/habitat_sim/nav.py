@@ -8,6 +8,7 @@ Distances are the shortest on the surface, where Detour's are somewhat longer.
 import enum
 import functools
 import math
+import operator
 from typing import Any, Iterable
 
 import numpy as np
@@ -57,6 +58,11 @@ class NavMeshSettings:
             raise _shared.NotServed(_shared.message(f"habitat_sim.nav.NavMeshSettings has no field {name!r}"))
         self.__dict__[name] = type(self._DEFAULTS[name])(value)
 
+    def __getattr__(self, name: str) -> Any:
+        if name[0] == "_":
+            raise AttributeError(f"NavMeshSettings has no attribute {name!r}")
+        raise _shared.NotServed(_shared.message(f"habitat_sim.nav.NavMeshSettings.{name}"))
+
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, NavMeshSettings):
             return NotImplemented
@@ -87,7 +93,9 @@ class NavMeshSettings:
 
     def _native(self) -> Any:
         """The same settings as gsnav.NavMeshSettings. Scenes have no objects, so include_static_objects has no
-        effect."""
+        effect. Raises TypeError for another object."""
+        if not isinstance(self, NavMeshSettings):
+            raise TypeError(f"navmesh_settings = {self!r}: must be a habitat_sim.NavMeshSettings")
         values = {**self.__dict__, "verts_per_poly": int(self.verts_per_poly)}
         return _engine.library().NavMeshSettings(**values)
 
@@ -99,7 +107,7 @@ class NavMeshSettings:
         return made
 
 
-class HitRecord:
+class HitRecord(_shared.FullySealed):
     """The nearest point of a wall: `hit_pos`, `hit_normal` (into the free space) and `hit_dist` in metres."""
 
     def __init__(self, hit_pos: Any = (0, 0, 0), hit_normal: Any = (0, 0, 0), hit_dist: float = 0.0) -> None:
@@ -208,6 +216,7 @@ class PathFinder(_shared.FullySealed):
         return [int(i) for i in self._surface(island_index)[1].reshape(-1)]
 
     def _surface(self, island_index: int) -> Any:
+        island_index = _island("build_navmesh_vertices", island_index)
         return self._need("build_navmesh_vertices").surface(None if island_index < 0 else island_index)
 
     # ---- Islands, numbered by decreasing area
@@ -223,7 +232,7 @@ class PathFinder(_shared.FullySealed):
 
     def island_area(self, island_index: int = -1) -> float:
         """Area of an island or, for -1, of the surface, square metres."""
-        mesh = self._need("island_area")
+        mesh, island_index = self._need("island_area"), _island("island_area", island_index)
         return mesh.navigable_area() if island_index < 0 else mesh.island_area(island_index)
 
     def island_radius(self, where: Any) -> float:
@@ -245,12 +254,13 @@ class PathFinder(_shared.FullySealed):
 
     def snap_point(self, point: Any, island_index: int = -1) -> Vector3:
         """Nearest point of the surface within 2 m on the ground and 4 m in height. NaN if there is none."""
+        island_index = _island("snap_point", island_index)
         at = self._snap(point, island_index)
         return Vector3(_NAN) if at is None else Vector3(*at.position)
 
     def is_navigable(self, pt: Any, max_y_delta: float = 0.5) -> bool:
-        """Whether a point is at most `max_y_delta` metres above or below the surface."""
-        return self._need("is_navigable").is_navigable(_triple(pt), max_y_delta)
+        """Whether a point is at most `max_y_delta` metres above or below the surface, which may be infinite."""
+        return self._need("is_navigable").is_navigable(_triple(pt), min(float(max_y_delta), 1e9))
 
     def seed(self, seed: int) -> None:
         """Seeds the random points. The same seed repeats them."""
@@ -264,6 +274,7 @@ class PathFinder(_shared.FullySealed):
     def get_random_navigable_point(self, max_tries: int = 10, island_index: int = -1) -> Vector3:
         """Random point, uniform over the surface or one island. NaN for an island that does not exist."""
         mesh = self._need("get_random_navigable_point")
+        island_index = _island("get_random_navigable_point", island_index)
         if island_index >= mesh.island_count():
             return Vector3(_NAN)
         return Vector3(*mesh.random_point(self._random(), None if island_index < 0 else island_index).position)
@@ -274,6 +285,7 @@ class PathFinder(_shared.FullySealed):
         """Random point within `radius` metres of another, uniform over that part. NaN if it is empty. The radius may be
         infinite. Raises ValueError for one that is negative or NaN."""
         mesh = self._need("get_random_navigable_point_near")
+        island_index = _island("get_random_navigable_point_near", island_index)
         _check_radius("get_random_navigable_point_near: radius", radius)
         if island_index >= mesh.island_count():
             return Vector3(_NAN)
@@ -367,6 +379,13 @@ class PathFinder(_shared.FullySealed):
 @functools.lru_cache(maxsize=16)
 def _snapping(island: int | None) -> Any:
     return _engine.library().SnapOptions(half_extents=_REACH, island=island)
+
+
+def _island(method: str, index: Any) -> int:
+    try:
+        return operator.index(index)
+    except TypeError:
+        raise TypeError(f"PathFinder.{method}: island_index = {index!r}: must be an integer") from None
 
 
 def _check_radius(name: str, radius: float) -> None:

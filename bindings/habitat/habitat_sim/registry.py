@@ -5,13 +5,15 @@ import collections
 import re
 from typing import Any
 
+import gsnav_habitat as _shared
+
 
 def _camel_to_snake(name: str) -> str:
     split = re.sub(r"(.)([A-Z][a-z]+)", r"\1_\2", name)
     return re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", split).lower()
 
 
-class _Registry:
+class _Registry(_shared.FullySealed):
     """Names by kind."""
 
     _mapping: dict[str, dict[str, Any]] = collections.defaultdict(dict)

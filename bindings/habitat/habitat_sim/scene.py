@@ -28,6 +28,7 @@ class SceneNode(_shared.Sealed):
 
     def __init__(self, parent: "SceneNode | None" = None) -> None:
         self.children: list[SceneNode] = []
+        self._simulator: Any = None  # The simulator of a root.
         self.parent = parent
         self._put(Vector3(), Quaternion())
         self.node_sensors: dict[str, Any] = {}
@@ -185,7 +186,13 @@ class SceneNode(_shared.Sealed):
         self.rotation = back * rotation
 
 
-class SceneGraph:
+_shared.unserved_members(
+    SceneNode, "type", "semantic_id", "object_semantic_id", "drawable_semantic_id", "cumulative_bb", "mesh_bb",
+    "compute_cumulative_bb", "drawables", "absolute_aabb",
+)  # fmt: skip
+
+
+class SceneGraph(_shared.FullySealed):
     """A tree of nodes."""
 
     def __init__(self) -> None:

@@ -46,8 +46,20 @@ class FisheyeSensorModelType(enum.IntEnum):
     DOUBLE_SPHERE = 0
 
 
+# Fields of a sensor's specification that can be changed: poses are read by set_transformation_from_spec, others when an
+# image is drawn.
+_CHANGEABLE = ("position", "orientation", "clear_color", "noise_model_kwargs")
+
+
+def _whole(x: Any) -> int:
+    if int(x) != x:
+        raise TypeError(f"SensorSpec.resolution: {x!r}: must be an integer")
+    return int(x)
+
+
 class SensorSpec(_shared.FullySealed):
-    """Fields of all sensors. Lengths in metres, `orientation` in radians about X, then Y, then Z."""
+    """Fields of all sensors. Lengths in metres, `orientation` in radians about X, then Y, then Z. Most fields of a
+    specification that belongs to a sensor cannot be changed; a copy can."""
 
     def __init__(self) -> None:
         self.uuid = ""
@@ -59,18 +71,36 @@ class SensorSpec(_shared.FullySealed):
         self.position, self.orientation = Vector3(0, 1.5, 0), Vector3()
 
     def __setattr__(self, name: str, value: Any) -> None:
+        if "_taken" in self.__dict__ and name not in _CHANGEABLE and hasattr(self, name):
+            raise NotImplementedError(_shared.message(f"changing {name} of sensor {self.uuid!r}"))
         if name in ("position", "orientation"):
             value = Vector3(*(float(x) for x in value))
         elif name == "resolution":
-            value = [int(x) for x in value]
+            value = [_whole(x) for x in value]
         elif name == "hfov" and isinstance(value, Rad):
             value = Deg(value)
         elif name == "clear_color":
             value = value if isinstance(value, Color4) else Color4(*(float(x) for x in value))
         super().__setattr__(name, value)
 
+    def _take(self) -> "SensorSpec":
+        """Makes this the specification of a sensor."""
+        self.__dict__["_taken"] = True
+        if "resolution" in self.__dict__:
+            self.__dict__["resolution"] = tuple(self.__dict__["resolution"])
+        return self
+
+    def __getstate__(self) -> Any:
+        """Fields of a copy, which belongs to no sensor."""
+        made = {name: value for name, value in self.__dict__.items() if name != "_taken"}
+        if "resolution" in made:
+            made["resolution"] = list(made["resolution"])
+        return made
+
     def __eq__(self, other: object) -> bool:
-        return type(self) is type(other) and self.__dict__ == other.__dict__
+        return isinstance(other, SensorSpec) and type(self) is type(other) and (
+            self.__getstate__() == other.__getstate__()
+        )
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -149,8 +179,7 @@ class Sensor(_shared.FullySealed):
     """A sensor on a node. A sensor of a simulator can be drawn and read."""
 
     def __init__(self, node: SceneNode, spec: Any) -> None:
-        self.node, self._spec = node, spec
-        self._simulator: Any = None
+        self.node, self._spec = node, spec._take()
         self._image: Any = None
         node.node_sensors[spec.uuid] = self
         self.set_transformation_from_spec()
@@ -187,12 +216,24 @@ class Sensor(_shared.FullySealed):
         self.node.translation = self._spec.position
         self.node.rotation = _euler(self._spec.orientation)
 
+    def _simulator(self) -> Any:
+        """The simulator that the node belongs to. Raises RuntimeError if there is none, or if it is closed."""
+        node = self.node
+        while node.parent is not None:
+            node = node.parent
+        found = node._simulator
+        if found is None:
+            raise RuntimeError(f"sensor {self.uuid!r} belongs to no simulator")
+        found._need_open("the sensors")
+        return found
+
     def draw_observation(self) -> None:
-        """Draws the image that get_observation returns."""
-        self._image = self._simulator._draw([self])[self.uuid]
+        """Draws the image that get_observation returns. Raises RuntimeError without an open simulator."""
+        self._image = self._simulator()._draw([self])[self.uuid]
 
     def get_observation(self) -> Any:
-        """The image that was drawn last; draws it if there is none."""
+        """The image that was drawn last; draws it if there is none. Raises as draw_observation."""
+        self._simulator()
         if self._image is None:
             self.draw_observation()
         image, self._image = self._image, None

@@ -5,6 +5,7 @@ import dataclasses
 import functools
 import math
 import numbers
+import operator
 import os
 import random as _random
 import time
@@ -17,7 +18,7 @@ from magnum import Vector3
 
 from . import _draw, _engine
 from ._follower import GreedyGeodesicFollower
-from ._people import TIME_SETTINGS, PeoplePart
+from ._people import TIME_SETTINGS, Clock, PeoplePart
 from .agent import Agent
 from .agent.agent import AgentState
 from .metadata import MetadataMediator, TemplateManager
@@ -119,31 +120,35 @@ class Simulator(PeoplePart):
         for agent in config.agents:
             for spec in agent.sensor_specifications:
                 _draw.check(spec, _engine.is_empty(sim_cfg.scene_id))
-        if not 0 <= sim_cfg.default_agent_id < len(config.agents):
+        default = _integer("SimulatorConfiguration.default_agent_id", sim_cfg.default_agent_id)
+        if not 0 <= default < len(config.agents):
             raise ValueError(
-                f"SimulatorConfiguration.default_agent_id = {sim_cfg.default_agent_id}: there are "
-                f"{len(config.agents)} agents, from 0"
+                f"SimulatorConfiguration.default_agent_id = {default}: there are {len(config.agents)} agents, from 0"
             )
-        navigator = config.agents[sim_cfg.default_agent_id]
+        if not isinstance(sim_cfg.allow_sliding, (bool, np.bool_)):
+            raise TypeError(f"SimulatorConfiguration.allow_sliding = {sim_cfg.allow_sliding!r}: must be a bool")
+        navigator = config.agents[default]
         settings = sim_cfg.navmesh_settings
         if settings is None:
             settings = NavMeshSettings()
             settings.agent_radius, settings.agent_height = navigator.radius, navigator.height
         required = sim_cfg.navmesh_settings is not None
-        stage = _engine.stage(str(sim_cfg.scene_id), settings._native(), required)
-        device = _engine.device(int(sim_cfg.gpu_device_id))
+        stage = _engine.stage(str(sim_cfg.scene_id), NavMeshSettings._native(settings), required)
+        device = _engine.device(_integer("SimulatorConfiguration.gpu_device_id", sim_cfg.gpu_device_id))
+        seed, clock = _integer("SimulatorConfiguration.random_seed", sim_cfg.random_seed), Clock(sim_cfg)
+        graph = SceneGraph()
+        agents = [Agent(graph.get_root_node().create_child(), agent) for agent in config.agents]
+        # All that can fail is done, so a simulator whose new settings are refused keeps the old ones.
         if stage is not self._stage:
             self.pathfinder._mesh = stage.navmesh
         self._stage, self._painter, self.config = stage, _draw.Painter(stage, device), config
-        self._graph = SceneGraph()
+        self._graph, self.agents = graph, agents
+        graph.get_root_node()._simulator = self
         self._world_time = 0.0
-        self._open_people()
-        self.seed(int(sim_cfg.random_seed))
-        self.agents = []
-        for agent in config.agents:
-            made = Agent(self._graph.get_root_node().create_child(), agent)
-            made.controls.move_filter_fn = functools.partial(self._filter, len(self.agents))
-            self.agents.append(made)
+        self._open_people(clock)
+        self.seed(seed)
+        for agent_id, made in enumerate(agents):
+            made.controls.move_filter_fn = functools.partial(self._filter, agent_id)
         for agent_id in range(len(self.agents)):
             self.initialize_agent(agent_id)
 
@@ -171,6 +176,7 @@ class Simulator(PeoplePart):
 
     def seed(self, new_seed: int) -> None:
         """Seeds the random points and the simulator's random numbers."""
+        new_seed = _integer("Simulator.seed: new_seed", new_seed)
         self.random = _random.Random(new_seed)
         self.pathfinder.seed(new_seed)
 
@@ -300,9 +306,6 @@ class Simulator(PeoplePart):
 
     def _draw(self, sensors: Any) -> dict[str, np.ndarray]:
         self._need_open("the sensors")
-        for sensor in sensors:
-            if sensor._simulator is not self:
-                sensor._simulator = self
         return self._painter.draw(sensors, self._clock.gaussian_time)
 
     def get_sensor_observations(self, agent_ids: Any = 0) -> Any:
@@ -325,9 +328,7 @@ class Simulator(PeoplePart):
         if spec.uuid in self.sensors:
             raise ValueError(f"SensorSpec.uuid {spec.uuid!r} is used twice")
         node = self._default_agent.scene_node if scene_node is None else scene_node
-        sensor = SensorFactory.create_sensors(node, [spec])[spec.uuid]
-        sensor._simulator = self
-        return sensor
+        return SensorFactory.create_sensors(node, [spec])[spec.uuid]
 
     def add_sensor(self, sensor_spec: Any, agent_id: int | None = None) -> Sensor:
         """Makes a sensor of an agent."""
@@ -336,9 +337,7 @@ class Simulator(PeoplePart):
 
     def get_sensor(self, uuid: str) -> Sensor:
         """A sensor by its name. Raises KeyError if there is none."""
-        sensor = self.sensors[uuid]
-        sensor._simulator = self
-        return sensor
+        return self.sensors[uuid]
 
     def remove_sensor(self, uuid: str) -> None:
         """Takes a sensor away. Raises KeyError if there is none."""
@@ -379,7 +378,7 @@ class Simulator(PeoplePart):
 
         Voxels of a scene of Gaussians are at most 0.05 m high. Raises ValueError naming a setting out of range.
         """
-        settings = navmesh_settings._native()
+        settings = NavMeshSettings._native(navmesh_settings)
         settings.validate()
         if self._stage is None or self._stage.scene is None:
             return False
@@ -416,6 +415,13 @@ def _guard(kind: type) -> None:
 
 _guard(PeoplePart)
 _guard(Simulator)
+
+
+def _integer(name: str, value: Any) -> int:
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name} = {value!r}: must be an integer") from None
 
 
 def _checked(method: str, dt: float) -> float:

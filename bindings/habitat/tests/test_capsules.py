@@ -112,9 +112,36 @@ def test_a_later_mesh_and_another_list_replace_the_capsules(stage, monkeypatch):
         assert finder.try_step_no_sliding([0, FLOOR, -1], [0, FLOOR, -3])[2] == pytest.approx(-1.5, abs=1e-3)
         sim.set_navmesh_dynamic_capsules(np.empty((0, 7), np.float32))
         assert finder.try_step_no_sliding([0, FLOOR, -1], [0, FLOOR, -3])[2] == pytest.approx(-3, abs=1e-5)
-        for wrong in ([[1, 2, 3]], [[*PILLAR[:6], -1.0]], [[*PILLAR[:6], float("nan")]], [PILLAR + [0]]):
+        for wrong in ([[1, 2, 3]], [[*PILLAR[:6], -1.0]], [[*PILLAR[:6], float("nan")]], [PILLAR + [0]],
+                      [[1e20, *PILLAR[1:]]]):  # fmt: skip
             with pytest.raises(ValueError, match="set_navmesh_dynamic_capsules"):
                 sim.set_navmesh_dynamic_capsules(wrong)
+
+
+def test_bodies_wider_than_high_are_refused(stage, monkeypatch):
+    # Among people a body is a capsule within its height. A radius above half of the height would be cut.
+    with open_sim(stage, 0, monkeypatch) as sim:
+        sim.set_navmesh_dynamic_capsules([PILLAR])
+        at, text = [1, FLOOR, -2], "radius = 0.5, height = 0.8: .*at most half of the height"
+        assert sim.distance_to_avatar_proxy_capsules(at, 0.4, 0.8) == pytest.approx(1 - 0.2 - 0.4, abs=1e-6)
+        with pytest.raises(ValueError, match=text):
+            sim.distance_to_avatar_proxy_capsules(at, 0.5, 0.8)
+        with pytest.raises(ValueError, match=text):
+            sim.is_step_blocked_by_avatar_proxy_capsules(at, at, True, 0.5, 0.8)
+        with pytest.raises(ValueError, match="agent_height = 1e.300: must be finite and within 1e9 m"):
+            sim.distance_to_avatar_proxy_capsules(at, 0.1, 1e300)
+        settings = habitat_sim.NavMeshSettings()
+        settings.agent_radius, settings.agent_height = 0.5, 0.8
+        assert sim.recompute_navmesh(sim.pathfinder, settings)
+        before = sim.get_agent(0).get_state()
+        with pytest.raises(ValueError, match=text):
+            sim.pathfinder.try_step([0, FLOOR, -1], [0, FLOOR, -3])
+        sim.get_agent(0).agent_config.radius, sim.get_agent(0).agent_config.height = 0.5, 0.8
+        with pytest.raises(ValueError, match=text):
+            sim.step("move_forward")
+        assert sim.get_agent(0).get_state() == before
+        sim.clear_navmesh_dynamic_capsules()
+        sim.step("move_forward")
 
 
 def test_hidden_people_leave_no_trace_in_images_and_still_stop_agents(stage, monkeypatch):
@@ -137,3 +164,6 @@ def test_hidden_people_leave_no_trace_in_images_and_still_stop_agents(stage, mon
         for name, image in sim.get_sensor_observations().items():
             assert np.array_equal(seen[name], image)
         assert not sim.set_gaussian_avatar_visible(2, False)
+        for wrong in (True, 1.0, "1"):
+            with pytest.raises(TypeError, match="avatar_id = .*must be an integer"):
+                sim.set_gaussian_avatar_visible(wrong, False)

@@ -90,6 +90,8 @@ def test_the_colour_shines_through_gaussians_by_their_alpha():
 
 
 def test_an_empty_scene_also_has_the_alpha():
+    with simulator("NONE", camera("c", clear_color=[0.1, 0.2, 0.3, 1])) as sim:  # Rounded as in scenes.
+        assert sim.get_sensor_observations()["c"][0, 0].tolist() == [26, 51, 77, 255]
     with simulator("NONE", camera("c", clear_color=[1, 0.5, 0, 0.25])) as sim:
         assert (sim.get_sensor_observations()["c"] == [255, 128, 0, 64]).all()
 

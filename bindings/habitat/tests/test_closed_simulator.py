@@ -29,6 +29,8 @@ ARGUMENTS = {
 def test_each_name_of_a_closed_simulator_says_that_it_is_closed(stage, destroy):
     sim = habitat_sim.Simulator(small(stage))
     sensor, agent = sim.get_sensor("color_sensor"), sim.get_agent(0)
+    person = habitat_sim.gaussian_avatar.GaussianAvatar(sim, 0)
+    sensor.draw_observation()  # An image that close() must not leave.
     sim.close(destroy)
     sim.close(destroy)
     names = [name for name in dir(habitat_sim.Simulator) if name[0] != "_" and name not in ("close", "reconfigure")]
@@ -39,7 +41,7 @@ def test_each_name_of_a_closed_simulator_says_that_it_is_closed(stage, destroy):
                 getattr(sim, name)
             else:
                 getattr(sim, name)(*ARGUMENTS.get(name, []))
-    for call in (sensor.get_observation, lambda: agent.act("move_forward")):
+    for call in (sensor.get_observation, person.get_navmesh_capsules, lambda: agent.act("move_forward")):
         with pytest.raises(RuntimeError, match="the simulator is closed"):
             call()
     sim.reconfigure(small(stage))

@@ -24,9 +24,9 @@ from habitat_sim import _draw
 
 if __name__ == "__main__":
     usual, sizes = _draw.Painter._draw_places, []
-    def counted(self, seconds, places):
+    def counted(self, group, seconds, places):
         sizes.append(len(places))
-        return usual(self, seconds, places)
+        return usual(self, group, seconds, places)
     _draw._together, _draw.Painter._draw_places = lambda device: True, counted
     sys.argv = sys.argv[1:]
     runpy.run_path(sys.argv[0], run_name="__main__")

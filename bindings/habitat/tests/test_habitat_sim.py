@@ -372,11 +372,14 @@ def test_import_refuses_beside_the_forms_that_setuptools_installs(tmp_path, entr
 
 
 @pytest.mark.parametrize("package, importing", [("magnum", "habitat_sim"), ("corrade", "habitat_sim"),
-                                                ("habitat_sim", "magnum")])  # fmt: skip
-def test_import_refuses_where_python_finds_a_package_without_metadata_first(tmp_path, package, importing):
+                                                ("habitat_sim", "magnum"), ("habitat_sim", "habitat_sim")])  # fmt: skip
+@pytest.mark.parametrize("place", [0, 99])  # Before and behind this distribution.
+def test_import_refuses_beside_a_package_without_metadata(tmp_path, package, importing, place):
+    if place == 0 and package == importing:
+        return  # Python imports the other package.
     (tmp_path / package).mkdir()
     (tmp_path / package / "__init__.py").write_text("")
-    result = run_python(f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import {importing}")
+    result = run_python(f"import sys; sys.path.insert({place}, {str(tmp_path)!r}); import {importing}")
     assert "ImportError: The distributions gsnav-habitat" in result.stderr
     assert package.replace("_", "-") in result.stderr and str(tmp_path / package) in result.stderr
 

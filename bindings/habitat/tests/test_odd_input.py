@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Odd settings raise errors that name the field and the value."""
 
+import copy
 import math
 
 import habitat_sim
@@ -97,6 +98,83 @@ def test_numbers_of_agents(sim, stage):
         config.sim_cfg.default_agent_id = number
         with pytest.raises(ValueError, match=f"default_agent_id = {number}: there are 1 agents"):
             habitat_sim.Simulator(config)
+
+
+def test_types_of_settings(sim, stage):
+    sim.seed(np.int64(5))
+    for name, wrong in (("random_seed", "abc"), ("gpu_device_id", None), ("allow_sliding", "no"),
+                        ("navmesh_settings", 5), ("default_agent_id", 0.0)):  # fmt: skip
+        config = small(stage)
+        setattr(config.sim_cfg, name, wrong)
+        with pytest.raises(TypeError, match=f"{name} = {wrong!r}: must be"):
+            habitat_sim.Simulator(config)
+    with pytest.raises(TypeError, match="navmesh_settings = 5: must be a habitat_sim.NavMeshSettings"):
+        sim.recompute_navmesh(sim.pathfinder, 5)
+    finder, at = sim.pathfinder, [0, 0.07, 0]
+    for call in (lambda i: finder.get_random_navigable_point(island_index=i), lambda i: finder.snap_point(at, i),
+                 lambda i: finder.get_random_navigable_point_near(at, 1.0, island_index=i),
+                 finder.island_area, finder.build_navmesh_vertices):  # fmt: skip
+        with pytest.raises(TypeError, match="island_index = 1.5: must be an integer"):
+            call(1.5)
+    assert finder.is_navigable(at, math.inf) and finder.is_navigable([0, 9, 0], 1e300)
+
+
+def test_settings_that_are_refused_leave_the_simulator_as_it_was(stage):
+    with habitat_sim.Simulator(small(stage)) as sim:
+        sim.seed(7)
+        sim.initialize_agent(0)
+        config, state, mesh = sim.config, sim.get_agent(0).get_state(), sim.pathfinder._mesh
+        random, image = sim.random.getstate(), sim.get_sensor_observations()["depth_sensor"]
+        twice, seed, clock = small("NONE"), small("NONE"), small("NONE")
+        twice.agents[0].sensor_specifications[1].uuid = twice.agents[0].sensor_specifications[0].uuid
+        seed.sim_cfg.random_seed, clock.sim_cfg.gaussian_time = "abc", math.inf
+        for wrong, text in ((twice, "used twice"), (seed, "random_seed"), (clock, "gaussian_time")):
+            with pytest.raises((TypeError, ValueError), match=text):
+                sim.reconfigure(wrong)
+            assert sim.config is config and sim.pathfinder._mesh is mesh and sim.random.getstate() == random
+            assert sim.get_agent(0).get_state() == state
+            assert np.array_equal(sim.get_sensor_observations()["depth_sensor"], image)
+
+
+@pytest.mark.parametrize("way", [
+    lambda sim: sim.get_agent(0).sensors, lambda sim: sim.sensors, lambda sim: sim.agents[0]._sensors,
+])  # fmt: skip
+def test_sensors_can_be_drawn_however_they_are_found(stage, way):
+    with habitat_sim.Simulator(small(stage)) as sim:
+        sensor = way(sim)["color_sensor"]
+        assert np.array_equal(sensor.get_observation(), sim.get_sensor_observations()["color_sensor"])
+        sim.remove_sensor("color_sensor")
+        with pytest.raises(RuntimeError, match="sensor 'color_sensor' belongs to no simulator"):
+            sensor.get_observation()
+
+
+def test_a_sensor_cannot_get_another_lens_and_a_copy_of_its_specification_can(stage):
+    with habitat_sim.Simulator(small(stage)) as sim:
+        spec = sim.get_sensor("color_sensor").specification()
+        for name, value in (("hfov", 30), ("near", "x"), ("resolution", [4, 4]), ("noise_model", "a")):
+            before = getattr(spec, name)
+            with pytest.raises(NotImplementedError, match=f"gsnav.*changing {name} of sensor 'color_sensor'"):
+                setattr(spec, name, value)
+            assert getattr(spec, name) == before
+        with pytest.raises(TypeError):
+            spec.resolution[0] = 4
+        other = copy.copy(spec)
+        assert other == spec and type(other.resolution) is list
+        other.uuid, other.hfov, other.resolution = "narrow", 30, [4, 6]
+        assert sim.add_sensor(other).get_observation().shape == (4, 6, 4) and spec != other
+        wide, spec.position = sim.get_sensor_observations()["color_sensor"], [0, 0.5, 0]
+        assert np.array_equal(sim.get_sensor_observations()["color_sensor"], wide)
+        sim.get_sensor("color_sensor").set_transformation_from_spec()
+        assert not np.array_equal(sim.get_sensor_observations()["color_sensor"], wide)
+
+
+def test_the_number_of_people_may_be_empty_and_is_checked_without_a_scene(stage, monkeypatch):
+    monkeypatch.setenv("GSNAV_PEOPLE", "")
+    with habitat_sim.Simulator(small(stage)) as made:
+        assert made.get_gaussian_avatar_ids() == []
+    monkeypatch.setenv("GSNAV_PEOPLE", "x")
+    with pytest.raises(ValueError, match="GSNAV_PEOPLE = x"):
+        habitat_sim.Simulator(small("NONE"))
 
 
 @pytest.mark.parametrize("text", ["99999", "1001", "-1", "x", "2.5", "9" * 5000])

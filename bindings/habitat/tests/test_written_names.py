@@ -7,6 +7,7 @@ import pickle
 import re
 
 import habitat_sim
+import magnum as mn
 import pytest
 from habitat_sim.utils.settings import make_cfg
 
@@ -107,6 +108,54 @@ def test_sensors_nodes_and_the_batch_renderer(sim, stage):
     config.enable_batch_renderer = True
     with pytest.raises(NotImplementedError, match="gsnav.*enable_batch_renderer"):
         habitat_sim.Simulator(config)
+
+
+def test_parts_of_a_simulator_have_their_own_names_only(sim):
+    agent, finder, control = sim.get_agent(0), sim.pathfinder, habitat_sim.agent.ObjectControls()
+    action = agent.agent_config.action_space["move_forward"]
+    objects = [agent, agent.get_state(), habitat_sim.AgentState(), habitat_sim.SixDOFPose(), agent.controls, control,
+               sim.get_active_scene_graph(), action, action.actuation, habitat_sim.HitRecord(), sim.metadata_mediator,
+               sim.get_object_template_manager(), sim.make_greedy_follower(), habitat_sim.registry,
+               habitat_sim.gaussian_avatar.GaussianAvatar(sim, 0)]  # fmt: skip
+    for made in (*objects, copy.copy(agent.get_state()), copy.deepcopy(action.actuation)):
+        for name in ("velocity", "amout"):
+            with pytest.raises(NotImplementedError, match=f"gsnav.*{type(made).__name__}.{name}"):
+                getattr(made, name)
+            with pytest.raises(NotImplementedError, match=f"gsnav.*{type(made).__name__}.{name}"):
+                setattr(made, name, 1)
+            assert not hasattr(made, name)
+    for made in (agent.scene_node, habitat_sim.SceneNode, type(agent), type(finder), habitat_sim.NavMeshSettings()):
+        for name in ("semantic_id", "cumulative_bb"):
+            with pytest.raises(NotImplementedError, match=f"gsnav.*{name}"):
+                getattr(made, name)
+    with pytest.raises(NotImplementedError, match="gsnav.*MetadataMediator.active_dataset = 'x'"):
+        sim.metadata_mediator.active_dataset = "x"
+    sim.metadata_mediator.active_dataset = sim.metadata_mediator.active_dataset
+    assert pickle.loads(pickle.dumps(agent.get_state())) == agent.get_state()
+
+
+@pytest.mark.parametrize("line, name", [
+    ("from habitat_sim import Bogus", "habitat_sim.Bogus"), ("from magnum import gl", "magnum.gl"),
+    ("from habitat_sim.utils import viz_utils", "habitat_sim.utils.viz_utils"),
+    ("from habitat_sim.nav import Bogus", "habitat_sim.nav.Bogus"), ("import magnum.gl", "magnum.gl"),
+    ("import habitat_sim.utils.viz_utils", "habitat_sim.utils.viz_utils"),
+    ("from corrade import utility", "corrade.utility"),
+])  # fmt: skip
+def test_imports_that_are_not_served_say_so(line, name):
+    for expected in (NotImplementedError, ImportError):  # Scripts catch the second.
+        with pytest.raises(expected, match=f"^gsnav serves navigation only: {name}$"):
+            exec(line)
+    exec("from habitat_sim.nav import PathFinder; from magnum import Vector3; import habitat_sim.nav")
+
+
+@pytest.mark.parametrize("made, name", [
+    (mn.Matrix4, "orthographic_projection"), (mn.Range3D(), "x"), (mn.Color4(1, 0, 0, 1), "to_hsv"),
+    (mn.Quaternion(), "to_euler"), (habitat_sim.scene.SceneNode(), "semantic_id"),
+])  # fmt: skip
+def test_members_that_are_not_served_say_so(made, name):
+    with pytest.raises(NotImplementedError, match=f"gsnav.*{name}$"):
+        getattr(made, name)
+    assert not hasattr(made, name)
 
 
 SERVED = {

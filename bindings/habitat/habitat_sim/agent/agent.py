@@ -42,9 +42,21 @@ class _Pose:
     def __setattr__(self, name: str, value: Any) -> None:
         if name == "position":
             value = np.array(value, dtype=np.float32)
-        elif name == "rotation" and not hasattr(value, "components") and not isinstance(value, Quaternion):
-            value = quat_from_coeffs(np.asarray(value, dtype=np.float64))
+        elif name == "rotation":
+            if not hasattr(value, "components") and not isinstance(value, Quaternion):
+                value = quat_from_coeffs(np.asarray(value, dtype=np.float64))
+        elif name != "sensor_states" and name[0] != "_" and type(self).__module__ == __name__:
+            raise _shared.NotServed(self._unserved(name))
         object.__setattr__(self, name, value)
+
+    def __getattr__(self, name: str) -> Any:
+        if name[0] == "_":
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        raise _shared.NotServed(self._unserved(name))
+
+    @classmethod
+    def _unserved(cls, name: str) -> str:
+        return _shared.message(f"habitat_sim.agent.{cls.__name__}.{name}")
 
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):
@@ -91,7 +103,7 @@ class AgentConfiguration(_shared.FullySealed):
     body_type: str = "cylinder"
 
 
-class Agent:
+class Agent(_shared.FullySealed):
     """A body on a node, with sensors on nodes below."""
 
     def __init__(

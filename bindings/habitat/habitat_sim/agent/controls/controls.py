@@ -2,7 +2,6 @@
 """Actions that move an agent or its sensors."""
 
 import dataclasses
-import math
 import numbers
 from typing import Any, Callable
 
@@ -13,21 +12,23 @@ from ...registry import registry
 
 
 @dataclasses.dataclass
-class ActuationSpec:
+class ActuationSpec(_shared.FullySealed):
     """Size of an action: metres or degrees. `constraint` limits a tilt to +-degrees, or is None."""
 
     amount: float
     constraint: float | None = None
 
     def _check(self, action_name: str) -> None:
-        """Raises ValueError naming a field that is not finite."""
+        """Raises ValueError naming a field that is beyond 1e9 or not finite."""
         for name, value in (("amount", self.amount), ("constraint", self.constraint)):
-            if isinstance(value, (numbers.Real, Deg, Rad)) and not math.isfinite(float(value)):
-                raise ValueError(f"action {action_name!r}: ActuationSpec.{name} = {value}: must be finite")
+            if isinstance(value, (numbers.Real, Deg, Rad)) and not abs(float(value)) <= 1e9:
+                raise ValueError(
+                    f"action {action_name!r}: ActuationSpec.{name} = {value}: must be finite and at most 1e9"
+                )
 
 
 @dataclasses.dataclass
-class ActionSpec:
+class ActionSpec(_shared.FullySealed):
     """An action: the name of a registered function, and the actuation that it gets."""
 
     name: str
@@ -47,7 +48,7 @@ class SceneNodeControl:
         raise NotImplementedError(f"{type(self).__name__} does not define __call__")
 
 
-class ObjectControls:
+class ObjectControls(_shared.FullySealed):
     """Performs actions. `move_filter_fn(start, end)` returns the position that a move of a body reaches."""
 
     def __init__(self) -> None:
