@@ -74,7 +74,8 @@ Status check_people(const char* subject, const char* field, std::size_t count) {
 
 /// A flat with its NavMesh, and people who walk in it.
 Result<SimulatorScene> inhabited(Result<DefaultScene> flat, std::size_t people, std::uint64_t seed,
-                                 double people_density, const TaskConfig& task) {
+                                 double people_density, const TaskConfig& task,
+                                 const std::function<void(double)>& progress) {
   if (!flat) return flat.status();
   const auto build = [&](double radius, double height) {
     NavMeshSettings settings;
@@ -99,7 +100,7 @@ Result<SimulatorScene> inhabited(Result<DefaultScene> flat, std::size_t people, 
   if (people == 0) return scene;
   const auto walkways = build(0.3, 1.8);
   if (!walkways) return walkways.status();
-  auto actors = walking_people(*walkways, people, seed, people_density);
+  auto actors = walking_people(*walkways, people, seed, people_density, progress);
   if (!actors) return actors.status();
   scene.avatars = std::move(*actors);
   return scene;
@@ -118,13 +119,15 @@ Vec3d person_color(std::size_t index) noexcept {
 }
 
 Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::size_t count,
-                                                std::uint64_t seed, double density) {
+                                                std::uint64_t seed, double density,
+                                                const std::function<void(double)>& progress) {
   if (Status s = check_people("walking_people: ", "count", count); !s) return s;
   if (!std::isfinite(density)) return {Errc::invalid_argument, "walking_people: density is not finite"};
   std::vector<Way> ways;
   std::vector<AvatarActor> people;
   Rng rng(seed ^ 0x70656f706c65ull);
   for (std::size_t i = 0; i < count; ++i) {
+    if (progress) progress(static_cast<double>(i) / static_cast<double>(count));
     std::optional<Way> best;
     double best_distance = -1;
     for (int tries = 0; tries < 80 && best_distance < kApart; ++tries) {
@@ -153,21 +156,23 @@ Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::si
 }
 
 Result<SimulatorScene> default_simulator_scene(std::size_t people, std::uint64_t seed, double density,
-                                               const TaskConfig& task) {
+                                               const TaskConfig& task,
+                                               const std::function<void(double)>& progress) {
   if (Status s = check_people("default_simulator_scene: ", "people", people); !s) return s;
-  return inhabited(make_default_scene(density), people, seed, 1.0, task);
+  return inhabited(make_default_scene(density), people, seed, 1.0, task, progress);
 }
 
 Result<SimulatorScene> planned_simulator_scene(const FloorPlanOptions& plan, std::size_t people,
                                                std::uint64_t seed, double density,
-                                               const TaskConfig& task, SurfaceKind kind) {
+                                               const TaskConfig& task, SurfaceKind kind,
+                                               const std::function<void(double)>& progress) {
   if (Status s = check_people("planned_simulator_scene: ", "people", people); !s) return s;
   const auto drawn = make_floor_plan(plan);
   if (!drawn) return drawn.status();
   SceneSampling sampling;
   sampling.density = density;
   sampling.kind = kind;
-  return inhabited(make_planned_scene(*drawn, sampling), people, seed, density, task);
+  return inhabited(make_planned_scene(*drawn, sampling), people, seed, density, task, progress);
 }
 
 }  // namespace gsnav

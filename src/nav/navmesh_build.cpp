@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 
+#include "gsnav/detail/core/field_check.hpp"
 #include "navmesh_stages.hpp"
 #include "triangle_heights.hpp"
 
@@ -42,6 +43,8 @@ Result<NavMesh> NavMesh::build(const NavMeshSettings& settings, std::span<const 
                                std::span<const Triangle> triangles, int threads,
                                const std::function<void(double)>& progress) {
   if (Status s = settings.validate(); !s.ok()) return s;
+  detail::FieldCheck check("NavMesh::build: ");
+  if (const Status s = check.in("threads", threads, 0, 1024).status(); !s) return s;
   if (vertices.empty() || triangles.empty()) {
     return Status(Errc::nothing_navigable, "NavMesh: there are no triangles to build from");
   }

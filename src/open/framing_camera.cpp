@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "gsnav/core/rng.hpp"
+#include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/detail/demo/default_scene.hpp"
 #include "gsnav/detail/image/field_of_view.hpp"
 #include "gsnav/detail/image/validate_camera.hpp"
@@ -73,6 +74,8 @@ Status validate(const OpenedScene& scene, int width, int height, double hfov) {
 Result<std::vector<Camera>> views_around(const OpenedScene& scene, int count, int width, int height,
                                          double hfov) {
   if (Status s = validate(scene, width, height, hfov); !s) return s;
+  detail::FieldCheck check("views_around: ");
+  if (const Status s = check.in("count", count, 1, 100'000).status(); !s) return s;
   const Vec3d up = scene.up == "keep" ? scene.report.up : Vec3d{0, 1, 0};
   std::vector<Camera> out;
   if (scene.scene->assets.empty()) {

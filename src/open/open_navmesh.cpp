@@ -168,8 +168,8 @@ Status add_people(OpeningScene& s, const std::optional<NavMeshChoice>& choice) {
     body.agent_height = 1.8;
     if (auto made = build(s, *choice, body, "NavMesh of people")) wide = std::move(*made);
   }
-  s.tell("people");
-  auto people = walking_people(wide ? *wide : *s.scene.navmesh, o.people, o.seed, o.density);
+  auto people = walking_people(wide ? *wide : *s.scene.navmesh, o.people, o.seed, o.density,
+                               [&s](double share) { s.tell("people", share); });
   if (!people) return people.status();
   s.scene.avatars = std::move(*people);
   return add_body_levels(s);

@@ -10,7 +10,7 @@
 namespace gsnav {
 namespace {
 
-constexpr double kMaxEnvironments = 1 << 20;  // a million, far above the memory of their images
+constexpr double kMaxEnvironments = 1 << 16;  // far above what the memory of their images allows
 
 Status bad(std::string what) { return {Errc::invalid_argument, std::move(what)}; }
 

@@ -43,6 +43,8 @@ Status validate(const EpisodeRules& r) {
   at_least("straight_ratio", r.straight_ratio, 0.0, "must be >= 0");
   at_least("retries_per_goal", r.retries_per_goal, 1, "must be >= 1");
   at_least("max_goals", r.max_goals, 1, "must be >= 1");
+  const double starts = static_cast<double>(r.max_goals) * r.retries_per_goal;
+  check.need(starts <= 1e6, "max_goals", r.max_goals, "times retries_per_goal must be at most 1000000");
   return check.status();
 }
 
@@ -81,13 +83,15 @@ Result<PointNavEpisode> generate_episode(const NavMesh& navmesh, Rng& rng, const
 }
 
 Result<std::vector<PointNavEpisode>> generate_episodes(const NavMesh& navmesh, std::size_t count,
-                                                       std::uint64_t seed, const EpisodeRules& rules) {
+                                                       std::uint64_t seed, const EpisodeRules& rules,
+                                                       const std::function<void(double)>& progress) {
   detail::FieldCheck check("generate_episodes: ");
   if (const Status s = check.in("count", count, 0, kMaxEpisodes).status(); !s) return s;
   Rng rng(seed);
   std::vector<PointNavEpisode> episodes;
   episodes.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
+    if (progress) progress(static_cast<double>(i) / static_cast<double>(count));
     Result<PointNavEpisode> e = generate_episode(navmesh, rng, rules);
     if (!e) return e.status();
     e->id = std::to_string(i);

@@ -69,6 +69,11 @@ TEST_CASE("episodes that cannot be are refused") {
   rules = {};
   rules.retries_per_goal = 0;
   CHECK(validate(rules).message().find("retries_per_goal") != std::string::npos);
+  rules.retries_per_goal = 1001;
+  rules.max_goals = 1000;
+  CHECK(validate(rules).message().find("max_goals = 1000: times retries_per_goal") != std::string::npos);
+  rules.retries_per_goal = 1000;
+  CHECK(validate(rules));
   const auto many = generate_episodes(flat(), 10'000'001, 1);
   CHECK(many.code() == Errc::invalid_argument);
   CHECK(many.message().find("count = 10000001: must be in [0, 10000000]") != std::string::npos);

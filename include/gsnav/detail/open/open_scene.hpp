@@ -143,7 +143,8 @@ struct OpenedScene {
 Result<OpenedScene> open_scene(const std::string& name, const OpenOptions& options = {});
 
 /// `count` cameras on a circle around a scene, slightly above it, looking at its middle. World frame.
-/// `hfov` is the horizontal field of view, degrees. Errors: those of framing_camera.
+/// `hfov` is the horizontal field of view, degrees. Errors: those of framing_camera; invalid_argument
+/// for a count that is not in [1, 100000].
 Result<std::vector<Camera>> views_around(const OpenedScene& scene, int count, int width, int height,
                                          double hfov = 60);
 

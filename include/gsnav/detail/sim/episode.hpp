@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <functional>
 #include <vector>
 
 #include "gsnav/detail/nav/episode.hpp"
@@ -26,7 +27,7 @@ struct EpisodeRules {
   /// 20 (ratio - 0.98)^2.
   double straight_ratio = 1.1;
   int retries_per_goal = 10;  ///< Number of starts to try per goal.
-  int max_goals = 2000;       ///< Number of goals to try before an episode fails.
+  int max_goals = 2000;  ///< Number of goals to try before an episode fails. At most 10^6 starts in all.
 };
 
 /// Checks the values.
@@ -40,9 +41,11 @@ Result<PointNavEpisode> generate_episode(const NavMesh& navmesh, Rng& rng,
                                          const EpisodeRules& rules = {});
 
 /// Samples `count` episodes with ids "0", "1", ...
+/// @param progress receives the share that is done, before each episode. An exception ends the work.
 /// @return the errors of generate_episode; invalid_argument for a count above 10^7.
 Result<std::vector<PointNavEpisode>> generate_episodes(const NavMesh& navmesh, std::size_t count,
                                                        std::uint64_t seed,
-                                                       const EpisodeRules& rules = {});
+                                                       const EpisodeRules& rules = {},
+                                                       const std::function<void(double)>& progress = {});
 
 }  // namespace gsnav
