@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 import copy
 import enum
+import itertools
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -37,6 +38,7 @@ from ._spaces import Box, Dict, Discrete
 # Discrete actions of PointNav: stop, move_forward, turn_left, turn_right.
 ACTIONS = 4
 POINT_GOAL = "point_goal"
+_MOST_DRAWN = 10**6  # Episodes of an iterator.
 # Memory of an environment without sensors: its generator and its world.
 ENVIRONMENT_BYTES = 2000
 # Bound of values without one. Gymnasium warns of infinite bounds.
@@ -248,6 +250,10 @@ class Episodes:
         if episodes is not None:
             if isinstance(episodes, (str, Mapping)) or not isinstance(episodes, Iterable):
                 raise TypeError(f"episodes: expected a sequence of episodes, got {short(episodes)}")
+            if not isinstance(episodes, Sequence):  # It may be endless.
+                episodes = list(itertools.islice(episodes, _MOST_DRAWN + 1))
+                if len(episodes) > _MOST_DRAWN:
+                    raise InvalidArgument(f"episodes: an iterator of more than {_MOST_DRAWN}; pass a list")
             self.given = [self._checked(e, i) for i, e in enumerate(episodes)]
             if not self.given:
                 raise InvalidArgument("episodes: the list is empty; use None to sample episodes")

@@ -214,13 +214,13 @@ class VectorEnv(BaseVectorEnv):
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
         many: Any = seed
-        if isinstance(seed, (str, bytes)) or not isinstance(seed, (Sequence, np.ndarray)) or np.ndim(many) == 0:
+        if isinstance(seed, (str, bytes)) or not isinstance(seed, (Sequence, np.ndarray)) or (
+                isinstance(seed, np.ndarray) and seed.ndim == 0):
             first = _task.checked_seed(seed)
             return [None if first is None else first + e for e in range(self.num_envs)]
-        seeds = list(many)
-        if len(seeds) != self.num_envs:
-            raise InvalidArgument(f"seed: {len(seeds)} seeds for {self.num_envs} environments")
-        return [_task.checked_seed(one, f"seed[{e}]") for e, one in enumerate(seeds)]
+        if len(many) != self.num_envs:
+            raise InvalidArgument(f"seed: {len(many)} seeds for {self.num_envs} environments")
+        return [_task.checked_seed(one, f"seed[{e}]") for e, one in enumerate(many)]
 
     def _mask(self, mask: Any) -> npt.NDArray[np.bool_] | None:
         if mask is None:
@@ -235,6 +235,8 @@ class VectorEnv(BaseVectorEnv):
         return mask
 
     def _checked(self, actions: Any) -> npt.NDArray[np.integer[Any]]:
+        if isinstance(actions, Sequence) and len(actions) != self.num_envs:  # Before it becomes an array.
+            raise InvalidArgument(f"VectorEnv.step: {len(actions)} actions for {self.num_envs} environments")
         array = actions if type(actions) is np.ndarray else self._array(actions)
         if array.dtype.kind not in "iu":
             raise TypeError(f"VectorEnv.step: actions have dtype {array.dtype}: use integers")

@@ -98,6 +98,8 @@ class AvatarTracker {
   double distance(const Vec3d& base, double time, double radius, double height) const {
     const Busy::Hold hold(busy_, "AvatarTracker.distance");
     finite("distance: position", base);
+    check_finite("AvatarTracker.distance: radius", radius);
+    check_finite("AvatarTracker.distance: height", height);
     check_finite("AvatarTracker.distance: time", time);
     const CapsuleSet now = bodies_in(time, time);
     return clearance({base, radius > 0 ? radius : radius_, height > 0 ? height : height_}, now, time)
@@ -108,6 +110,8 @@ class AvatarTracker {
                double height) const {
     const Busy::Hold hold(busy_, "AvatarTracker.blocked");
     finite("blocked: start", start);
+    check_finite("AvatarTracker.blocked: radius", radius);
+    check_finite("AvatarTracker.blocked: height", height);
     finite("blocked: end", end);
     check_finite("AvatarTracker.blocked: time", time);
     const CapsuleSet now = bodies_in(time, time);

@@ -9,6 +9,7 @@
 #include "gsnav/detail/sim/episode.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/sim.hpp"
+#include "progress.hpp"
 
 namespace gsnav::python {
 namespace {
@@ -80,7 +81,8 @@ void bind_generation(nb::module_& m) {
       .field("straight_ratio", &R::straight_ratio,
              "Paths with a smaller ratio of length to straight distance are mostly refused.")
       .field("retries_per_goal", &R::retries_per_goal, "Number of starts to try per goal.")
-      .field("max_goals", &R::max_goals, "Number of goals to try before an episode fails.")
+      .field("max_goals", &R::max_goals,
+             "Number of goals to try before an episode fails. At most 10^6 starts in all.")
       .done();
   m.def(
       "generate_episode",
@@ -99,10 +101,11 @@ void bind_generation(nb::module_& m) {
   m.def(
       "generate_episodes",
       [](const NavMesh& mesh, std::size_t count, std::uint64_t seed, EpisodeRules rules) {
-        return generate_episodes(mesh, count, seed, rules).value();
+        return generate_episodes(mesh, count, seed, rules, stop_after_signal).value();
       },
       nb::arg("navmesh"), nb::arg("count"), nb::arg("seed"), nb::arg("rules") = EpisodeRules{},
-      Release(), "Samples `count` episodes with the ids \"0\", \"1\", ...");
+      Release(),
+      "Samples `count` episodes, at most 10^7, with the ids \"0\", \"1\", ... Ctrl-C ends the call.");
 }
 
 void bind_files(nb::module_& m) {
@@ -155,13 +158,14 @@ void bind_episodes(nb::module_& m) {
       "default_simulator_scene",
       [](std::size_t people, std::uint64_t seed, double density, TaskConfig task) {
         return std::make_shared<SimulatorScene>(
-            default_simulator_scene(people, seed, density, task).value());
+            default_simulator_scene(people, seed, density, task, stop_after_signal).value());
       },
       nb::arg("people") = 3, nb::arg("seed") = 1, nb::arg("density") = 1.0,
       nb::arg("task") = TaskConfig{}, Release(),
-      "The embedded flat with its NavMesh for the body of `task`, and people who walk in it. `density` "
-      "is "
-      "the factor on the number of Gaussians of the flat, in [0.05, 20].");
+      "The embedded flat with its NavMesh for the body of `task`, and people who walk in it, at most "
+      "1000 "
+      "(each takes some tenths of a second). `density` is the factor on the number of Gaussians of the "
+      "flat, in [0.05, 20]. Ctrl-C ends the call at the next person.");
   bind_planned_scene(m);
 }
 

@@ -9,16 +9,29 @@
 #include <cstddef>
 #include <vector>
 
+#include "casters.hpp"
+
 // Casters of std::vector and std::array, in place of those of nanobind. nanobind borrows the elements of
 // a list. The conversion of one may run code of the caller, which may change the list.
 
 namespace nanobind::detail {
+
+/// True for a sequence with more than a million elements that is neither a list nor a tuple. nanobind
+/// would make a list of it before it looks at the elements: of range(10**9), 40 GB.
+inline bool is_too_long(handle source) noexcept {
+  if (PyTuple_Check(source.ptr()) || PyList_Check(source.ptr()) || !PySequence_Check(source.ptr()))
+    return false;
+  const Py_ssize_t size = PyObject_Size(source.ptr());
+  if (size < 0) gsnav::python::drop_error();
+  return size > 1'000'000;
+}
 
 /// Converts the elements of a copy of a list. The copy lives as long as the call.
 template <class Caster>
 struct kept_list_caster : Caster {
   template <class Flags>
   bool from_python(handle source, Flags flags, cleanup_list* cleanup) noexcept {
+    if (is_too_long(source)) return false;
     if (!PyList_CheckExact(source.ptr())) return Caster::from_python(source, flags, cleanup);
     object copy = steal(PyList_AsTuple(source.ptr()));
     if (!copy.is_valid()) return PyErr_Clear(), false;

@@ -19,6 +19,11 @@ nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu> rows_of_three(n
                                                                                const char* name,
                                                                                const char* kinds,
                                                                                const char* type) {
+  if (!nb::hasattr(source, "shape") && nb::hasattr(source, "__len__") && nb::len(source) > 50'000'000) {
+    throw nb::value_error(("NavMesh.build: " + std::string(name) +
+                           ": a sequence of more than 50 million rows; pass an array of numpy")
+                              .c_str());
+  }
   const nb::object array = numpy_array(source);
   const nb::object dtype = array.attr("dtype"), shape = array.attr("shape");
   const std::string where = "NavMesh.build: " + std::string(name) + " have ";
@@ -27,6 +32,9 @@ nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu> rows_of_three(n
   }
   if (nb::len(shape) != 2 || nb::cast<std::size_t>(shape[1]) != 3) {
     throw nb::value_error((where + "shape " + text_of(shape) + "; (n, 3) is needed").c_str());
+  }
+  if (nb::cast<std::size_t>(shape[0]) > std::numeric_limits<std::int32_t>::max()) {
+    throw nb::value_error((where + "shape " + text_of(shape) + "; at most 2^31 - 1 rows").c_str());
   }
   if (std::is_integral_v<T> && nb::cast<std::size_t>(shape[0]) > 0) {
     const std::string low = text_of(array.attr("min")()), high = text_of(array.attr("max")());

@@ -4,6 +4,7 @@
 #include "bind.hpp"
 #include "fields.hpp"
 #include "gsnav/demo.hpp"
+#include "progress.hpp"
 
 namespace gsnav::python {
 
@@ -23,7 +24,7 @@ void bind_planned_scene(nb::module_& m) {
       [](O plan, std::size_t people, std::uint64_t seed, double density, TaskConfig task,
          SurfaceKind kind) {
         return std::make_shared<SimulatorScene>(
-            planned_simulator_scene(plan, people, seed, density, task, kind).value());
+            planned_simulator_scene(plan, people, seed, density, task, kind, stop_after_signal).value());
       },
       nb::arg("plan") = O{}, nb::arg("people") = 0, nb::arg("seed") = 1, nb::arg("density") = 1.0,
       nb::arg("task") = TaskConfig{}, nb::arg("kind") = SurfaceKind::gaussians,
@@ -31,7 +32,9 @@ void bind_planned_scene(nb::module_& m) {
       "A random furnished flat with its NavMesh for the body of `task`, and people who walk in it. The "
       "same arguments give the same scene. `density` is the factor on the number of Gaussians of the "
       "flat and of the people, in [0.05, 20]. With SurfaceKind.mesh the flat has triangles in place of "
-      "Gaussians, with an equal NavMesh and equal people.");
+      "Gaussians, with an equal NavMesh and equal people. There are at most 1000 people. Ctrl-C ends "
+      "the call "
+      "at the next one.");
 }
 
 }  // namespace gsnav::python

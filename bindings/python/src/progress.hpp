@@ -18,4 +18,10 @@ inline std::function<void(double)> stopping_progress(const nb::object& progress)
   };
 }
 
+/// A progress function for the same places that only ends the work after Ctrl-C.
+inline void stop_after_signal(double) {
+  const HoldGil gil;
+  if (PyErr_CheckSignals() != 0) throw nb::python_error();
+}
+
 }  // namespace gsnav::python

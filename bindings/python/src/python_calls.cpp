@@ -7,6 +7,7 @@
 #include <Python.h>
 #include <unistd.h>
 
+#include <cstdarg>
 #include <cstddef>
 
 namespace {
@@ -30,6 +31,9 @@ auto call(const F& f) {
   extern "C" result __wrap_##name parameters {                        \
     return call([&]() -> result { return __real_##name arguments; }); \
   }
+
+// Names a function that the file defines in full.
+#define GSNAV_WRAP_BY_HAND(name)
 
 using Object = PyObject*;
 using Size = Py_ssize_t;
@@ -63,6 +67,9 @@ GSNAV_WRAP(Object, PyVectorcall_Call, (Object f, Object a, Object k), (f, a, k))
 GSNAV_WRAP(Size, PyObject_Size, (Object a), (a))
 GSNAV_WRAP(Size, PySequence_Size, (Object a), (a))
 GSNAV_WRAP(int, PyDict_Contains, (Object a, Object key), (a, key))
+GSNAV_WRAP(Object, PyDict_GetItemWithError, (Object a, Object key), (a, key))
+GSNAV_WRAP(int, PyDict_Update, (Object a, Object b), (a, b))
+GSNAV_WRAP(int, PyErr_WarnEx, (Object type, const char* text, Size level), (type, text, level))
 GSNAV_WRAP(int, PyDict_SetItem, (Object a, Object key, Object b), (a, key, b))
 GSNAV_WRAP(int, PyObject_GetBuffer, (Object a, Py_buffer* view, int flags), (a, view, flags))
 GSNAV_WRAP(int, PyObject_HasAttr, (Object a, Object name), (a, name))
@@ -86,3 +93,18 @@ GSNAV_WRAP(PyGILState_STATE, PyGILState_Ensure, (), ())
 // Drops of the last reference, which run __del__: _Py_DecRef in a module of the stable ABI.
 GSNAV_WRAP(void, _Py_Dealloc, (Object a), (a))
 GSNAV_WRAP(void, _Py_DecRef, (Object a), (a))
+
+// nanobind warns by it, which runs warnings.showwarning. A function with "..." cannot call another with
+// its arguments.
+GSNAV_WRAP_BY_HAND(PyErr_WarnFormat)
+extern "C" int __wrap_PyErr_WarnFormat(Object type, Size level, const char* format, ...) {
+  std::va_list arguments;
+  va_start(arguments, format);
+  const Object text = PyUnicode_FromFormatV(format, arguments);
+  va_end(arguments);
+  if (text == nullptr) return -1;
+  const char* const bytes = PyUnicode_AsUTF8AndSize(text, nullptr);
+  const int failed = bytes == nullptr ? -1 : __wrap_PyErr_WarnEx(type, bytes, level);
+  Py_DECREF(text);
+  return failed;
+}

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Numbers that no call can serve: an error at once that names field, value and range."""
 
+import itertools
 import math
+import resource
 import time
 
 import numpy as np
@@ -21,6 +23,10 @@ def batch(scene, environments):
     return gsnav.BatchSimulator("serial", [scene], config, environments, lambda e, k: None)
 
 
+def vector(scene):
+    return gsnav.VectorEnv(2, scene, config=gsnav.SimulatorConfig(sensors=[]), device="serial")
+
+
 @pytest.mark.parametrize("call, words", [
     (lambda s: gsnav.generate_episodes(s.navmesh, 2**62, 1),
      "generate_episodes: count = 4611686018427387904: must be in [0, 10000000]"),
@@ -30,8 +36,8 @@ def batch(scene, environments):
      "planned_simulator_scene: people = 1001: must be in [0, 1000]"),
     (lambda s: gsnav.open_scene("default", gsnav.OpenOptions(people=10**9)),
      "OpenOptions.people = 1000000000: must be in [0, 1000]"),
-    (lambda s: batch(s, 2**40), "environments = 1099511627776: must be in [1, 1048576]"),
-    (lambda s: batch(s, 0), "environments = 0: must be in [1, 1048576]"),
+    (lambda s: batch(s, 2**40), "environments = 1099511627776: must be in [1, 65536]"),
+    (lambda s: batch(s, 0), "environments = 0: must be in [1, 65536]"),
     (lambda s: gsnav.Renderer("serial", s).render([]), "Renderer.render: cameras = []: there is no camera"),
     (lambda s: camera(180), "Camera.look_at: hfov = 180.000000: must be in (0, 180) degrees"),
     (lambda s: camera(200), "hfov = 200.000000"),
@@ -52,6 +58,19 @@ def batch(scene, environments):
     (lambda s: gsnav.AvatarTracker(s).capsules(math.inf), "AvatarTracker.capsules: time = inf"),
     (lambda s: gsnav.AvatarTracker(s).distance((0, NAN, 0), 0.0), "distance: position = (0.000000, nan, "),
     (lambda s: gsnav.AvatarTracker(s).distance((0, 0, 0), NAN), "AvatarTracker.distance: time = nan"),
+    (lambda s: gsnav.AvatarTracker(s).distance((0, 0, 0), 0.0, radius=NAN), "AvatarTracker.distance: radius = nan"),
+    (lambda s: gsnav.AvatarTracker(s).distance((0, 0, 0), 0.0, height=-math.inf), "distance: height = -inf"),
+    (lambda s: gsnav.AvatarTracker(s).blocked((0, 0, 0), (0, 0, 0), 0.0, radius=NAN), "blocked: radius = nan"),
+    (lambda s: gsnav.views_around(gsnav.open_scene("default", gsnav.OpenOptions(density=0.05)), 10**9, 8, 8),
+     "views_around: count = 1000000000: must be in [1, 100000]"),
+    (lambda s: gsnav.generate_episode(s.navmesh, gsnav.Rng(1), gsnav.EpisodeRules(max_goals=10**6)),
+     "EpisodeRules.max_goals = 1000000: times retries_per_goal must be at most 1000000"),
+    (lambda s: gsnav.NavMesh.build(gsnav.NavMeshSettings(), np.zeros((3, 3)), np.zeros((1, 3), int), threads=-1),
+     "NavMesh::build: threads = -1: must be in [0, 1024]"),
+    (lambda s: gsnav.VectorEnv(2, s, episodes=itertools.repeat(gsnav.PointNavEpisode())),
+     "episodes: an iterator of more than 1000000"),
+    (lambda s: vector(s).reset(seed=range(10**9)), "seed: 1000000000 seeds for 2 environments"),
+    (lambda s: vector(s).step(range(10**9)), "VectorEnv.step: 1000000000 actions for 2 environments"),
     (lambda s: gsnav.AvatarTracker(s).blocked((NAN, 0, 0), (0, 0, 0), 0.0), "AvatarTracker.blocked: start = (nan, "),
     (lambda s: gsnav.AvatarTracker(s).blocked((0, 0, 0), (NAN, 0, 0), 0.0), "AvatarTracker.blocked: end = (nan, "),
 ])
@@ -64,6 +83,28 @@ def test_a_number_out_of_range_is_named_at_once(call, words, people):
 
 
 MASKED = np.ma.array([5.0, 0.0, 4.0], mask=[True, False, False])
+
+
+LONG = range(10**9)
+
+
+@pytest.mark.parametrize("call", [
+    lambda s: gsnav.AvatarTracker(s).set_capsules(LONG), lambda s: s.navmesh.find_path_to_any((5, 0, 4), LONG),
+    lambda s: gsnav.BatchSimulator("serial", LONG, gsnav.BatchConfig(), 1, lambda e, k: None),
+    lambda s: gsnav.SimulatorConfig(sensors=LONG), lambda s: gsnav.Renderer("serial", s).render(LONG),
+    lambda s: gsnav.summarize(LONG), lambda s: gsnav.navmesh_viewpoints(s.navmesh, LONG, 1.0),
+    lambda s: gsnav.OpenOptions(meshes=LONG), lambda s: gsnav.SimulatorScene(assets=LONG),
+    lambda s: s.navmesh.geodesic_distance((5, 0, 4), np.broadcast_to(np.zeros(3), (10**8, 3))),
+    lambda s: gsnav.NavMesh.build(gsnav.NavMeshSettings(), LONG, range(3)),
+    lambda s: gsnav.NavMesh.build(gsnav.NavMeshSettings(), np.zeros((3, 3)),
+                                  np.broadcast_to(np.uint32(0), (10**10, 3))),
+])
+def test_a_long_sequence_is_refused_before_it_is_copied(call, people):
+    before, start = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
+    with pytest.raises((TypeError, ValueError, gsnav.InvalidArgument)):
+        call(people)
+    assert time.process_time() - start < 2
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 10**6  # KB.
 
 
 @pytest.mark.parametrize("point", [

@@ -54,6 +54,10 @@ CALLS = {
     "array": ("__array__", "gsnav.NavMesh.build(gsnav.NavMeshSettings(), value, value)"),
     "attribute": ("__getattr__", "gsnav.AgentPose(yaw=value)"),
     "deletion": ("__del__", "states = [value]; globals().pop('value'); gsnav.TaskConfig(max_steps=states.pop())"),
+    "warning": ("unused", "import warnings; warnings.simplefilter('always'); warnings.showwarning = stay; "
+                "gsnav.TaskConfig.__new__(gsnav.TaskConfig).max_steps"),
+    "second_init": ("unused", "import warnings; warnings.simplefilter('always'); warnings.showwarning = stay; "
+                    "gsnav.TaskConfig().__init__()"),
     "meanwhile": ("unused", "batch.step([1], stay)"),
 }
 

@@ -177,6 +177,31 @@ def test_ctrl_c_ends_the_rendering_of_many_cameras():
     assert float(run.stdout) < 0.6  # of the time of the whole call; mostly an eighth
 
 
+WORK = """
+import os, signal, sys, threading, time
+import gsnav
+signal.signal(signal.SIGINT, signal.default_int_handler)
+mesh = gsnav.default_simulator_scene(people=0, density=0.05).navmesh
+calls = {"people": lambda: gsnav.default_simulator_scene(people=1000, density=0.05),
+         "rooms": lambda: gsnav.planned_simulator_scene(people=1000, density=0.05),
+         "open": lambda: gsnav.open_scene("default", gsnav.OpenOptions(navmesh="auto", people=1000, density=0.05)),
+         "episodes": lambda: gsnav.generate_episodes(mesh, 10**7, 1)}
+threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+start = time.process_time()
+try:
+    calls[sys.argv[1]]()
+except KeyboardInterrupt:
+    print(time.process_time() - start)
+"""
+
+
+@pytest.mark.parametrize("call", ["people", "rooms", "open", "episodes"])
+def test_ctrl_c_ends_calls_that_make_many_people_or_episodes(call):
+    run = subprocess.run([sys.executable, "-c", WORK, call], capture_output=True, text=True, timeout=100)
+    assert run.returncode == 0, run.stderr
+    assert float(run.stdout) < 20  # All of the work takes minutes.
+
+
 OPENED = """
 import os, signal, sys, threading, time
 import gsnav
