@@ -14,8 +14,8 @@ MOST = 12  # values of a message
 def short(value: Any) -> str:
     """The value as text of at most 80 characters."""
     try:
-        text = repr(value)
-    except Exception:  # of the caller's own class
+        text = repr(value).encode("utf-8", "backslashreplace").decode()  # without surrogates
+    except Exception:  # of the caller's own class, or an integer of thousands of digits
         text = f"a {type(value).__name__}"
     return text if len(text) <= LONGEST else text[:LONGEST - 3] + "..."
 
@@ -62,7 +62,7 @@ def owner_of(function: Any) -> tuple[Any, str]:
 
 def about_self(owner: type, name: str, given: Any, made: bool | None) -> str:
     """The mistake in the first argument of a method, or ""."""
-    if not isinstance(given, owner):
+    if not issubclass(type(given), owner):  # isinstance would ask the caller's own class.
         return f"{owner.__name__}.{name}: expected a {owner.__name__} as self, got {short(given)}"
     if name in ("__init__", "__setstate__"):
         again = f"{owner.__name__}.{name}: this object has been made already; make another {owner.__name__}"

@@ -70,7 +70,9 @@ def count(value: Any, what: str, least: int = 0) -> int:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
         raise TypeError(f"{what}: expected an integer, got {short(value)}")
     if value < least:
-        raise InvalidArgument(f"{what} = {value}: must be at least {least}")
+        raise InvalidArgument(f"{what} = {short(value)}: must be at least {least}")
+    if value >= 2**2048:
+        raise InvalidArgument(f"{what} = {short(value)}: must be below 2^2048")
     return int(value)
 
 

@@ -130,6 +130,26 @@ def test_a_value_without_text_is_named_by_its_type():
         gsnav.load_navmesh(Silent())
 
 
+def test_values_that_cannot_be_shown_or_asked(people, small):
+    class Odd:
+        @property
+        def __class__(self):
+            raise ZeroDivisionError
+
+        def __repr__(self):
+            return "\udc80"
+
+    with pytest.raises(TypeError, match="^TaskConfig.max_steps: expected a TaskConfig as self, got "):
+        TASK.max_steps.fget(Odd())
+    with pytest.raises(TypeError, match=r"max_steps.*\\udc80"):
+        TASK(max_steps=Odd())
+    envs = gsnav.VectorEnv(2, people, config=small)
+    for call, name in ((lambda n: gsnav.VectorEnv(n, people), "num_envs"), (lambda n: envs.reset(seed=n), "seed")):
+        for huge in (10**5000, -10**5000):  # Python makes no text of it.
+            with pytest.raises(gsnav.InvalidArgument, match=f"^{name} = a int: must be "):
+                call(huge)
+
+
 def test_errors_of_functions_that_call_python_stay(people):
     def source(environment, count):
         return gsnav.load_navmesh(Odd())
