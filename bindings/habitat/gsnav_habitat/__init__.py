@@ -2,6 +2,7 @@
 """Parts that the packages of the distribution gsnav-habitat share: the notice on import, the check that no other
 distribution owns their names, and placeholders for names that are not served."""
 
+import abc
 import functools
 import os
 import sys
@@ -40,10 +41,12 @@ def _strangers() -> Iterator[str]:
         spec = PathFinder.find_spec(package) if loaded is None else loaded.__spec__
         found = [] if spec is None or not spec.origin else [os.path.dirname(spec.origin)]
         for folder in sys.path:  # Those that Python would find later.
-            if os.path.isfile(os.path.join(folder, package, "__init__.py")):
+            if isinstance(folder, str) and os.path.isfile(os.path.join(folder, package, "__init__.py")):
                 found.append(os.path.join(folder, package))
         for folder in found:
-            if os.path.dirname(os.path.realpath(folder)) != here:
+            beside = os.path.dirname(os.path.realpath(folder))
+            # Another copy of this distribution, such as a checkout, is none.
+            if beside != here and not os.path.isdir(os.path.join(beside, "gsnav_habitat")):
                 yield f"{package.replace('_', '-')} of unknown version, in {folder},"
 
 
@@ -83,6 +86,11 @@ def message(name: str) -> str:
     return f"gsnav serves navigation only: {name}"
 
 
+def _full_name(kind: type, name: str) -> str:
+    """Name of an attribute, by the public module of its class."""
+    return f"{kind.__module__.partition('._')[0]}.{kind.__qualname__}.{name}"
+
+
 class NotServed(NotImplementedError, AttributeError):
     """A name that gsnav does not serve. `hasattr` is False for it, as for names that do not exist."""
 
@@ -119,10 +127,10 @@ class _UnservedMember:
 def unserved_members(owner: type, *names: str) -> None:
     """Lets reading and writing these attributes of a class and of its objects raise NotServed."""
     for name in names:
-        setattr(owner, name, _UnservedMember(f"{owner.__module__}.{owner.__qualname__}.{name}"))
+        setattr(owner, name, _UnservedMember(_full_name(owner, name)))
 
 
-class _Sealing(type):
+class _Sealing(abc.ABCMeta):  # Subclasses may be abstract.
     def __call__(cls, *args: Any, **kwargs: Any) -> Any:
         made = super().__call__(*args, **kwargs)
         made.__dict__["_complete"] = True
@@ -132,7 +140,7 @@ class _Sealing(type):
         """Called for names that a class does not have."""
         if name[0] == "_":
             raise AttributeError(f"type object {cls.__name__!r} has no attribute {name!r}")
-        raise NotServed(message(f"{cls.__module__}.{cls.__qualname__}.{name}"))
+        raise NotServed(message(_full_name(cls, name)))
 
 
 class Sealed(metaclass=_Sealing):
@@ -143,7 +151,7 @@ class Sealed(metaclass=_Sealing):
         if name not in self.__dict__ and "_complete" in self.__dict__:
             kind = type(self)
             if name[0] != "_" and not hasattr(kind, name) and kind.__module__.partition(".")[0] == "habitat_sim":
-                raise NotServed(message(f"{kind.__module__}.{kind.__qualname__}.{name}"))
+                raise NotServed(message(_full_name(kind, name)))
         object.__setattr__(self, name, value)
 
 
@@ -156,7 +164,7 @@ class FullySealed(Sealed):
         kind = type(self)
         if name[0] == "_" or hasattr(kind, name):
             return object.__getattribute__(self, name)  # Raises the usual error.
-        raise NotServed(message(f"{kind.__module__}.{kind.__qualname__}.{name}"))
+        raise NotServed(message(_full_name(kind, name)))
 
 
 def missing(module: str) -> Callable[[str], NoReturn]:

@@ -136,6 +136,9 @@ class Simulator(PeoplePart):
         stage = _engine.stage(str(sim_cfg.scene_id), NavMeshSettings._native(settings), required)
         device = _engine.device(_integer("SimulatorConfiguration.gpu_device_id", sim_cfg.gpu_device_id))
         seed, clock = _integer("SimulatorConfiguration.random_seed", sim_cfg.random_seed), Clock(sim_cfg)
+        if stage.scene is not None and stage.scene.avatar_count > 0:
+            for agent in config.agents:
+                _engine.capsule("AgentConfiguration", agent.radius, agent.height)
         graph = SceneGraph()
         agents = [Agent(graph.get_root_node().create_child(), agent) for agent in config.agents]
         # All that can fail is done, so a simulator whose new settings are refused keeps the old ones.

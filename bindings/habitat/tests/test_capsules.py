@@ -144,6 +144,15 @@ def test_bodies_wider_than_high_are_refused(stage, monkeypatch):
         sim.step("move_forward")
 
 
+def test_bodies_wider_than_high_are_refused_where_people_walk(stage, monkeypatch):
+    config = make_cfg({"scene": stage, "width": 8, "height": 8})
+    config.agents[0].radius, config.agents[0].height = 0.5, 0.8
+    habitat_sim.Simulator(config).close()
+    monkeypatch.setenv("GSNAV_PEOPLE", "1")
+    with pytest.raises(ValueError, match="AgentConfiguration: radius = 0.5, height = 0.8: "):
+        habitat_sim.Simulator(config)
+
+
 def test_hidden_people_leave_no_trace_in_images_and_still_stop_agents(stage, monkeypatch):
     with open_sim(stage, 0, monkeypatch) as empty, open_sim(stage, 2, monkeypatch) as sim:
         body = sim._tracker(0).capsules(0.0, 0)[:, [0, 2]].mean(0)

@@ -384,6 +384,14 @@ def test_import_refuses_beside_a_package_without_metadata(tmp_path, package, imp
     assert package.replace("_", "-") in result.stderr and str(tmp_path / package) in result.stderr
 
 
+def test_a_second_copy_of_this_distribution_is_no_other_one(tmp_path):
+    for package in ("habitat_sim", "gsnav_habitat"):
+        (tmp_path / package).mkdir()
+        (tmp_path / package / "__init__.py").write_text("")
+    result = run_python(f"import sys; sys.path += [{str(tmp_path)!r}, b'bytes']; import habitat_sim")
+    assert result.returncode == 0, result.stderr
+
+
 def test_the_distribution_has_the_version_of_the_library():
     root = pathlib.Path(__file__).resolve().parents[3]
     header = (root / "include/gsnav/version.hpp").read_text()

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Names that gsnav does not serve cannot be written, and those that habitat-lab writes can."""
 
+import abc
 import copy
 import pathlib
 import pickle
@@ -128,6 +129,15 @@ def test_parts_of_a_simulator_have_their_own_names_only(sim):
         for name in ("semantic_id", "cumulative_bb"):
             with pytest.raises(NotImplementedError, match=f"gsnav.*{name}"):
                 getattr(made, name)
+    with pytest.raises(NotImplementedError, match="gsnav.*SixDOFPose.sensor_states$"):
+        habitat_sim.SixDOFPose().sensor_states = {}
+    with pytest.raises(NotImplementedError, match="gsnav serves navigation only: magnum.Color4.hue$"):
+        mn.Color4().hue
+
+    class Abstract(habitat_sim.Agent, abc.ABC):
+        pass
+
+    assert issubclass(Abstract, habitat_sim.Agent)
     with pytest.raises(NotImplementedError, match="gsnav.*MetadataMediator.active_dataset = 'x'"):
         sim.metadata_mediator.active_dataset = "x"
     sim.metadata_mediator.active_dataset = sim.metadata_mediator.active_dataset

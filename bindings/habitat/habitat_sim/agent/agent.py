@@ -45,7 +45,9 @@ class _Pose:
         elif name == "rotation":
             if not hasattr(value, "components") and not isinstance(value, Quaternion):
                 value = quat_from_coeffs(np.asarray(value, dtype=np.float64))
-        elif name != "sensor_states" and name[0] != "_" and type(self).__module__ == __name__:
+        elif name[0] != "_" and type(self).__module__ == __name__ and (
+            name != "sensor_states" or not isinstance(self, AgentState)
+        ):
             raise _shared.NotServed(self._unserved(name))
         object.__setattr__(self, name, value)
 
