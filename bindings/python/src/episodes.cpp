@@ -81,8 +81,9 @@ void bind_generation(nb::module_& m) {
       .field("straight_ratio", &R::straight_ratio,
              "Paths with a smaller ratio of length to straight distance are mostly refused.")
       .field("retries_per_goal", &R::retries_per_goal, "Number of starts to try per goal.")
-      .field("max_goals", &R::max_goals,
-             "Number of goals to try before an episode fails. At most 10^6 starts in all.")
+      .field(
+          "max_goals", &R::max_goals,
+          "Number of goals to try before an episode fails. With retries_per_goal, at most 10^6 starts.")
       .done();
   m.def(
       "generate_episode",
@@ -105,7 +106,8 @@ void bind_generation(nb::module_& m) {
       },
       nb::arg("navmesh"), nb::arg("count"), nb::arg("seed"), nb::arg("rules") = EpisodeRules{},
       Release(),
-      "Samples `count` episodes, at most 10^7, with the ids \"0\", \"1\", ... Ctrl-C ends the call.");
+      "Samples `count` episodes, at most 10^7, with the ids \"0\", \"1\", ... Ctrl-C ends the call "
+      "after an episode.");
 }
 
 void bind_files(nb::module_& m) {

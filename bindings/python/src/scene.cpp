@@ -193,7 +193,7 @@ void bind_scene(nb::module_& m) {
       },
       nb::arg("scene"), nb::arg("count"), nb::arg("width"), nb::arg("height"), nb::arg("hfov") = 60.0,
       nb::call_guard<ReleaseGil>(),
-      "`count` cameras on a circle around a scene, looking at its middle. `count` is at most 100000, "
+      "`count` cameras on a circle around a scene, looking at its middle. `count` is 1 to 100000, "
       "`hfov` in degrees.");
   m.def(
       "framing_camera",
