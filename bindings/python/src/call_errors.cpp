@@ -19,7 +19,8 @@ using Call = PyObject* (*)(PyObject*, PyObject* const*, std::size_t, PyObject*);
 
 /// Where a function object holds the address of its code, as its type says. Null for other objects.
 Call* call_of(nb::handle object) {
-  const std::string_view type = nb::type_name(object.type()).c_str();
+  const nb::str name = nb::type_name(object.type());
+  const std::string_view type = name.c_str();
   if (!type.ends_with("nb_func") && !type.ends_with("nb_method")) return nullptr;
   auto* const class_ = reinterpret_cast<PyTypeObject*>(object.type().ptr());
   const auto* member = static_cast<const PyMemberDef*>(PyType_GetSlot(class_, Py_tp_members));
