@@ -3,6 +3,7 @@
 
 import contextlib
 import logging
+import operator
 import os
 import threading
 import weakref
@@ -76,6 +77,14 @@ def _stamp(name: str) -> Any:
     except OSError:
         return None
     return status.st_mtime_ns, status.st_size
+
+
+def integer(what: str, value: Any) -> int:
+    """An integer of Python or numpy. Raises TypeError naming `what` for anything else."""
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise TypeError(f"{what} = {value!r}: must be an integer") from None
 
 
 def capsule(what: str, radius: float, height: float) -> tuple[float, float]:

@@ -8,7 +8,6 @@ Distances are the shortest on the surface, where Detour's are somewhat longer.
 import enum
 import functools
 import math
-import operator
 from typing import Any, Iterable
 
 import numpy as np
@@ -216,7 +215,7 @@ class PathFinder(_shared.FullySealed):
         return [int(i) for i in self._surface(island_index)[1].reshape(-1)]
 
     def _surface(self, island_index: int) -> Any:
-        island_index = _island("build_navmesh_vertices", island_index)
+        island_index = _engine.integer("PathFinder.build_navmesh_vertices: island_index", island_index)
         return self._need("build_navmesh_vertices").surface(None if island_index < 0 else island_index)
 
     # ---- Islands, numbered by decreasing area
@@ -232,7 +231,7 @@ class PathFinder(_shared.FullySealed):
 
     def island_area(self, island_index: int = -1) -> float:
         """Area of an island or, for -1, of the surface, square metres."""
-        mesh, island_index = self._need("island_area"), _island("island_area", island_index)
+        mesh, island_index = self._need("island_area"), _engine.integer("PathFinder.island_area: island_index", island_index)
         return mesh.navigable_area() if island_index < 0 else mesh.island_area(island_index)
 
     def island_radius(self, where: Any) -> float:
@@ -254,7 +253,7 @@ class PathFinder(_shared.FullySealed):
 
     def snap_point(self, point: Any, island_index: int = -1) -> Vector3:
         """Nearest point of the surface within 2 m on the ground and 4 m in height. NaN if there is none."""
-        island_index = _island("snap_point", island_index)
+        island_index = _engine.integer("PathFinder.snap_point: island_index", island_index)
         at = self._snap(point, island_index)
         return Vector3(_NAN) if at is None else Vector3(*at.position)
 
@@ -274,7 +273,7 @@ class PathFinder(_shared.FullySealed):
     def get_random_navigable_point(self, max_tries: int = 10, island_index: int = -1) -> Vector3:
         """Random point, uniform over the surface or one island. NaN for an island that does not exist."""
         mesh = self._need("get_random_navigable_point")
-        island_index = _island("get_random_navigable_point", island_index)
+        island_index = _engine.integer("PathFinder.get_random_navigable_point: island_index", island_index)
         if island_index >= mesh.island_count():
             return Vector3(_NAN)
         return Vector3(*mesh.random_point(self._random(), None if island_index < 0 else island_index).position)
@@ -285,7 +284,7 @@ class PathFinder(_shared.FullySealed):
         """Random point within `radius` metres of another, uniform over that part. NaN if it is empty. The radius may be
         infinite. Raises ValueError for one that is negative or NaN."""
         mesh = self._need("get_random_navigable_point_near")
-        island_index = _island("get_random_navigable_point_near", island_index)
+        island_index = _engine.integer("PathFinder.get_random_navigable_point_near: island_index", island_index)
         _check_radius("get_random_navigable_point_near: radius", radius)
         if island_index >= mesh.island_count():
             return Vector3(_NAN)
@@ -379,13 +378,6 @@ class PathFinder(_shared.FullySealed):
 @functools.lru_cache(maxsize=16)
 def _snapping(island: int | None) -> Any:
     return _engine.library().SnapOptions(half_extents=_REACH, island=island)
-
-
-def _island(method: str, index: Any) -> int:
-    try:
-        return operator.index(index)
-    except TypeError:
-        raise TypeError(f"PathFinder.{method}: island_index = {index!r}: must be an integer") from None
 
 
 def _check_radius(name: str, radius: float) -> None:

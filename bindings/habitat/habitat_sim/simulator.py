@@ -5,7 +5,6 @@ import dataclasses
 import functools
 import math
 import numbers
-import operator
 import os
 import random as _random
 import time
@@ -120,7 +119,7 @@ class Simulator(PeoplePart):
         for agent in config.agents:
             for spec in agent.sensor_specifications:
                 _draw.check(spec, _engine.is_empty(sim_cfg.scene_id))
-        default = _integer("SimulatorConfiguration.default_agent_id", sim_cfg.default_agent_id)
+        default = _engine.integer("SimulatorConfiguration.default_agent_id", sim_cfg.default_agent_id)
         if not 0 <= default < len(config.agents):
             raise ValueError(
                 f"SimulatorConfiguration.default_agent_id = {default}: there are {len(config.agents)} agents, from 0"
@@ -134,8 +133,8 @@ class Simulator(PeoplePart):
             settings.agent_radius, settings.agent_height = navigator.radius, navigator.height
         required = sim_cfg.navmesh_settings is not None
         stage = _engine.stage(str(sim_cfg.scene_id), NavMeshSettings._native(settings), required)
-        device = _engine.device(_integer("SimulatorConfiguration.gpu_device_id", sim_cfg.gpu_device_id))
-        seed, clock = _integer("SimulatorConfiguration.random_seed", sim_cfg.random_seed), Clock(sim_cfg)
+        device = _engine.device(_engine.integer("SimulatorConfiguration.gpu_device_id", sim_cfg.gpu_device_id))
+        seed, clock = _engine.integer("SimulatorConfiguration.random_seed", sim_cfg.random_seed), Clock(sim_cfg)
         if stage.scene is not None and stage.scene.avatar_count > 0:
             for agent in config.agents:
                 _engine.capsule("AgentConfiguration", agent.radius, agent.height)
@@ -179,7 +178,7 @@ class Simulator(PeoplePart):
 
     def seed(self, new_seed: int) -> None:
         """Seeds the random points and the simulator's random numbers."""
-        new_seed = _integer("Simulator.seed: new_seed", new_seed)
+        new_seed = _engine.integer("Simulator.seed: new_seed", new_seed)
         self.random = _random.Random(new_seed)
         self.pathfinder.seed(new_seed)
 
@@ -418,13 +417,6 @@ def _guard(kind: type) -> None:
 
 _guard(PeoplePart)
 _guard(Simulator)
-
-
-def _integer(name: str, value: Any) -> int:
-    try:
-        return operator.index(value)
-    except TypeError:
-        raise TypeError(f"{name} = {value!r}: must be an integer") from None
 
 
 def _checked(method: str, dt: float) -> float:
