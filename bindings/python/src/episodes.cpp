@@ -165,9 +165,8 @@ void bind_episodes(nb::module_& m) {
       nb::arg("people") = 3, nb::arg("seed") = 1, nb::arg("density") = 1.0,
       nb::arg("task") = TaskConfig{}, Release(),
       "The embedded flat with its NavMesh for the body of `task`, and people who walk in it, at most "
-      "1000 "
-      "(each takes some tenths of a second). `density` is the factor on the number of Gaussians of the "
-      "flat, in [0.05, 20]. Ctrl-C ends the call at the next person.");
+      "1000. `density` is the factor on the number of Gaussians of the flat, in [0.05, 20]. Ctrl-C ends "
+      "the call at the next person.");
   bind_planned_scene(m);
 }
 

@@ -17,7 +17,7 @@
 namespace nanobind::detail {
 
 /// True for a sequence with more than a million elements that is neither a list nor a tuple. nanobind
-/// would make a list of it before it looks at the elements: of range(10**9), 40 GB.
+/// would make a list of it before it looks at the elements.
 inline bool is_too_long(handle source) noexcept {
   if (PyTuple_Check(source.ptr()) || PyList_Check(source.ptr()) || !PySequence_Check(source.ptr()))
     return false;

@@ -166,8 +166,8 @@ class NavMesh {
   /// @param settings Agent, cell sizes and limits.
   /// @param vertices Positions, metres, Y up, at any distance from the world origin.
   /// @param triangles Indices. A triangle can be walked on if it is counter-clockwise seen from above.
-  /// @param threads Threads that build tiles if `settings.tile_size` is set. 0: one thread per core, at
-  /// most 16. At most 1024.
+  /// @param threads Threads that build tiles if `settings.tile_size` is set. In [0, 1024];
+  /// 0 is one thread per core, up to 16.
   /// @param progress Called some hundred times with the share of the work that is done, in [0, 1], by
   /// the calling thread. If it throws, the build ends and the exception leaves it. Stages of Recast are
   /// not cut: up to half of the time on a large field, or that of a tile, passes between two calls.

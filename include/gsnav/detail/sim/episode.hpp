@@ -27,8 +27,8 @@ struct EpisodeRules {
   /// 20 (ratio - 0.98)^2.
   double straight_ratio = 1.1;
   int retries_per_goal = 10;  ///< Number of starts to try per goal.
-  int max_goals =
-      2000;  ///< Number of goals to try before an episode fails. Times retries_per_goal, at most 10^6.
+  /// Number of goals to try before an episode fails. Times retries_per_goal, at most 10^6.
+  int max_goals = 2000;
 };
 
 /// Checks the values.
