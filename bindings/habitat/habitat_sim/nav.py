@@ -231,7 +231,8 @@ class PathFinder(_shared.FullySealed):
 
     def island_area(self, island_index: int = -1) -> float:
         """Area of an island or, for -1, of the surface, square metres."""
-        mesh, island_index = self._need("island_area"), _engine.integer("PathFinder.island_area: island_index", island_index)
+        mesh = self._need("island_area")
+        island_index = _engine.integer("PathFinder.island_area: island_index", island_index)
         return mesh.navigable_area() if island_index < 0 else mesh.island_area(island_index)
 
     def island_radius(self, where: Any) -> float:
