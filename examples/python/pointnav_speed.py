@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measures the steps per second of train_pointnav.py's environments, without an agent.
 
-    python examples/python/pointnav_speed.py --environments 256 --density 0.05
+    python examples/python/pointnav_speed.py --environments 256 --density 0.05 --quality fast
     python examples/python/pointnav_speed.py --people 5
 """
 

@@ -112,7 +112,7 @@ def world_arguments(p: argparse.ArgumentParser) -> None:
     """Adds the arguments for the worlds and the quality of images."""
     p.add_argument("--device", default="best", help="device of gsnav and torch: best, cuda, cuda:1, cpu, ...")
     p.add_argument("--people", type=int, default=0, help="people in each flat")
-    p.add_argument("--density", type=float, default=0.05, help="factor on the number of Gaussians. Flats of "
+    p.add_argument("--density", type=float, default=0.3, help="factor on the number of Gaussians. Flats of "
                    "triangles take 0.05 at most, because it only changes how fine their colours are")
     p.add_argument("--rooms", type=int, default=4, help="rooms of a flat")
     p.add_argument("--worlds", default="gaussians", choices=["gaussians", "meshes", "both"],
