@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "eval/oracle_support.hpp"
-#include "gsnav/detail/math/pack_layout.hpp"
+#include "gsnav/detail/math/pack_columns.hpp"
 #include "hard_cases/backends.hpp"
 #include "hard_cases/cases.hpp"
 #include "hard_cases/records.hpp"

@@ -5,9 +5,11 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <vector>
 
 #include "gsnav/core/rng.hpp"
 #include "gsnav/detail/math/pack.hpp"
+#include "gsnav/detail/math/pack_columns.hpp"
 #include "gsnav/detail/math/pack_double.hpp"
 #include "gsnav/detail/math/pack_layout.hpp"
 #include "gsnav/detail/math/packs.hpp"
@@ -91,6 +93,54 @@ void check_memory() {
   const int listed = store_lane_indices(P::load(c) > P(2.0f), 7, indices);
   REQUIRE(listed == N - 2);
   for (int i = 0; i < listed; ++i) CHECK(indices[i] == 7 + 2 + i);
+}
+
+/// The columns of a matrix with N rows of K numbers, read and written in every way, against its
+/// elements.
+template <int K, int N>
+void check_columns(Rng& rng) {
+  using P = Pack<float, N>;
+  std::vector<float> matrix(K * N);
+  for (float& x : matrix) x = static_cast<float>(rng.normal());
+  const auto element = [&matrix](int row, int column) {
+    return matrix[static_cast<std::size_t>(K * row + column)];
+  };
+  P columns[K];
+  load_columns<K>(matrix.data(), columns);
+  for (int k = 0; k < K; ++k) {
+    for (int row = 0; row < N; ++row) REQUIRE(columns[k][row] == element(row, k));
+  }
+  std::vector<float> written(matrix.size());
+  store_columns<K>(columns, written.data());
+  REQUIRE(written == matrix);
+}
+
+/// Chosen lanes, against a loop over the bits that choose them.
+template <int N>
+void check_chosen_lanes(Rng& rng) {
+  std::uint32_t lanes[N];
+  for (std::uint32_t& x : lanes) x = static_cast<std::uint32_t>(rng.uniform() * 4294967296.0);
+  for (int round = 0; round < 500; ++round) {
+    const std::uint32_t bits = static_cast<std::uint32_t>(rng.uniform() * (1 << N));
+    std::vector<std::uint32_t> expected;
+    std::vector<std::uint8_t> expected_places;
+    float marks[N];
+    for (int i = 0; i < N; ++i) {
+      const bool chosen = (bits >> i & 1u) != 0;
+      marks[i] = chosen ? 1.0f : 0.0f;
+      if (!chosen) continue;
+      expected.push_back(lanes[i]);
+      expected_places.push_back(static_cast<std::uint8_t>(100 + i));
+    }
+    std::vector<std::uint32_t> written(expected.size());  // a write beyond the end is an error
+    REQUIRE(store_lanes(bits, lanes, written.data()) == static_cast<int>(expected.size()));
+    REQUIRE(written == expected);
+    std::vector<std::uint8_t> places(N);
+    const int count =
+        store_lane_indices(Pack<float, N>::load(marks) > Pack<float, N>(0.5f), 100, places.data());
+    places.resize(static_cast<std::size_t>(count));
+    REQUIRE(places == expected_places);
+  }
 }
 
 /// A power of two times 1 + k / 2^bits, either sign.
@@ -197,6 +247,14 @@ void check_side_by_side() {
 }
 
 }  // namespace
+
+TEST_CASE("columns and chosen lanes of packs are those of the matrix") {
+  Rng rng(8);
+  check_columns<3, 4>(rng), check_columns<4, 4>(rng), check_columns<8, 4>(rng);
+  check_columns<3, 8>(rng), check_columns<4, 8>(rng), check_columns<8, 8>(rng);
+  check_columns<3, 16>(rng), check_columns<4, 16>(rng), check_columns<8, 16>(rng);
+  check_chosen_lanes<4>(rng), check_chosen_lanes<8>(rng), check_chosen_lanes<16>(rng);
+}
 
 TEST_CASE("packs of the natural width are their lanes") { check_lanes<GSNAV_PACK_WIDTH>(); }
 TEST_CASE("packs of four are their lanes") { check_lanes<4>(); }

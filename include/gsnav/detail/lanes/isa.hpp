@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "gsnav/detail/math/pack_layout.hpp"
+#include "gsnav/detail/math/pack_columns.hpp"
 
 // SIMD code is compiled once per instruction set and selected at run time. All its functions are in a
 // namespace named after the set, so that a linker cannot mix them up. Header-only use has other names,

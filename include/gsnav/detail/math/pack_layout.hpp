@@ -102,6 +102,24 @@ GSNAV_HD void transpose_chunks(Pack<float, N>* v) noexcept {
   }
 }
 
+#if defined(__AVX2__)
+namespace detail {
+/// For each of 256 sets of bits: the places of its bits, in order, one byte each.
+struct BitPlaces {
+  std::uint64_t places[256];
+  constexpr BitPlaces() noexcept : places{} {
+    for (std::uint32_t bits = 0; bits < 256; ++bits) {
+      int count = 0;
+      for (std::uint64_t k = 0; k < 8; ++k) {
+        if ((bits >> k & 1u) != 0) places[bits] |= k << (8 * count++);
+      }
+    }
+  }
+};
+inline constexpr BitPlaces kBitPlaces;
+}  // namespace detail
+#endif
+
 /// Writes first + l for each lane l set in `m`, in order, and returns the number written. May overwrite
 /// up to N bytes from `out` on.
 template <int N>
@@ -114,6 +132,15 @@ GSNAV_HD int store_lane_indices(Mask<N> m, int first, std::uint8_t* out) noexcep
     const __m128i bytes = _mm512_maskz_cvtepi32_epi8(static_cast<__mmask16>(-1), packed);
     std::memcpy(out, &bytes, sizeof bytes);
     return __builtin_popcount(m.v);
+  } else
+#endif
+#if defined(__AVX2__)
+      if constexpr (N == 8) {
+    const std::uint32_t bits = lane_bits(m);
+    const std::uint64_t indices =
+        detail::kBitPlaces.places[bits] + 0x0101010101010101u * static_cast<std::uint64_t>(first);
+    std::memcpy(out, &indices, sizeof indices);
+    return __builtin_popcount(bits);
   } else
 #endif
   {
@@ -138,149 +165,23 @@ GSNAV_HD int store_lanes(std::uint32_t bits, const std::uint32_t (&lanes)[N],
     return count;
   } else
 #endif
+#if defined(__AVX2__)
+      if constexpr (N == 8) {
+    const __m256i numbers = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+    const __m256i places =
+        _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<long long>(detail::kBitPlaces.places[bits])));
+    const __m256i all = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(lanes));
+    const int count = __builtin_popcount(bits);
+    _mm256_maskstore_epi32(reinterpret_cast<int*>(out),
+                           _mm256_cmpgt_epi32(_mm256_set1_epi32(count), numbers),
+                           _mm256_permutevar8x32_epi32(all, places));
+    return count;
+  } else
+#endif
   {
     int count = 0;
     for (; bits != 0; bits &= bits - 1) out[count++] = lanes[__builtin_ctz(bits)];
     return count;
-  }
-}
-
-namespace detail {
-#if defined(__AVX512F__)
-/// Transposes two 8 x 8 matrices: the one in the lower halves of 8 registers, and the one in the upper
-/// halves.
-GSNAV_HD void transpose_halves(PackTypes<16>::f* r) noexcept {
-  using V = PackTypes<16>::f;
-  V t[8];
-  for (int i = 0; i < 8; i += 2) {
-    t[i] = __builtin_shufflevector(r[i], r[i + 1], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13,
-                                   29);
-    t[i + 1] = __builtin_shufflevector(r[i], r[i + 1], 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14,
-                                       30, 15, 31);
-  }
-  for (int i = 0; i < 8; i += 4) {
-    for (int h = 0; h < 2; ++h) {
-      const V a = t[i + h], b = t[i + 2 + h];
-      r[i + 2 * h] =
-          __builtin_shufflevector(a, b, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
-      r[i + 2 * h + 1] =
-          __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31);
-    }
-  }
-  for (int i = 0; i < 4; ++i) {
-    const V a = r[i], b = r[i + 4];
-    r[i] = __builtin_shufflevector(a, b, 0, 1, 2, 3, 16, 17, 18, 19, 8, 9, 10, 11, 24, 25, 26, 27);
-    r[i + 4] = __builtin_shufflevector(a, b, 4, 5, 6, 7, 20, 21, 22, 23, 12, 13, 14, 15, 28, 29, 30, 31);
-  }
-}
-#endif
-}  // namespace detail
-
-/// Reads K floats from each of N rows, one row per lane, into K packs, one per column.
-template <int K, int N>
-GSNAV_HD void load_columns(const float* const (&rows)[N], Pack<float, N>* columns) noexcept {
-#if defined(__AVX512F__)
-  if constexpr (N == 16 && K == 8) {
-    // Rows i and i + 8 share a register, so that each half is an 8 x 8 transpose.
-    typename Pack<float, 16>::vector r[8];
-    for (int i = 0; i < 8; ++i) {
-      const Pack<float, 8> a = Pack<float, 8>::load(rows[i]), b = Pack<float, 8>::load(rows[i + 8]);
-      r[i] = __builtin_shufflevector(a.v, b.v, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-    }
-    detail::transpose_halves(r);
-    for (int k = 0; k < 8; ++k) columns[k].v = r[k];
-    return;
-  }
-#endif
-#if defined(__AVX512VL__)
-  if constexpr (N == 16 && K == 3) {
-    // Rows i, i + 4, i + 8 and i + 12 share a register.
-    using V = typename Pack<float, 16>::vector;
-    V r[4];
-    const auto row = [&rows](int i) GSNAV_INLINED {
-      return reinterpret_cast<typename Pack<float, 4>::vector>(_mm_maskz_loadu_ps(0x7, rows[i]));
-    };
-    for (int i = 0; i < 4; ++i) {
-      const auto low = __builtin_shufflevector(row(i), row(i + 4), 0, 1, 2, 3, 4, 5, 6, 7);
-      const auto high = __builtin_shufflevector(row(i + 8), row(i + 12), 0, 1, 2, 3, 4, 5, 6, 7);
-      r[i] = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-    }
-    const V t0 =
-        __builtin_shufflevector(r[0], r[1], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    const V t1 =
-        __builtin_shufflevector(r[0], r[1], 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-    const V t2 =
-        __builtin_shufflevector(r[2], r[3], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    const V t3 =
-        __builtin_shufflevector(r[2], r[3], 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-    columns[0].v =
-        __builtin_shufflevector(t0, t2, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
-    columns[1].v =
-        __builtin_shufflevector(t0, t2, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31);
-    columns[2].v =
-        __builtin_shufflevector(t1, t3, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
-    return;
-  }
-#endif
-  for (int k = 0; k < K; ++k) {
-    float column[N];
-    for (int i = 0; i < N; ++i) column[i] = rows[i][k];
-    columns[k] = Pack<float, N>::load(column);
-  }
-}
-/// Reads the columns of a row-major matrix with N rows of K floats.
-template <int K, int N>
-GSNAV_HD void load_columns(const float* matrix, Pack<float, N>* columns) noexcept {
-  const float* rows[N];
-  for (int i = 0; i < N; ++i) rows[i] = matrix + K * i;
-  load_columns<K>(rows, columns);
-}
-
-/// Writes K packs, one per column, as a row-major matrix with N rows (one per lane) of K floats.
-template <int K, int N>
-GSNAV_HD void store_columns(const Pack<float, N>* columns, float* matrix) noexcept {
-#if defined(__AVX512F__)
-  if constexpr (N == 16 && K == 8) {
-    typename Pack<float, 16>::vector r[8];
-    for (int k = 0; k < 8; ++k) r[k] = columns[k].v;
-    detail::transpose_halves(r);
-    for (int i = 0; i < 8; ++i) {
-      Pack<float, 8>(__builtin_shufflevector(r[i], r[i], 0, 1, 2, 3, 4, 5, 6, 7)).store(matrix + 8 * i);
-      Pack<float, 8>(__builtin_shufflevector(r[i], r[i], 8, 9, 10, 11, 12, 13, 14, 15))
-          .store(matrix + 8 * (i + 8));
-    }
-    return;
-  }
-#endif
-#if defined(__AVX512F__)
-  if constexpr (N == 16 && K == 4) {
-    using V = typename Pack<float, 16>::vector;
-    const V a = columns[0].v, b = columns[1].v, c = columns[2].v, d = columns[3].v;
-    const V ab0 =
-        __builtin_shufflevector(a, b, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    const V ab1 =
-        __builtin_shufflevector(a, b, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-    const V cd0 =
-        __builtin_shufflevector(c, d, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    const V cd1 =
-        __builtin_shufflevector(c, d, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-    // r[i] holds rows i, i + 4, i + 8 and i + 12, four floats each.
-    const V r[4] = {
-        __builtin_shufflevector(ab0, cd0, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29),
-        __builtin_shufflevector(ab0, cd0, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31),
-        __builtin_shufflevector(ab1, cd1, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29),
-        __builtin_shufflevector(ab1, cd1, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31)};
-    for (int i = 0; i < 4; ++i) {
-      Pack<float, 4>(__builtin_shufflevector(r[i], r[i], 0, 1, 2, 3)).store(matrix + 4 * i);
-      Pack<float, 4>(__builtin_shufflevector(r[i], r[i], 4, 5, 6, 7)).store(matrix + 4 * (i + 4));
-      Pack<float, 4>(__builtin_shufflevector(r[i], r[i], 8, 9, 10, 11)).store(matrix + 4 * (i + 8));
-      Pack<float, 4>(__builtin_shufflevector(r[i], r[i], 12, 13, 14, 15)).store(matrix + 4 * (i + 12));
-    }
-    return;
-  }
-#endif
-  for (int k = 0; k < K; ++k) {
-    for (int i = 0; i < N; ++i) matrix[K * i + k] = columns[k][i];
   }
 }
 
