@@ -8,7 +8,7 @@ RUNS = "visible sets: rows in runs*"
 
 FAULTS = [
     fault("rows_of_lanes_all_seen", "bits",
-          "lane_bits(projected.splat.visible) & wanted & ", "lane_bits(projected.splat.visible) & ",
+          "lane_bits(projected.splat.visible) & place.wanted;", "lane_bits(projected.splat.visible);",
           VISIBLE_TEST, DRAWN),
     fault("rows_one_by_one_all_seen", "ProjectChunk",
           "if (seen.has(i - begin) && project_gaussian(", "if (project_gaussian(", VISIBLE_TEST, DRAWN),

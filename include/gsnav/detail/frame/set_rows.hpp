@@ -76,6 +76,7 @@ struct OneRow {
   GSNAV_HD float codes(int plane) const noexcept {
     return static_cast<float>(shape.codes.data[static_cast<std::size_t>(plane) * shape.size + i]);
   }
+  GSNAV_HD ShapeEncoding encoding() const noexcept { return shape.encoding(); }
   /// Constants that decode the row, or null if shapes are floats.
   GSNAV_HD const PackedChunk* chunk() const noexcept {
     return shape.encoding() == ShapeEncoding::codes ? &shape.chunks[i / kProjectChunk] : nullptr;
@@ -100,7 +101,7 @@ struct SetRows {
                                                       : floats3(at.shape.means);
   }
   /// True if the shape is a factor M (ShapeRows::axes) instead of a quaternion and scales.
-  GSNAV_HD bool has_factor() const noexcept { return at.shape.encoding() == ShapeEncoding::factors; }
+  GSNAV_HD bool has_factor() const noexcept { return at.encoding() == ShapeEncoding::factors; }
   GSNAV_HD Mat3<L> factor() const noexcept {
     return {{floats3(at.shape.axes), floats3(at.shape.axes, 3), floats3(at.shape.axes, 6)}};
   }

@@ -9,6 +9,29 @@
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
 
+/// Offsets of the rows row(0), ..., row(kWidth - 1), each that of its origin.
+template <class Row>
+GSNAV_HD Vec3<doubles_of<F>> offsets_of(const ShapeRows& shape, const View<const Vec3d>& offsets,
+                                        const Row& row) noexcept {
+  using D = doubles_of<F>;
+  const auto all = [](const Vec3d& o) noexcept { return Vec3<D>{D(o.x), D(o.y), D(o.z)}; };
+  if (shape.origin_ids.empty()) return all(offsets[0]);
+  // Neighbours mostly have one origin.
+  const std::uint32_t first = shape.origin_ids[row(0)];
+  std::uint32_t others = 0;
+  for (std::size_t k = 1; k < static_cast<std::size_t>(kWidth); ++k)
+    others |= shape.origin_ids[row(k)] ^ first;
+  if (others == 0) return all(offsets[first]);
+  double planes[3][kWidth];
+  for (std::size_t k = 0; k < static_cast<std::size_t>(kWidth); ++k) {
+    const Vec3d& o = offsets[shape.origin_ids[row(k)]];
+    planes[0][k] = o.x;
+    planes[1][k] = o.y;
+    planes[2][k] = o.z;
+  }
+  return {D::load(planes[0]), D::load(planes[1]), D::load(planes[2])};
+}
+
 /// Reads kWidth rows of a set from row i on, one per lane, for SetRows. The last pack of a set may have
 /// fewer rows (`count`). Its other lanes repeat the last row, and callers mask them.
 struct PackOfRows {
@@ -18,6 +41,7 @@ struct PackOfRows {
   const PackedChunk* packed;  ///< null if shapes are floats
   std::size_t i, count;
 
+  GSNAV_HD ShapeEncoding encoding() const noexcept { return shape.encoding(); }
   GSNAV_HD const PackedChunk* chunk() const noexcept { return packed; }
   GSNAV_HD std::size_t row(std::size_t k) const noexcept { return i + (k < count ? k : count - 1); }
   GSNAV_HD F floats(const View<const float>& plane) const noexcept {
@@ -37,18 +61,53 @@ struct PackOfRows {
     return F::load(values);
   }
   GSNAV_HD Vec3<doubles_of<F>> offset(const View<const Vec3d>& offsets) const noexcept {
-    using D = doubles_of<F>;
-    if (shape.origin_ids.empty()) return {D(offsets[0].x), D(offsets[0].y), D(offsets[0].z)};
-    double planes[3][kStep];
-    for (std::size_t k = 0; k < kStep; ++k) {
-      const Vec3d& o = offsets[shape.origin_ids[row(k)]];
-      planes[0][k] = o.x;
-      planes[1][k] = o.y;
-      planes[2][k] = o.z;
-    }
-    return {D::load(planes[0]), D::load(planes[1]), D::load(planes[2])};
+    return offsets_of(shape, offsets, [this](std::size_t k) GSNAV_INLINED { return row(k); });
   }
 };
+
+/// PackOfRows for kWidth rows of ShapeEncoding::ellipsoids. Nearly all packs are. Without the other
+/// cases their code is a third as long.
+struct PlainRows {
+  using lane = F;
+  const ShapeRows& shape;
+  std::size_t i;
+
+  GSNAV_HD static bool fit(const ShapeRows& shape) noexcept {
+    return shape.encoding() == ShapeEncoding::ellipsoids;
+  }
+  GSNAV_HD static constexpr ShapeEncoding encoding() noexcept { return ShapeEncoding::ellipsoids; }
+  GSNAV_HD static constexpr const PackedChunk* chunk() noexcept { return nullptr; }
+  GSNAV_HD F floats(const View<const float>& plane) const noexcept { return F::load(plane.data + i); }
+  GSNAV_HD static F codes(int) noexcept { return {}; }
+  GSNAV_HD Vec3<doubles_of<F>> offset(const View<const Vec3d>& offsets) const noexcept {
+    return offsets_of(shape, offsets, [this](std::size_t k) GSNAV_INLINED { return i + k; });
+  }
+};
+
+/// Where a pack of rows is written: after the `written` splats that its chunk has, from slot `base` on.
+struct PackPlace {
+  std::size_t first;     ///< row of the first lane
+  std::uint32_t wanted;  ///< bits of the lanes to project
+  std::size_t base;
+  std::uint32_t written;
+};
+
+/// Projects a pack of rows and writes those that are visible. Returns their number.
+template <class Rows>
+GSNAV_STAGE std::uint32_t project_pack(const ViewedSet<float>& args, const ProjectOutputs<float>& out,
+                                       const Rows& pack, const PackPlace& place,
+                                       Survivors& survivors) noexcept {
+  const ProjectionCamera<float>& camera = args.camera;
+  const ViewedRows<Rows> rows(pack, args.offsets);
+  const RowKey<F> key = row_key<F>(args.camera64, rows);
+  if (!any(beyond_near_plane(camera.near_plane, key.z))) return 0;
+  if (camera.response != Response::ewa) __builtin_unreachable();  // project_chunk has seen to it
+  const ProjectedRow<F> projected(camera, rows, key);
+  const std::uint32_t bits = lane_bits(projected.splat.visible) & place.wanted;
+  if (bits == 0) return 0;
+  return write_splats(args, out, place.base, place.written, {place.first, key, projected}, bits,
+                      survivors);
+}
 
 /// Projects a chunk with the serial kernel, for rules that have no SIMD form.
 GSNAV_STAGE void project_chunk_alone(const ViewedSet<float>& args, const ProjectOutputs<float>& out,
@@ -60,8 +119,7 @@ GSNAV_STAGE void project_chunk_alone(const ViewedSet<float>& args, const Project
 inline void project_chunk(const ViewedSet<float>& args, const ProjectOutputs<float>& out,
                           std::size_t c) noexcept {
   const ShapeRows& shape = args.gaussians.shape;
-  const ProjectionCamera<float>& camera = args.camera;
-  if (camera.response != Response::ewa || camera.compat != Compat::none) {
+  if (args.camera.response != Response::ewa || args.camera.compat != Compat::none) {
     project_chunk_alone(args, out, c);
     return;
   }
@@ -77,21 +135,20 @@ inline void project_chunk(const ViewedSet<float>& args, const ProjectOutputs<flo
   const SeenRows may_be_seen = args.seen_rows(id);
   const PackedChunk* const packed =
       shape.encoding() == ShapeEncoding::codes ? &shape.chunks[id] : nullptr;
+  const bool plain = PlainRows::fit(shape);
   std::uint32_t written = 0;
   Survivors survivors;
   static_assert(kChunkPart % step == 0 && 32 % step == 0);
   for (std::size_t i = begin; i < end; i += step) {
     if ((parts >> ((i - begin) / kChunkPart) & 1u) == 0) continue;
-    const std::uint32_t wanted = may_be_seen.word((i - begin) / 32) >> ((i - begin) % 32);
-    if ((wanted & ((1u << step) - 1u)) == 0) continue;
     const std::size_t count = end - i < step ? end - i : step;
-    const ViewedRows<PackOfRows> rows({shape, packed, i, count}, args.offsets);
-    const RowKey<F> key = row_key<F>(args.camera64, rows);
-    if (!any(beyond_near_plane(camera.near_plane, key.z))) continue;
-    const ProjectedRow<F> projected(camera, rows, key);
-    const std::uint32_t bits = lane_bits(projected.splat.visible) & wanted & ((1u << count) - 1u);
-    if (bits != 0)
-      written += write_splats(args, out, base, written, {i, key, projected}, bits, survivors);
+    const std::uint32_t wanted =
+        may_be_seen.word((i - begin) / 32) >> ((i - begin) % 32) & ((1u << count) - 1u);
+    if (wanted == 0) continue;
+    const PackPlace place{i, wanted, base, written};
+    written += plain && count == step
+                   ? project_pack(args, out, PlainRows{shape, i}, place, survivors)
+                   : project_pack(args, out, PackOfRows{shape, packed, i, count}, place, survivors);
   }
   if (!out.colors.empty()) {
     const ColorRows& sh = args.gaussians.color;
