@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+import gsnav
 import gsnav_habitat as _shared
 from gsnav_habitat import _turns
 
@@ -210,7 +211,7 @@ def _nothing(spec: Any) -> np.ndarray:
     if spec.sensor_type == SensorType.DEPTH:
         return np.zeros(shape, np.float32)
     out = np.empty((*shape, 4), np.uint8)
-    out[...] = np.floor(255 * np.clip(np.array(spec.clear_color), 0, 1) + np.float32(0.5))  # As images of scenes.
+    out[...] = gsnav.to_bytes(np.array(spec.clear_color, np.float32))
     return out
 
 
