@@ -170,7 +170,6 @@ std::vector<ProxyCapsule> habitat_capsules(const Skeleton& skeleton) {
 CapsuleReport measure_capsules(const AvatarAsset& asset, const std::vector<ProxyCapsule>& capsules,
                                const std::vector<std::vector<Affine3<double>>>& poses, bool volumes) {
   CapsuleReport report{.capsules = capsules.size(), .poses = poses.size()};
-  double sum = 0.0;
   std::vector<double> over;
   for (const auto& pose : poses) {
     const std::vector<Vec3d> centers = skinned_centers(asset, pose);
@@ -186,7 +185,6 @@ CapsuleReport measure_capsules(const AvatarAsset& asset, const std::vector<Proxy
     const double share =
         static_cast<double>(inside) / static_cast<double>(max<std::size_t>(1, centers.size()));
     report.contained_least = min(report.contained_least, share);
-    sum += share;
     if (volumes) {
       const CapsuleVolume volume = measure_capsule_volume(centers, placed);
       const double part = 1.0 / static_cast<double>(poses.size()), body = max(volume.body, 1e-30);
@@ -218,7 +216,6 @@ CapsuleReport measure_capsules(const AvatarAsset& asset, const std::vector<Proxy
       }
     }
   }
-  report.contained_mean = poses.empty() ? 1.0 : sum / static_cast<double>(poses.size());
   if (!over.empty()) {
     for (const double d : over) report.over_mean += d / static_cast<double>(over.size());
     report.over_p99 = value_at(over, 0.99);

@@ -275,8 +275,8 @@ GSNAV_HD float exp2_in_range(float x) noexcept {
   return detail::exp2_by_polynomial<M>(x);
 }
 /// 2^x. In float, x is clamped to [-126, 126]; the integer part goes to the exponent, and a polynomial
-/// computes the rest. Each step is correctly rounded, so all backends agree on the bits. In double and
-/// long double the platform's function is used.
+/// computes the rest. Each step is correctly rounded, so all backends agree on the bits. In double the
+/// platform's function is used.
 template <Exp2 M = Exp2::degree5>
 GSNAV_HD float exp2(float x) noexcept {
   return exp2_in_range<M>(clamp(x, -126.0f, 126.0f));
@@ -291,18 +291,6 @@ template <Exp2 = Exp2::degree5>
 GSNAV_HD double exp2_in_range(double x) noexcept {
   return ::exp2(x);
 }
-#if !defined(__CUDACC__)
-/// 2^x by the platform's function.
-template <Exp2 = Exp2::degree5>
-GSNAV_HD long double exp2(long double x) noexcept {
-  return ::exp2l(x);
-}
-/// 2^x by the platform's function.
-template <Exp2 = Exp2::degree5>
-GSNAV_HD long double exp2_in_range(long double x) noexcept {
-  return ::exp2l(x);
-}
-#endif
 
 namespace detail {
 /// log2(m) + exponent, where t = (m - 1) / (m + 1). Uses log2(m) = 2 / ln 2 * artanh(t), with five terms
@@ -329,9 +317,5 @@ GSNAV_HD float log2(float x) noexcept {
 }
 /// log2(x) by the platform's function.
 GSNAV_HD double log2(double x) noexcept { return ::log2(x); }
-#if !defined(__CUDACC__)
-/// log2(x) by the platform's function.
-GSNAV_HD long double log2(long double x) noexcept { return ::log2l(x); }
-#endif
 
 }  // namespace gsnav

@@ -25,8 +25,7 @@ struct CapsuleReport {
   std::size_t capsules = 0, poses = 0;  ///< Number of capsules, and number of poses.
   double percentile = 0.0;              ///< The percentile that was needed.
   double contained_least = 1.0;         ///< Share of the centres inside a capsule, in the worst pose.
-  double contained_mean = 1.0;    ///< Mean over the poses of the share of centres inside a capsule.
-  double outside_greatest = 0.0;  ///< Greatest distance of a centre from the nearest capsule.
+  double outside_greatest = 0.0;        ///< Greatest distance of a centre from the nearest capsule.
   double over_mean = 0.0;  ///< Mean distance of the capsules' outer surface from the nearest centre.
   double over_p99 = 0.0;   ///< 99th percentile of that distance.
   double body_volume =
