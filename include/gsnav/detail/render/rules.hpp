@@ -81,7 +81,7 @@ BlendRules<S> blend_rules(const RenderConfig& c, const FrameImages<S>& images) n
                   [&](const ImageKind<S>& k) { return k.sums && images.*k.image != nullptr; });
   if (sums || c.compat != Compat::none) return r;
   S needed(1);
-  if (images.median_depth != nullptr) needed = S(0.5);
+  if (images.median_depth != nullptr) needed = kMedianLevel<S>;
   if (images.first_hit_depth != nullptr) needed = std::min(needed, S(1) - r.first_hit_tau);
   r.transmittance_min = std::max(r.transmittance_min, needed);
   return r;
