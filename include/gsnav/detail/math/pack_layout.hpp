@@ -116,7 +116,8 @@ struct BitPlaces {
     }
   }
 };
-inline constexpr BitPlaces kBitPlaces;
+/// Not inline: objects of different instruction sets must not share a symbol.
+constexpr BitPlaces kBitPlaces;
 }  // namespace detail
 #endif
 
