@@ -124,7 +124,7 @@ void check_chosen_lanes(Rng& rng) {
     const std::uint32_t bits = static_cast<std::uint32_t>(rng.uniform() * (1 << N));
     std::vector<std::uint32_t> expected;
     std::vector<std::uint8_t> expected_places;
-    float marks[N];
+    float marks[N] = {};
     for (int i = 0; i < N; ++i) {
       const bool chosen = (bits >> i & 1u) != 0;
       marks[i] = chosen ? 1.0f : 0.0f;
@@ -135,11 +135,13 @@ void check_chosen_lanes(Rng& rng) {
     std::vector<std::uint32_t> written(expected.size());  // a write beyond the end is an error
     REQUIRE(store_lanes(bits, lanes, written.data()) == static_cast<int>(expected.size()));
     REQUIRE(written == expected);
-    std::vector<std::uint8_t> places(N);
-    const int count =
-        store_lane_indices(Pack<float, N>::load(marks) > Pack<float, N>(0.5f), 100, places.data());
-    places.resize(static_cast<std::size_t>(count));
-    REQUIRE(places == expected_places);
+    if constexpr (N <= GSNAV_PACK_WIDTH) {  // wider masks have no registers here
+      std::vector<std::uint8_t> places(N);
+      const int count =
+          store_lane_indices(Pack<float, N>::load(marks) > Pack<float, N>(0.5f), 100, places.data());
+      places.resize(static_cast<std::size_t>(count));
+      REQUIRE(places == expected_places);
+    }
   }
 }
 
