@@ -6,10 +6,12 @@
 
 OLD and NEW are programs made of bench/bench_engine.cpp, or others with its protocol. The scene is that
 of GSNAV_BENCH_SCENE and GSNAV_BENCH_CAMERAS. `@` before OUTPUT/PROFILE draws all views in one call.
-Each view counts with its least time of all rounds, since other programs only slow a frame down. A row has
-the median over views, and how many times faster it is than the first row with the same number of views per
-call: the median of the ratios of single views, and their quartiles. Then: how many of its images have the
-bits of those of the first row.
+
+A view counts with its least time of all rounds, since other programs only slow a frame down. Rows are
+compared with the first one, and rows with `@` with the first of those. A printed row has:
+- the median time over views, milliseconds per frame;
+- how many times faster it is: the median over views, and the quartiles;
+- how many of its images have the same bits.
 """
 import argparse
 import os

@@ -95,8 +95,7 @@ void check_memory() {
   for (int i = 0; i < listed; ++i) CHECK(indices[i] == 7 + 2 + i);
 }
 
-/// The columns of a matrix with N rows of K numbers, read and written in every way, against its
-/// elements.
+/// The columns of a matrix with N rows of K numbers, read and written, against its elements.
 template <int K, int N>
 void check_columns(Rng& rng) {
   using P = Pack<float, N>;

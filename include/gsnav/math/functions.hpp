@@ -8,10 +8,10 @@
 
 #include "gsnav/config.hpp"
 
-// Scalar functions with the same names for float, double and long double. detail/math/pack.hpp adds
-// these names for SIMD packs, so that a kernel written once runs on all of them. All functions use
-// correctly rounded operations (+ - * / sqrt fma), except exp2 and log2 of double and the trigonometric
-// functions, which come from the platform.
+// Scalar functions with the same names for float and double, some also for long double.
+// detail/math/pack.hpp adds these names for SIMD packs, so that a kernel written once runs on all of
+// them. All functions use correctly rounded operations (+ - * / sqrt fma), except exp2 and log2 of
+// double and the trigonometric functions, which come from the platform.
 
 namespace gsnav {
 

@@ -65,8 +65,8 @@ struct PackOfRows {
   }
 };
 
-/// PackOfRows for kWidth rows of ShapeEncoding::ellipsoids. Nearly all packs are. Without the other
-/// cases their code is a third as long.
+/// PackOfRows for kWidth rows of ShapeEncoding::ellipsoids, as nearly all packs are. Code without the
+/// other cases is much shorter.
 struct PlainRows {
   using lane = F;
   const ShapeRows& shape;
