@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-import gsnav
 import gsnav_habitat as _shared
 from gsnav_habitat import _turns
 
@@ -211,7 +210,7 @@ def _nothing(spec: Any) -> np.ndarray:
     if spec.sensor_type == SensorType.DEPTH:
         return np.zeros(shape, np.float32)
     out = np.empty((*shape, 4), np.uint8)
-    out[...] = gsnav.to_bytes(np.array(spec.clear_color, np.float32))
+    out[...] = _engine.library().to_bytes(np.array(spec.clear_color, np.float32))
     return out
 
 
