@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks that no file includes a header of a higher layer or of another module of its layer (CONTRIBUTING.md,
 "Layout of the repository"). Examples, tools and the report may use only public headers and names: nothing of
-detail/ or src/, and no `detail::`.
+detail/ or src/, and no `detail::`. Oracles of images reach no header with code of a kernel, however far away, and
+call no function that decodes rows.
 
 usage: check_layers.py [root]      check a source tree (default: this one)
        check_layers.py --self-test plant violations in a scratch tree and expect to find each
@@ -20,6 +21,14 @@ DATA_ONLY = {"scene/gaussian_cloud.hpp", "scene/load_report.hpp", "scene/surface
 # Headers that are not standard, but exist on every platform that compiles the code that includes them.
 PLATFORM_HEADERS = {"emmintrin.h", "immintrin.h", "arm_neon.h", "fcntl.h", "sched.h", "sys/mman.h", "sys/stat.h",
                     "unistd.h"}
+# Oracles of images may reach only the headers FOR_ORACLES of these layers: values, and checks and lists of them.
+ORACLES = ("include/gsnav/eval/oracle.hpp", "include/gsnav/detail/eval/oracle_*.hpp", "tests/support/oracle.*")
+NOT_FOR_ORACLES = {"frame", "skin", "sweep", "mesh", "lanes", "render", "eval"}
+FOR_ORACLES = {"frame/gaussians.hpp", "frame/rules.hpp", "detail/frame/output.hpp", "render/config.hpp",
+               "detail/render/validate_set.hpp"}
+# Functions that decode rows, and how rows are laid out.
+ROW_READER = re.compile(r"\b(?:encoding|band_encoding|packed|rest|degree_of|origin_of|origin_id|bytes_of|chunk_count|"
+                        r"sh_coefficient_count)\(|\bcloud\.mean\(|\bShapeRows::k|\bkProjectChunk\b")
 # modules with a header <module>.hpp that includes their public headers
 MODULES = {"render", "avatar", "rigging", "nav", "sim", "io", "eval", "demo", "open", "gsnav"}
 # Largest number of public headers: of the library in include/, and those that backends add.
@@ -79,6 +88,31 @@ def check_program(root, file):
                     for m in re.finditer(r"\b(?:\w+::)*detail::\w+|\bnamespace\b[^;{]*\bdetail\b", code)]
 
 
+def reached(root, file, seen):
+    """Adds to `seen` each header of the project that the file reaches by includes, and the file that includes it."""
+    for _, name in INCLUDE.findall(file.read_text(encoding="utf-8")):
+        header = next((p for p in (root / "include" / name, root / "tests" / name) if p.is_file()), None)
+        if header and header not in seen:
+            seen[header] = file
+            reached(root, header, seen)
+    return seen
+
+
+def check_oracle(root, file):
+    """Headers and functions that an oracle of images shares with kernels."""
+    path = file.relative_to(root)
+    oracles = {p for pattern in ORACLES for p in root.glob(pattern)}
+    wrong = []
+    for header, by in reached(root, file, {}).items():
+        name = header.relative_to(root)
+        if (header not in oracles and layer_of(name) in NOT_FOR_ORACLES and
+                name.as_posix().removeprefix("include/gsnav/") not in FOR_ORACLES):
+            wrong.append(f"{path}: an oracle may not reach {name} (by {by.relative_to(root)})")
+    code = NO_CODE.sub("", file.read_text(encoding="utf-8"))
+    return wrong + [f"{path}: an oracle decodes rows by its own code, without {m.group()}"
+                    for m in ROW_READER.finditer(code)]
+
+
 def check(root):
     """Lines 'file: problem', one for each include that is not allowed."""
     wrong = []
@@ -109,6 +143,9 @@ def check(root):
         for file in sorted(p for p in (root / top).rglob("*") if p.suffix in SOURCES):
             files.append(file)
             wrong += check_program(root, file)
+    for pattern in ORACLES:
+        for file in sorted(root.glob(pattern)):
+            wrong += check_oracle(root, file)
     library, of_backends = public_headers(root)
     if len(library) > MOST_PUBLIC:
         wrong.append(f"include/gsnav: {len(library)} public headers, more than {MOST_PUBLIC}")
@@ -124,7 +161,9 @@ def self_test():
             "backends/x/gsnav/backends/x.hpp": '"gsnav/render/render.hpp"', "include/gsnav/detail/io/ply.hpp": "",
             "tools/t/own.hpp": '"gsnav/core/view.hpp"', "tools/t/own.cpp": '"../t/own.hpp"',
             "examples/e/says.cpp": "// see gsnav::detail::f and namespace detail\nconst char* a = \"detail::f\";",
-            "tools/t/backend.cpp": '"gsnav/backends/x.hpp"'}
+            "tools/t/backend.cpp": '"gsnav/backends/x.hpp"', "include/gsnav/detail/eval/plane.hpp": "",
+            "include/gsnav/detail/render/loop.hpp": "", "include/gsnav/eval/by.hpp": '"gsnav/detail/render/loop.hpp"',
+            "include/gsnav/detail/eval/oracle_own.hpp": '"gsnav/core/view.hpp"'}
     bad = {"include/gsnav/core/up.hpp": '"gsnav/frame/sh.hpp"',
            "include/gsnav/scene/sideways.hpp": '"gsnav/nav/navmesh.hpp"',
            "include/gsnav/avatar/not_data.hpp": '"gsnav/scene/basic_renderer.hpp"',
@@ -138,6 +177,9 @@ def self_test():
            "tools/t/of_backend.cpp": '"../../backends/z/src/z.cpp"',
            "tools/t/calls.cpp": "int a = gsnav::detail::f();", "examples/e/calls.cpp": "int a = detail::f();",
            "bench/report/opens.cpp": "using namespace gsnav::io::detail;",
+           "include/gsnav/detail/eval/oracle_by.hpp": '"gsnav/eval/by.hpp"',
+           "include/gsnav/detail/eval/oracle_decodes.hpp": "bool b = rows.shape.encoding() == 1;",
+           "tests/support/oracle.hpp": '"gsnav/detail/eval/plane.hpp"',
            "backends/z/src/z.cpp": '"gsnav/scene/basic_renderer.hpp"', "src/other/o.cpp": ""}
     with tempfile.TemporaryDirectory() as scratch:
         root = pathlib.Path(scratch)

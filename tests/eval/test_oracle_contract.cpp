@@ -3,15 +3,19 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "eval/oracle_support.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
 #include "gsnav/frame/sh.hpp"
+#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/scene/packed_cloud.hpp"
 #include "hard_cases/cases.hpp"
 #include "support/brush.hpp"
+#include "support/compiled_frames.hpp"
 #include "support/oracle.hpp"
 #include "support/scenes.hpp"
 
@@ -207,6 +211,33 @@ TEST_CASE("oracle: codes and halves are read as renderers read them") {
     const GaussianCloud floats = unpack_cloud(packed);
     CHECK(same_images(oracle({packed.set()}, axis_camera()), oracle({floats.set()}, axis_camera())));
   }
+}
+
+TEST_CASE("oracle: factors replace rotations and scales, as in the renderer") {
+  const GaussianCloud small = random_cloud(71, {.count = 100, .needle = 0.2});
+  GaussianCloud large = small;
+  std::array<std::vector<float>, 9> factors;
+  for (std::size_t i = 0; i < small.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) large.scales[k][i] = 2 * small.scales[k][i];
+    const Mat3d r = rotation_matrix(
+        Quatd{small.quats[0][i], small.quats[1][i], small.quats[2][i], small.quats[3][i]});
+    for (std::size_t k = 0; k < 9; ++k) {
+      factors[k].push_back(static_cast<float>(r(static_cast<int>(k / 3), static_cast<int>(k % 3)) *
+                                              static_cast<double>(large.scales[k % 3][i])));
+    }
+  }
+  GaussianSet set = small.set();
+  set.gaussians.shape.axes = planes_of(factors);
+  const OracleFrames f = oracle({set}, axis_camera()), truth = oracle({large.set()}, axis_camera());
+  SerialBackend serial;
+  BasicRenderer<double, SerialBackend> renderer(serial, RenderConfig{.outputs = kRgb | kAlpha});
+  const auto rendered = renderer.render(std::vector{set}, {{axis_camera()}}).value();
+  std::vector<bool> skip(f.alpha.size());
+  for (std::size_t p = 0; p < skip.size(); ++p) skip[p] = f.undecided[p] != 0;
+  CHECK(image_error(rendered.rgb, f.rgb, 3, skip).max < 1e-11);
+  CHECK(image_error(rendered.alpha, f.alpha, 1, skip).max < 1e-11);
+  for (std::size_t p = 0; p < skip.size(); ++p) skip[p] = skip[p] || truth.undecided[p] != 0;
+  CHECK(image_error(f.rgb, truth.rgb, 3, skip).max < 1e-3);  // the factors' own rounding to float
 }
 
 TEST_CASE("oracle: the long double oracle on random scenes") {

@@ -114,7 +114,7 @@ void covariance_in_camera(const gsnav::GaussianCloud& cloud, std::size_t n, cons
 /// Colour of Gaussian n seen along d, of any length.
 void shade(const gsnav::GaussianCloud& cloud, std::size_t n, const Real d[3], Real color[3]) {
   const Real dn = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-  const int coefficients = gsnav::sh_coefficient_count(cloud.sh_degree);
+  const int coefficients = (cloud.sh_degree + 1) * (cloud.sh_degree + 1);
   for (std::size_t ch = 0; ch < 3; ++ch) {
     Real sum = 0;
     for (int k = 0; k < coefficients; ++k) {
@@ -134,9 +134,16 @@ bool project(const gsnav::GaussianCloud& cloud, std::size_t n, const gsnav::Came
              const OracleView& to_camera, OracleSplat& s) {
   const auto& r = to_camera.r;
   const auto& t = to_camera.t;
-  const gsnav::Vec3d mean = cloud.mean(n);
+  Real mean[3];
+  for (std::size_t k = 0; k < 3; ++k) mean[k] = cloud.means[k][n];
+  if (!cloud.origins.empty()) {
+    const auto& origin = cloud.origins[cloud.origin_ids[n]];
+    mean[0] += origin.x;
+    mean[1] += origin.y;
+    mean[2] += origin.z;
+  }
   for (int i = 0; i < 3; ++i) {
-    s.mean[i] = r[i][0] * mean.x + r[i][1] * mean.y + r[i][2] * mean.z + t[i];
+    s.mean[i] = r[i][0] * mean[0] + r[i][1] * mean[1] + r[i][2] * mean[2] + t[i];
   }
   s.z = s.mean[2];
   if (s.z <= camera.near_plane) return false;
@@ -175,7 +182,7 @@ bool project(const gsnav::GaussianCloud& cloud, std::size_t n, const gsnav::Came
   s.reach = std::sqrt(2 * std::log(255 * s.opacity)) * std::sqrt(view[2][2]);
   invert3(view, s.precision);
 
-  const Real d[3] = {mean.x - to_camera.eye[0], mean.y - to_camera.eye[1], mean.z - to_camera.eye[2]};
+  const Real d[3] = {mean[0] - to_camera.eye[0], mean[1] - to_camera.eye[1], mean[2] - to_camera.eye[2]};
   shade(cloud, n, d, s.color);
   return true;
 }

@@ -12,6 +12,7 @@
 #include "gsnav/detail/eval/oracle_config.hpp"
 #include "gsnav/detail/eval/oracle_project.hpp"
 #include "gsnav/detail/eval/oracle_ray.hpp"
+#include "gsnav/detail/render/validate_set.hpp"
 
 // Reference renderer: float64 images of Gaussians straight from the definition, without tiles or
 // approximations. The errors of all renderers are measured against it. For tests and reports; it is

@@ -4,12 +4,12 @@
 #include <string>
 
 #include "gsnav/core/status.hpp"
-#include "gsnav/detail/frame/blend.hpp"
-#include "gsnav/detail/frame/projection_camera.hpp"
+#include "gsnav/detail/frame/output.hpp"
 #include "gsnav/detail/image/validate_camera.hpp"
-#include "gsnav/detail/mesh/mesh.hpp"
 #include "gsnav/frame/gaussians.hpp"
 #include "gsnav/frame/rules.hpp"
+#include "gsnav/math/functions.hpp"
+#include "gsnav/math/vec.hpp"
 
 namespace gsnav {
 

@@ -11,12 +11,14 @@
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/detail/core/huge_pages.hpp"
-#include "gsnav/detail/frame/projection_camera.hpp"
 #include "gsnav/detail/math/curves.hpp"
 #include "gsnav/detail/math/half.hpp"
 #include "gsnav/detail/scene/load_report.hpp"
 #include "gsnav/detail/scene/origin_lattice.hpp"
 #include "gsnav/frame/gaussians.hpp"
+#include "gsnav/frame/rules.hpp"
+#include "gsnav/math/functions.hpp"
+#include "gsnav/math/quat.hpp"
 
 namespace gsnav {
 

@@ -4,6 +4,7 @@ from . import EVERY, fault
 
 ROWS = "tests/hard_cases/test_rows.cpp"
 WORLD = "tests/hard_cases/test_world.cpp"
+ORACLE = "tests/eval/test_oracle_contract.cpp"
 PLY_TEST = "tests/io/test_ply.cpp"
 PLY_COLUMNS = "src/io/ply_columns.cpp"
 PLY_READER = ("src/io/ply.cpp", PLY_COLUMNS, "src/io/ply_body.cpp", "src/io/ply_header.cpp",
@@ -83,6 +84,12 @@ FAULTS = [
           "      cloud.origin_ids.push_back(id);\n",
           "      cloud.origin_ids.push_back(id > 1 ? 1u : id);\n",
           WORLD, "N29_chunk_boundary"),
+    fault("rotation_before_the_factor", "encoding", "return axes.empty() ? ShapeEncoding::ellipsoids",
+          "return axes.empty() || !quats.empty() ? ShapeEncoding::ellipsoids",
+          ORACLE, "oracle: factors replace rotations and scales, as in the renderer",
+          why="an oracle that asks the renderer how rows are stored agrees with it"),
+    fault("band_of_a_code", "packed_band", "k < 9 ? 1 : 2", "k < 8 ? 1 : 2",
+          ORACLE, "oracle: codes and halves are read as renderers read them"),
     fault("cells_of_the_first_file", "append", "a.origin_ids.push_back(shift + id);", "a.origin_ids.push_back(id);",
           WORLD, "N29_chunk_boundary"),
 ]

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "gsnav/core/status.hpp"
+#include "gsnav/detail/image/validate_camera.hpp"
 #include "gsnav/frame/gaussians.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/render/config.hpp"
-#include "gsnav/render/render.hpp"
 
 namespace gsnav::eval {
 

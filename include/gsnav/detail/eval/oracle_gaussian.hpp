@@ -140,13 +140,11 @@ struct OracleSet {
 
   /// Columns of M in camera axes, metres, with Sigma = M M^T.
   RealColumns factor(std::size_t row) const noexcept {
-    const ShapeRows& gs = set.gaussians.shape;
+    const StoredShape stored{set.gaussians.shape, row};
     RealColumns m;
-    if (gs.encoding() == ShapeEncoding::factors) {
-      for (std::size_t k = 0; k < 3; ++k)
-        m[k] = {gs.axes[k][row], gs.axes[3 + k][row], gs.axes[6 + k][row]};
+    if (stored.has_columns()) {
+      m = stored.columns();
     } else {
-      const StoredShape stored{gs, row};
       const std::array<Real, 4> q = stored.quat();
       const std::array<Real, 3> s = stored.scales();
       m = rotation_columns(q[0], q[1], q[2], q[3]);

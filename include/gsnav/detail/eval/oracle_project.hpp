@@ -11,7 +11,6 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/view.hpp"
-#include "gsnav/detail/core/parallel.hpp"
 #include "gsnav/detail/eval/oracle_config.hpp"
 #include "gsnav/detail/eval/oracle_gaussian.hpp"
 

@@ -42,14 +42,27 @@ inline float half_value(std::uint16_t bits) noexcept {
   return bits >> 15 == 0 ? value : -value;
 }
 
-/// One row's shape as it is stored.
+/// Rows that share the constants of one PackedChunk.
+inline constexpr std::size_t kStoredChunk = 256;
+
+/// One row's shape as it is stored. Planes of codes: three of scales, three of the rotation, one of the
+/// opacity, three of the mean.
 struct StoredShape {
   const ShapeRows& rows;
   std::size_t row;
 
-  const PackedChunk& chunk() const noexcept { return rows.chunks[row / kProjectChunk]; }
+  const PackedChunk& chunk() const noexcept { return rows.chunks[row / kStoredChunk]; }
   int code(int plane) const noexcept {
     return rows.codes[static_cast<std::size_t>(plane) * rows.size + row];
+  }
+  /// Whether the shape is columns of M instead of a rotation and scales.
+  bool has_columns() const noexcept { return rows.axes[0].size != 0; }
+  /// Columns of M in the asset's frame, metres, if has_columns().
+  std::array<Real3, 3> columns() const noexcept {
+    std::array<Real3, 3> out;
+    for (std::size_t k = 0; k < 3; ++k)
+      out[k] = {rows.axes[k][row], rows.axes[3 + k][row], rows.axes[6 + k][row]};
+    return out;
   }
   /// Offset from the row's origin, metres.
   Real3 mean() const noexcept {
@@ -58,8 +71,7 @@ struct StoredShape {
     const auto at = [this](float base, float steps, int plane) {
       return std::fma(steps, static_cast<float>(code(plane)), base);
     };
-    return {at(low.x, step.x, ShapeRows::kMeans), at(low.y, step.y, ShapeRows::kMeans + 1),
-            at(low.z, step.z, ShapeRows::kMeans + 2)};
+    return {at(low.x, step.x, 7), at(low.y, step.y, 8), at(low.z, step.z, 9)};
   }
   /// Standard deviations, metres.
   std::array<Real, 3> scales() const noexcept {
@@ -69,7 +81,7 @@ struct StoredShape {
       if (rows.codes.empty()) {
         out[plane] = rows.scales[plane][row];
       } else {
-        const float root = static_cast<float>(code(ShapeRows::kScales + k)) * chunk().scale_step;
+        const float root = static_cast<float>(code(k)) * chunk().scale_step;
         out[plane] = root * root;
       }
     }
@@ -82,12 +94,11 @@ struct StoredShape {
       return {rows.quats[0][row], rows.quats[1][row], rows.quats[2][row], rows.quats[3][row]};
     constexpr float kMiddle = 16383, kStep = 0.70710678118654752f / kMiddle;
     std::array<Real, 4> out;
-    const std::size_t missing =
-        static_cast<std::size_t>((code(ShapeRows::kQuats) & 1) + 2 * (code(ShapeRows::kQuats + 1) & 1));
+    const std::size_t missing = static_cast<std::size_t>((code(3) & 1) + 2 * (code(4) & 1));
     float rest = 1;
     std::array<float, 3> stored;
     for (int k = 2; k >= 0; --k) {
-      const float v = (static_cast<float>(code(ShapeRows::kQuats + k) >> 1) - kMiddle) * kStep;
+      const float v = (static_cast<float>(code(3 + k) >> 1) - kMiddle) * kStep;
       stored[static_cast<std::size_t>(k)] = v;
       rest = std::fma(-v, v, rest);
     }
@@ -97,7 +108,7 @@ struct StoredShape {
   }
   Real opacity() const noexcept {
     if (rows.codes.empty()) return rows.opacities[row];
-    return static_cast<float>(code(ShapeRows::kOpacity)) / 65535.0f;
+    return static_cast<float>(code(6)) / 65535.0f;
   }
 };
 
@@ -116,7 +127,7 @@ inline Real3 stored_coefficient(const ColorRows& rows, std::size_t row, int k) n
   const std::size_t above = static_cast<std::size_t>((rows.degree + 1) * (rows.degree + 1) - 1);
   const std::size_t at = 3 * (above * row + static_cast<std::size_t>(k - 1));
   if (!rows.shN_codes.empty()) {
-    const float step = rows.chunks[row / kProjectChunk].sh_steps[k < 4 ? 0 : k < 9 ? 1 : 2];
+    const float step = rows.chunks[row / kStoredChunk].sh_steps[k < 4 ? 0 : k < 9 ? 1 : 2];
     return three(at, [&](std::size_t i) { return static_cast<float>(rows.shN_codes[i]) * step; });
   }
   if (!rows.shN_half.empty()) return three(at, half_of(rows.shN_half));

@@ -12,6 +12,7 @@
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/stages.hpp"
+#include "gsnav/detail/image/validate_camera.hpp"
 #include "gsnav/detail/mesh/mesh_shade.hpp"
 #include "gsnav/detail/render/scratch_memory.hpp"
 #include "gsnav/render/config.hpp"

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "gsnav/detail/frame/projection_camera.hpp"
 #include "gsnav/frame/gaussians.hpp"
+#include "gsnav/frame/rules.hpp"
 #include "gsnav/math/aabb.hpp"
 
 namespace gsnav {
