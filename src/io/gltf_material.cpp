@@ -48,6 +48,17 @@ TextureImage picture_of(const PngImage& image) {
 
 }  // namespace
 
+Result<GltfMaterial> GltfMaterials::of(const Json& primitive, const std::string& where) {
+  if (member(primitive, "material") == nullptr) return GltfMaterial{};
+  const auto index = file_.index(primitive, "material", "materials", where);
+  if (!index) return index.status();
+  const auto known = material_of_.find(*index);
+  if (known != material_of_.end()) return known->second;
+  auto material = read(*index);
+  if (material) material_of_.emplace(*index, *material);
+  return material;
+}
+
 Result<GltfMaterial> GltfMaterials::read(std::size_t index) {
   const auto found = file_.item("materials", index);
   if (!found) return found.status();

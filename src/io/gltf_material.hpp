@@ -32,10 +32,12 @@ class GltfMaterials {
                 std::vector<std::string>& warnings)
       : file_(file), textures_(textures), warnings_(warnings) {}
 
-  /// Reads entry `index` of "materials". Errors: invalid_file, file_not_found.
-  Result<GltfMaterial> read(std::size_t index);
+  /// The material of a primitive, each read once; white if it has none. Errors: invalid_file,
+  /// file_not_found.
+  Result<GltfMaterial> of(const Json& primitive, const std::string& where);
 
  private:
+  Result<GltfMaterial> read(std::size_t index);
   Status read_texture(const Json& info, const std::string& where, GltfMaterial& out);
   Status read_uv_map(const Json& transform, const std::string& where, GltfMaterial& out) const;
   Result<std::int32_t> picture(const Json& texture, std::size_t index);
@@ -44,6 +46,7 @@ class GltfMaterials {
   const GltfFile& file_;
   std::vector<TextureImage>& textures_;
   std::vector<std::string>& warnings_;
+  std::map<std::size_t, GltfMaterial> material_of_;
   std::map<std::size_t, std::int32_t> texture_of_;  ///< Texture of each image that was read; -1 if it
                                                     ///< could not be read.
   std::size_t pixels_ = 0;                          ///< Number of pixels of all textures.

@@ -14,8 +14,6 @@ namespace {
 
 using detail::GltfFile;
 using detail::GltfInstance;
-using detail::GltfMaterial;
-using detail::GltfNumbers;
 using detail::Json;
 
 Vec3f vec3_of(const double* p) { return vec_cast<float>(Vec3d{p[0], p[1], p[2]}); }
@@ -34,8 +32,7 @@ Mat3d adjugate_transposed(const Mat3d& m) {
 /// Applies a transform to a part. Normals transform by the cofactors, which keeps them perpendicular;
 /// triangles are reversed if the transform mirrors. Returns false if a vertex is then not finite.
 bool transform(TexturedPart& part, const Affine3<double>& a) {
-  const bool mirrored = determinant(a.linear) < 0;
-  const Mat3d cofactors = adjugate_transposed(a.linear) * (mirrored ? -1.0 : 1.0);
+  const Mat3d cofactors = adjugate_transposed(a.linear) * (determinant(a.linear) < 0 ? -1.0 : 1.0);
   bool finite = true;
   for (Vec3f& v : part.geometry.vertices) {
     v = vec_cast<float>(a * vec_cast<double>(v));
@@ -46,9 +43,7 @@ bool transform(TexturedPart& part, const Affine3<double>& a) {
     const double length = norm(turned);
     if (length > 0) n = vec_cast<float>(turned * (1.0 / length));
   }
-  for (auto& [i, j, k] : part.geometry.triangles) {
-    if (mirrored) std::swap(j, k);
-  }
+  detail::keep_sides(part.geometry.triangles, a);
   return finite;
 }
 
@@ -112,19 +107,16 @@ class SceneReader {
 
   Status read_mesh(std::size_t mesh) {
     std::vector<std::size_t>& parts = parts_of_[mesh];
-    const auto primitives = detail::primitives_of(file_, mesh);
-    if (!primitives) return primitives.status();
-    for (std::size_t p = 0; p < (*primitives)->size(); ++p) {
-      const std::string at = file_.where("meshes", mesh) + ".primitives[" + std::to_string(p) + "]";
-      const auto drawn = detail::has_triangles((**primitives)[p], at);
-      if (!drawn) return drawn.status();
-      if (!*drawn) continue;
-      auto part = read_part((**primitives)[p], at);
-      if (!part) return part.status();
-      parts.push_back(out_.parts.size());
-      if (Status s = keep(std::move(*part), at); !s) return s;
-    }
-    return {};
+    return detail::for_each_primitive(file_, mesh,
+                                      [&](const Json& primitive, const std::string& at) -> Status {
+                                        auto geometry = detail::read_geometry(file_, primitive, at);
+                                        if (!geometry) return geometry.status();
+                                        if (geometry->points.count == 0) return {};
+                                        auto part = read_part(primitive, std::move(*geometry), at);
+                                        if (!part) return part.status();
+                                        parts.push_back(out_.parts.size());
+                                        return keep(std::move(*part), at);
+                                      });
   }
 
   /// Keeps a part. Accessors and meshes may be shared, so a small file could ask for any number of
@@ -138,30 +130,17 @@ class SceneReader {
     return {};
   }
 
-  Result<GltfMaterial> material_of(const Json& primitive, const std::string& at) {
-    if (detail::member(primitive, "material") == nullptr) return GltfMaterial{};
-    const auto index = file_.index(primitive, "material", "materials", at);
-    if (!index) return index.status();
-    const auto known = material_of_.find(*index);
-    if (known != material_of_.end()) return known->second;
-    auto material = materials_.read(*index);
-    if (material) material_of_.emplace(*index, *material);
-    return material;
-  }
-
-  Result<TexturedPart> read_part(const Json& primitive, const std::string& at) {
-    const auto material = material_of(primitive, at);
+  Result<TexturedPart> read_part(const Json& primitive, detail::GltfGeometry geometry,
+                                 const std::string& at) {
+    const auto material = materials_.of(primitive, at);
     if (!material) return material.status();
     TexturedPart out;
     out.material = material->surface;
-    const auto points = detail::read_attribute(file_, primitive, "POSITION", "VEC3", 0, at);
-    if (!points) return points.status();
-    const std::size_t n = points->count;
-    if (n == 0) return {Errc::invalid_file, at + ": no attribute POSITION"};
-    for (std::size_t i = 0; i < n; ++i) out.geometry.vertices.push_back(vec3_of(points->row(i)));
-    auto triangles = detail::read_triangles(file_, primitive, n, at);
-    if (!triangles) return triangles.status();
-    out.geometry.triangles = std::move(*triangles);
+    const std::size_t n = geometry.points.count;
+    for (std::size_t i = 0; i < n; ++i) {
+      out.geometry.vertices.push_back(vec3_of(geometry.points.row(i)));
+    }
+    out.geometry.triangles = std::move(geometry.triangles);
     const auto read = [&](const std::string& name, const char* types) {
       return detail::read_attribute(file_, primitive, name, types, n, at);
     };
@@ -202,7 +181,6 @@ class SceneReader {
   TexturedScene out_;
   detail::GltfMaterials materials_;
   std::map<std::size_t, std::vector<std::size_t>> parts_of_;  ///< parts of each mesh in use
-  std::map<std::size_t, GltfMaterial> material_of_;
   std::size_t held_ = 0;  ///< number of vertices and triangles of all parts, together
 };
 

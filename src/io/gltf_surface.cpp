@@ -38,7 +38,10 @@ class SurfaceReader {
       }
       const auto m = file_.index(node, "mesh", "meshes", file_.where("nodes", n));
       if (!m) return m.status();
-      if (Status s = read_mesh(*m); !s) return s;
+      const auto read = [this](const Json& primitive, const std::string& at) {
+        return read_primitive(primitive, at);
+      };
+      if (Status s = for_each_primitive(file_, *m, read); !s) return s;
     }
     if (mesh_.triangles.empty()) {
       return {Errc::invalid_file, file_.source() + ": no triangles are moved by skins[" +
@@ -51,44 +54,33 @@ class SurfaceReader {
  private:
   void warn(const std::string& what) { out_.report.warnings.push_back(what); }
 
-  Status read_mesh(std::size_t index) {
-    const auto primitives = primitives_of(file_, index);
-    if (!primitives) return primitives.status();
-    for (std::size_t p = 0; p < (*primitives)->size(); ++p) {
-      const std::string at = file_.where("meshes", index) + ".primitives[" + std::to_string(p) + "]";
-      if (Status s = read_primitive((**primitives)[p], at); !s) return s;
-    }
-    return {};
-  }
-
   Result<GltfNumbers> attribute(const Json& primitive, const std::string& name, const std::string& types,
                                 const std::string& at) const {
     return read_attribute(file_, primitive, name, types, vertices_, at);
   }
 
   Status read_primitive(const Json& primitive, const std::string& at) {
-    const auto drawn = has_triangles(primitive, at);
-    if (!drawn) return drawn.status();
-    if (!*drawn) {
+    const auto geometry = read_geometry(file_, primitive, at);
+    if (!geometry) return geometry.status();
+    const auto& [points, triangles] = *geometry;
+    if (points.count == 0) {
       return {Errc::unsupported,
               at + ": 'mode' is " + shown(*member(primitive, "mode")) + "; triangles are read"};
     }
     if (member(primitive, "targets") != nullptr) warn(at + ": morph targets are left out");
-    vertices_ = 0;
-    const auto positions = attribute(primitive, "POSITION", "VEC3", at);
-    if (!positions) return positions.status();
-    if (positions->count == 0) return {Errc::invalid_file, at + " has no POSITION"};
-    vertices_ = positions->count;
+    vertices_ = points.count;
     const std::size_t first = mesh_.positions.size();
     for (std::size_t v = 0; v < vertices_; ++v) {
-      const double* p = positions->row(v);
+      const double* p = points.row(v);
       mesh_.positions.push_back(skin_.canonical_from_mesh *
                                 (part_->rig_from_mesh * Vec3d{p[0], p[1], p[2]}));
     }
     if (Status s = read_weights(primitive, at); !s) return s;
-    GltfMaterial material;
-    if (Status s = read_material(primitive, at, material); !s) return s;
-    const auto uv = attribute(primitive, "TEXCOORD_" + std::to_string(material.texcoord), "VEC2", at),
+    const auto material = materials_.of(primitive, at);
+    if (!material) return material.status();
+    if (material->surface.blend) warn(at + ": a blended surface is taken as opaque");
+    mesh_.materials.push_back(material->surface);
+    const auto uv = attribute(primitive, "TEXCOORD_" + std::to_string(material->texcoord), "VEC2", at),
                color = attribute(primitive, "COLOR_0", "VEC3 VEC4", at);
     if (!uv) return uv.status();
     if (!color) return color.status();
@@ -96,32 +88,16 @@ class SurfaceReader {
     colors_.resize(first, {1, 1, 1});
     for (std::size_t v = 0; v < vertices_; ++v) {
       uvs_.push_back(uv->count == 0 ? std::array<double, 2>{0, 0}
-                                    : material.uv(uv->row(v)[0], uv->row(v)[1]));
+                                    : material->uv(uv->row(v)[0], uv->row(v)[1]));
       colors_.push_back(color->count == 0 ? Vec3d{1, 1, 1}
                                           : Vec3d{color->row(v)[0], color->row(v)[1], color->row(v)[2]});
     }
     has_uvs_ = has_uvs_ || uv->count != 0;
     has_colors_ = has_colors_ || color->count != 0;
-    const auto triangles = read_triangles(file_, primitive, vertices_, at);
-    if (!triangles) return triangles.status();
     const auto base = static_cast<std::uint32_t>(first);
-    for (const auto& [a, b, c] : *triangles) mesh_.triangles.push_back({base + a, base + b, base + c});
-    mesh_.materials_of.insert(mesh_.materials_of.end(), triangles->size(),
+    for (const auto& [a, b, c] : triangles) mesh_.triangles.push_back({base + a, base + b, base + c});
+    mesh_.materials_of.insert(mesh_.materials_of.end(), triangles.size(),
                               static_cast<std::uint32_t>(mesh_.materials.size() - 1));
-    return {};
-  }
-
-  /// Reads the primitive's material; white if it has none.
-  Status read_material(const Json& primitive, const std::string& at, GltfMaterial& out) {
-    if (member(primitive, "material") != nullptr) {
-      const auto index = file_.index(primitive, "material", "materials", at);
-      if (!index) return index.status();
-      const auto read = materials_.read(*index);
-      if (!read) return read.status();
-      out = *read;
-      if (out.surface.blend) warn(at + ": a blended surface is taken as opaque");
-    }
-    mesh_.materials.push_back(out.surface);
     return {};
   }
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <string>
 #include <utility>
 
 #include "gltf_nodes.hpp"
@@ -9,6 +10,7 @@ namespace gsnav::io {
 namespace {
 
 using detail::GltfFile;
+using detail::GltfGeometry;
 using detail::GltfInstance;
 using detail::Json;
 
@@ -20,11 +22,11 @@ class MeshReader {
     const auto instances = detail::read_instances(file_);
     if (!instances) return instances.status();
     for (const GltfInstance& instance : *instances) {
-      const auto primitives = detail::primitives_of(file_, instance.mesh);
-      if (!primitives) return primitives.status();
-      for (const Json& primitive : **primitives) {
-        if (Status s = add(primitive, instance); !s) return s;
-      }
+      const auto read = [&](const Json& primitive, const std::string& at) {
+        auto geometry = detail::read_geometry(file_, primitive, at);
+        return geometry ? add(std::move(*geometry), instance) : geometry.status();
+      };
+      if (Status s = detail::for_each_primitive(file_, instance.mesh, read); !s) return s;
     }
     if (mesh_.triangles.empty()) {
       return {Errc::invalid_file, file_.source() + ": no triangles in the scene"};
@@ -33,34 +35,26 @@ class MeshReader {
   }
 
  private:
-  Status add(const Json& primitive, const GltfInstance& instance) {
+  Status add(GltfGeometry geometry, const GltfInstance& instance) {
     const std::string at = file_.where("nodes", instance.node);
-    const auto drawn = detail::has_triangles(primitive, at);
-    if (!drawn) return drawn.status();
-    if (!*drawn) return {};
-    const auto points = detail::read_attribute(file_, primitive, "POSITION", "VEC3", 0, at);
-    if (!points) return points.status();
-    if (points->count == 0) return {Errc::invalid_file, at + ": a primitive without attribute POSITION"};
-    auto triangles = detail::read_triangles(file_, primitive, points->count, at);
-    if (!triangles) return triangles.status();
+    const auto& [points, triangles] = geometry;
     // Nodes may share a mesh, so a small file could ask for any number of copies.
     const std::size_t first = mesh_.vertices.size();
-    if (first + points->count > file_.size() || points->count > 0xffffffff - first ||
-        mesh_.triangles.size() + triangles->size() > file_.size()) {
+    if (first + points.count > file_.size() || points.count > 0xffffffff - first ||
+        mesh_.triangles.size() + triangles.size() > file_.size()) {
       return {Errc::invalid_file, at + ": more vertices or triangles than the file has bytes"};
     }
-    for (std::size_t i = 0; i < points->count; ++i) {
-      const double* p = points->row(i);
+    for (std::size_t i = 0; i < points.count; ++i) {
+      const double* p = points.row(i);
       const Vec3f v = vec_cast<float>(instance.world_from_mesh * Vec3d{p[0], p[1], p[2]});
       if (!is_finite(v)) {
         return {Errc::invalid_file, at + ": vertex " + std::to_string(i) + " is not finite"};
       }
       mesh_.vertices.push_back(v);
     }
-    const bool mirrored = determinant(instance.world_from_mesh.linear) < 0;
+    detail::keep_sides(geometry.triangles, instance.world_from_mesh);
     const auto base = static_cast<std::uint32_t>(first);
-    for (auto& [a, b, c] : *triangles) {
-      if (mirrored) std::swap(b, c);
+    for (const auto& [a, b, c] : triangles) {
       mesh_.triangles.push_back({base + a, base + b, base + c});
     }
     return {};
