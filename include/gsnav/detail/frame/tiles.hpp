@@ -169,15 +169,35 @@ GSNAV_HD void prefetch_splat(const BinArgs<S>& args, std::size_t i) noexcept {
 #endif
 }
 
-/// Calls f(tile, splat) for the tiles of each splat in one block, in order.
-template <class S, class F>
-GSNAV_HD void for_each_intersection(const BinArgs<S>& args, std::size_t block, const F& f) noexcept {
+/// Calls f(tile, splat) for the tiles of each splat in one block, in order, without those that `cull`
+/// hides.
+template <class S, class Cull, class F>
+GSNAV_HD void for_each_intersection(const BinArgs<S>& args, const Cull& cull, std::size_t block,
+                                    const F& f) noexcept {
   const BlockRange r = BlockRange::of(block, args.blocks, args.order.size);
   for (std::size_t i = r.begin; i < r.end; ++i) {
     prefetch_splat(args, i);
     const std::uint32_t splat = args.order[i];
-    for_each_tile(args, splat, [&](std::size_t tile) GSNAV_INLINED { f(tile, splat); });
+    for_each_tile(args, splat, [&](std::size_t tile) GSNAV_INLINED {
+      if (!cull.hides(tile, splat)) f(tile, splat);
+    });
   }
+}
+
+/// Counts the items of each tile for one block. `each(f)` calls f(tile, item) for the items of the
+/// block, in order.
+template <class S, class Each>
+GSNAV_HD void count_in_tiles(const BinArgs<S>& args, std::size_t block, const Each& each) noexcept {
+  std::uint64_t* counts = args.cursors.data + block * args.grid.count();
+  for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
+  each([=](std::size_t tile, std::uint32_t) GSNAV_INLINED { ++counts[tile]; });
+}
+/// Writes the items of one block to the lists of their tiles, in order, after ScanTileIntersections.
+template <class S, class Each>
+GSNAV_HD void scatter_to_tiles(const BinArgs<S>& args, std::size_t block, const Each& each) noexcept {
+  std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
+  std::uint32_t* out = args.tile_splats.data;
+  each([=](std::size_t tile, std::uint32_t item) GSNAV_INLINED { out[cursors[tile]++] = item; });
 }
 }  // namespace detail
 
@@ -204,12 +224,9 @@ struct CountTileIntersections {
   BinArgs<S> args;
   Cull cull{};
   GSNAV_HD void operator()(std::size_t block) const noexcept {
-    std::uint64_t* counts = args.cursors.data + block * args.grid.count();
-    for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
-    detail::for_each_intersection(args, block,
-                                  [=, this](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
-                                    if (!cull.hides(tile, splat)) ++counts[tile];
-                                  });
+    detail::count_in_tiles(args, block, [=, this](const auto& f) GSNAV_INLINED {
+      detail::for_each_intersection(args, cull, block, f);
+    });
   }
 };
 
@@ -240,12 +257,9 @@ struct ScatterTileIntersections {
   BinArgs<S> args;
   Cull cull{};
   GSNAV_HD void operator()(std::size_t block) const noexcept {
-    std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
-    std::uint32_t* out = args.tile_splats.data;
-    detail::for_each_intersection(args, block,
-                                  [=, this](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
-                                    if (!cull.hides(tile, splat)) out[cursors[tile]++] = splat;
-                                  });
+    detail::scatter_to_tiles(args, block, [=, this](const auto& f) GSNAV_INLINED {
+      detail::for_each_intersection(args, cull, block, f);
+    });
   }
 };
 

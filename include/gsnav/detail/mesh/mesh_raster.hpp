@@ -83,6 +83,17 @@ GSNAV_HD void for_each_mesh_tile(const TileGrid& grid, const MeshTriangle<S>& t,
   }
 }
 
+/// Calls f(tile, triangle) for the tiles of each triangle in one block, in order.
+template <class S, class F>
+GSNAV_HD void for_each_mesh_intersection(const MeshRasterArgs<S>& args, std::size_t block,
+                                         const F& f) noexcept {
+  const BlockRange r = BlockRange::of(block, args.bin.blocks, args.triangles.size);
+  for (std::size_t i = r.begin; i < r.end; ++i) {
+    for_each_mesh_tile(args.bin.grid, args.triangles[i],
+                       [&](std::size_t tile) GSNAV_INLINED { f(tile, static_cast<std::uint32_t>(i)); });
+  }
+}
+
 /// Shrinks the span [left, right) of a row of n pixels to those inside one edge. `e` is the edge
 /// function at the first pixel, `step` its change per pixel. `inverse` is 1 / |step|; it only gives a
 /// first guess, which is corrected exactly.
@@ -118,14 +129,9 @@ template <class S>
 struct CountMeshTiles {
   MeshRasterArgs<S> args;
   GSNAV_HD void operator()(std::size_t block) const noexcept {
-    const BinArgs<S>& bin = args.bin;
-    std::uint64_t* counts = bin.cursors.data + block * bin.grid.count();
-    for (std::size_t t = 0; t < bin.grid.count(); ++t) counts[t] = 0;
-    const BlockRange r = BlockRange::of(block, bin.blocks, args.triangles.size);
-    for (std::size_t i = r.begin; i < r.end; ++i) {
-      detail::for_each_mesh_tile(bin.grid, args.triangles[i],
-                                 [=](std::size_t tile) GSNAV_INLINED { ++counts[tile]; });
-    }
+    detail::count_in_tiles(args.bin, block, [=, this](const auto& f) GSNAV_INLINED {
+      detail::for_each_mesh_intersection(args, block, f);
+    });
   }
 };
 
@@ -135,15 +141,9 @@ template <class S>
 struct ScatterMeshTiles {
   MeshRasterArgs<S> args;
   GSNAV_HD void operator()(std::size_t block) const noexcept {
-    const BinArgs<S>& bin = args.bin;
-    std::uint64_t* cursors = bin.cursors.data + block * bin.grid.count();
-    std::uint32_t* out = bin.tile_splats.data;
-    const BlockRange r = BlockRange::of(block, bin.blocks, args.triangles.size);
-    for (std::size_t i = r.begin; i < r.end; ++i) {
-      detail::for_each_mesh_tile(bin.grid, args.triangles[i], [=](std::size_t tile) GSNAV_INLINED {
-        out[cursors[tile]++] = static_cast<std::uint32_t>(i);
-      });
-    }
+    detail::scatter_to_tiles(args.bin, block, [=, this](const auto& f) GSNAV_INLINED {
+      detail::for_each_mesh_intersection(args, block, f);
+    });
   }
 };
 
