@@ -43,8 +43,26 @@ struct Pack;
 template <int N>
 struct PackPair;
 
+namespace detail {
+/// Arithmetic of a pack P, whatever its scalar.
+template <class P>
+struct PackArithmetic {
+  GSNAV_HD friend P operator+(P a, P b) noexcept { return P(a.v + b.v); }
+  GSNAV_HD friend P operator-(P a, P b) noexcept { return P(a.v - b.v); }
+  GSNAV_HD friend P operator*(P a, P b) noexcept { return P(a.v * b.v); }
+  GSNAV_HD friend P operator/(P a, P b) noexcept { return P(a.v / b.v); }
+  GSNAV_HD friend P operator-(P a) noexcept { return P(-a.v); }
+  GSNAV_HD friend P clamp(P a, P low, P high) noexcept { return min(max(a, low), high); }
+  /// Rounds towards zero; values that an int32 holds.
+  GSNAV_HD friend P truncated(P a) noexcept {
+    return P(
+        __builtin_convertvector(__builtin_convertvector(a.v, typename P::ints), typename P::vector));
+  }
+};
+}  // namespace detail
+
 template <int N>
-struct Pack<float, N> {
+struct Pack<float, N> : detail::PackArithmetic<Pack<float, N>> {
   using vector = typename detail::PackTypes<N>::f;
   using ints = typename detail::PackTypes<N>::i;
   vector v{};
@@ -63,11 +81,6 @@ struct Pack<float, N> {
   GSNAV_HD void store(float* p) const noexcept { std::memcpy(p, &v, sizeof v); }
   GSNAV_HD float operator[](int i) const noexcept { return v[i]; }
 
-  GSNAV_HD friend Pack operator+(Pack a, Pack b) noexcept { return Pack(a.v + b.v); }
-  GSNAV_HD friend Pack operator-(Pack a, Pack b) noexcept { return Pack(a.v - b.v); }
-  GSNAV_HD friend Pack operator*(Pack a, Pack b) noexcept { return Pack(a.v * b.v); }
-  GSNAV_HD friend Pack operator/(Pack a, Pack b) noexcept { return Pack(a.v / b.v); }
-  GSNAV_HD friend Pack operator-(Pack a) noexcept { return Pack(-a.v); }
   GSNAV_HD friend Mask<N> operator<(Pack a, Pack b) noexcept {
     return detail::compare<N, detail::Compare::less>(a.v, b.v);
   }
@@ -122,10 +135,6 @@ GSNAV_HD Pack<float, N> max(Pack<float, N> a, Pack<float, N> b) noexcept {
     return select(a > b, a, b);
   }
 }
-template <int N>
-GSNAV_HD Pack<float, N> clamp(Pack<float, N> v, Pack<float, N> low, Pack<float, N> high) noexcept {
-  return min(max(v, low), high);
-}
 
 namespace detail {
 template <int N>
@@ -145,12 +154,6 @@ GSNAV_HD typename PackTypes<N>::f floats(typename PackTypes<N>::i x) noexcept {
 template <int N>
 GSNAV_HD Pack<float, N> abs(Pack<float, N> a) noexcept {
   return Pack<float, N>(detail::floats<N>(detail::bits<N>(a.v) & 0x7fffffff));
-}
-
-template <int N>
-GSNAV_HD Pack<float, N> truncated(Pack<float, N> a) noexcept {
-  using P = Pack<float, N>;
-  return P(__builtin_convertvector(__builtin_convertvector(a.v, typename P::ints), typename P::vector));
 }
 
 /// Mask as bits: bit i is set if lane i is set.

@@ -36,7 +36,7 @@ struct DoublePackTypes<8> {
 }  // namespace detail
 
 template <int N>
-struct Pack<double, N> {
+struct Pack<double, N> : detail::PackArithmetic<Pack<double, N>> {
   using vector = typename detail::DoublePackTypes<N>::d;
   using floats = typename detail::DoublePackTypes<N>::f;
   using ints = typename detail::DoublePackTypes<N>::i;
@@ -63,12 +63,6 @@ struct Pack<double, N> {
     std::memcpy(p, &f, sizeof f);
   }
   GSNAV_HD double operator[](int i) const noexcept { return v[i]; }
-
-  GSNAV_HD friend Pack operator+(Pack a, Pack b) noexcept { return Pack(a.v + b.v); }
-  GSNAV_HD friend Pack operator-(Pack a, Pack b) noexcept { return Pack(a.v - b.v); }
-  GSNAV_HD friend Pack operator*(Pack a, Pack b) noexcept { return Pack(a.v * b.v); }
-  GSNAV_HD friend Pack operator/(Pack a, Pack b) noexcept { return Pack(a.v / b.v); }
-  GSNAV_HD friend Pack operator-(Pack a) noexcept { return Pack(-a.v); }
 };
 
 template <int N>
@@ -84,16 +78,6 @@ GSNAV_HD Pack<double, N> min(Pack<double, N> a, Pack<double, N> b) noexcept {
 template <int N>
 GSNAV_HD Pack<double, N> max(Pack<double, N> a, Pack<double, N> b) noexcept {
   return Pack<double, N>(a.v > b.v ? a.v : b.v);
-}
-template <int N>
-GSNAV_HD Pack<double, N> clamp(Pack<double, N> v, Pack<double, N> low, Pack<double, N> high) noexcept {
-  return min(max(v, low), high);
-}
-
-template <int N>
-GSNAV_HD Pack<double, N> truncated(Pack<double, N> a) noexcept {
-  using P = Pack<double, N>;
-  return P(__builtin_convertvector(__builtin_convertvector(a.v, typename P::ints), typename P::vector));
 }
 
 template <int N>
