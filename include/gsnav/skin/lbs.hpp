@@ -38,6 +38,22 @@ GSNAV_HD Mat3<L> cofactors(const Mat3<L>& m) noexcept {
            rough_cross(m.row[0], m.row[1])}};
 }
 
+/// linear * p + translation, as every mode of skinning rounds it.
+template <class L>
+GSNAV_HD Vec3<L> moved(const Mat3<L>& linear, const Vec3<L>& translation, const Vec3<L>& p) noexcept {
+  Vec3<L> out;
+  for (int i = 0; i < 3; ++i) {
+    const Vec3<L>& r = linear.row[i];
+    out[i] = fma(r.z, p.z, fma(r.y, p.y, fma(r.x, p.x, translation[i])));
+  }
+  return out;
+}
+/// q divided by its length, which is not 0.
+template <class L>
+GSNAV_HD Quat<L> unit(const Quat<L>& q) noexcept {
+  return q * (L(scalar_of<L>(1)) / sqrt(dot(q, q)));
+}
+
 }  // namespace detail
 
 /// A rotation matrix multiplied by a factor.
@@ -151,10 +167,7 @@ GSNAV_HD Skinned<L> skin(Affine3<L> blend, const First& first, const Vec3<L>& me
                          bool rotation = true) noexcept {
   using S = scalar_of<L>;
   Skinned<L> out;
-  for (int i = 0; i < 3; ++i) {
-    const Vec3<L>& r = blend.linear.row[i];
-    out.mean[i] = fma(r.z, mean.z, fma(r.y, mean.y, fma(r.x, mean.x, blend.translation[i])));
-  }
+  out.mean = detail::moved(blend.linear, blend.translation, mean);
   const mask_of<L> usable = dot(blend.linear.row[0], detail::cofactors(blend.linear).row[0]) >
                             L(static_cast<S>(kMinBlendDeterminant));
   if (!all(usable)) {
@@ -165,9 +178,8 @@ GSNAV_HD Skinned<L> skin(Affine3<L> blend, const First& first, const Vec3<L>& me
     }
   }
   const Quat<L> turn = quat_direction(scaled_polar_rotation(blend.linear)), turned = turn * quat;
-  const L one(S(1));
-  if (rotation) out.rotation = turn * (one / sqrt(dot(turn, turn)));
-  out.quat = turned * (one / sqrt(dot(turned, turned)));
+  if (rotation) out.rotation = detail::unit(turn);
+  out.quat = detail::unit(turned);
   return out;
 }
 

@@ -41,9 +41,7 @@ FAULTS = [
           "  take(ix, {wx, ix, xy, xz});\n  take(iy, {wy, xy, iy, yz});\n  take(iz, {wz, xz, yz, iz});\n", "",
           SKIN_TEST, "N56_lbs_candy_180", "N58_polar_vs_svd", why="cancels towards 180 degrees"),
     fault("positions_by_the_rotation", "skin",
-          "    const Vec3<L>& r = blend.linear.row[i];\n    out.mean[i]",
-          "    const Mat3<L> straight = polar_rotation(blend.linear);\n"
-          "    const Vec3<L>& r = straight.row[i];\n    out.mean[i]",
+          "moved(blend.linear,", "moved(polar_rotation(blend.linear),",
           SKIN_TEST, "N56_lbs_candy_180", "N58_polar_vs_svd", why="positions are the trainer's: linear"),
     fault("weights_of_eight_bits", "skinning_weight", "static_cast<S>(parts) * static_cast<S>(1.0 / kWeightParts)",
           "static_cast<S>((parts + 128) / 257) / static_cast<S>(255)",

@@ -24,16 +24,9 @@ inline constexpr double kLeastStretch = 0.5, kGreatestStretch = 2.0;
 template <class L>
 GSNAV_HD Skinned<L> skin(const DualQuat<L>& blend, const Vec3<L>& mean, const Quat<L>& quat) noexcept {
   Skinned<L> out;
-  const L one(scalar_of<L>(1));
-  out.rotation = blend.real * (one / sqrt(dot(blend.real, blend.real)));
-  const Vec3<L> t = translation_of(blend);
-  const Mat3<L> turn = rotation_matrix(out.rotation);
-  for (int i = 0; i < 3; ++i) {
-    const Vec3<L>& r = turn.row[i];
-    out.mean[i] = fma(r.z, mean.z, fma(r.y, mean.y, fma(r.x, mean.x, t[i])));
-  }
-  const Quat<L> turned = out.rotation * quat;
-  out.quat = turned * (one / sqrt(dot(turned, turned)));
+  out.rotation = detail::unit(blend.real);
+  out.mean = detail::moved(rotation_matrix(out.rotation), translation_of(blend), mean);
+  out.quat = detail::unit(out.rotation * quat);
   return out;
 }
 
@@ -72,6 +65,26 @@ GSNAV_HD Vec3<S> canonical_mean(const SkinningArgs<S, Out>& args, std::size_t i)
 template <class S, class Out>
 GSNAV_HD Quat<S> canonical_quat(const SkinningArgs<S, Out>& args, std::size_t i) noexcept {
   return {S(args.quats[0][i]), S(args.quats[1][i]), S(args.quats[2][i]), S(args.quats[3][i])};
+}
+
+/// A joint of the sum in SkinGaussianStretched: its linear part, and the product that the gradient of
+/// its weight adds. The first joint adds none.
+template <class L>
+struct StretchJoint {
+  const Mat3<L>& linear;
+  Vec3<L> apart{},  ///< where the joint puts the Gaussian, less where the first joint does
+      gradient{};   ///< of the weight
+};
+template <class L>
+GSNAV_HD Mat3<L> weighted(const L& weight, const StretchJoint<L>& joint) noexcept {
+  return joint.linear * weight;
+}
+template <class L>
+GSNAV_HD Mat3<L> weighted(const L& weight, const StretchJoint<L>& joint, Mat3<L> sum) noexcept {
+  for (int r = 0; r < 3; ++r) {
+    sum.row[r] = sum.row[r] + joint.linear.row[r] * weight + joint.gradient * joint.apart[r];
+  }
+  return sum;
 }
 
 }  // namespace detail
@@ -127,18 +140,18 @@ struct SkinGaussianStretched {
     const std::size_t row = static_cast<std::size_t>(args.influences);
     const std::uint16_t* const indices = args.joint_indices.data + row * i;
     const std::uint16_t* const parts = args.weights.data + row * i;
-    const float* gradient = args.weight_gradients.data + 3 * (row - 1) * i;
+    const float* const gradients = args.weight_gradients.data + 3 * (row - 1) * i;
     const Vec3<S> mean = detail::canonical_mean(args, i);
-    const Affine3<S>& first = args.joints[indices[0]];
-    const Vec3<S> place = first * mean;
-    Mat3<S> f = first.linear * skinning_weight<S>(parts[0]);
-    for (std::size_t k = 1; k < row; ++k, gradient += 3) {
-      const Affine3<S>& joint = args.joints[indices[k]];
-      const S w = skinning_weight<S>(parts[k]);
-      // The gradients of all weights sum to zero, so the first one is minus the sum of the others.
-      const Vec3<S> apart = joint * mean - place, g{S(gradient[0]), S(gradient[1]), S(gradient[2])};
-      for (int r = 0; r < 3; ++r) f.row[r] = f.row[r] + joint.linear.row[r] * w + g * apart[r];
-    }
+    const Vec3<S> place = args.joints[indices[0]] * mean;
+    // The gradients of all weights sum to zero, so the first one is minus the sum of the others.
+    const auto joint = [&](int k) GSNAV_INLINED -> detail::StretchJoint<S> {
+      const Affine3<S>& a = args.joints[indices[k]];
+      if (k == 0) return {a.linear};
+      const float* const g = gradients + 3 * (k - 1);
+      return {a.linear, a * mean - place, {S(g[0]), S(g[1]), S(g[2])}};
+    };
+    const auto weight = [&](int k) GSNAV_INLINED { return skinning_weight<S>(parts[k]); };
+    const Mat3<S> f = blend_influences(args.influences, joint, weight);
     const Mat3<S> axes = clamped_stretch(f) * rotation_matrix(detail::canonical_quat(args, i));
     for (int r = 0; r < 3; ++r) {
       for (int c = 0; c < 3; ++c) {
