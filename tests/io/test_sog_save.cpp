@@ -51,22 +51,26 @@ TEST_CASE("save_sog: every field within the bound that the header states") {
       std::vector<std::string> bands;
       for (int k = 0; k < rest; ++k) bands.push_back("f_rest_" + std::to_string(k));
       const char* axes[] = {"x", "y", "z"};
-      for (std::size_t i = 0; i < n; ++i) {
-        QuantisedBounds b;
-        for (std::size_t k = 0; k < 3; ++k) {
-          double low = 1e9, high = -1e9;
-          for (const PlyRow& row : rows) {
-            const double v = row.at(axes[k]), squeezed = std::copysign(std::log1p(std::fabs(v)), v);
-            low = std::min(low, squeezed);
-            high = std::max(high, squeezed);
-          }
-          b.mean[k] = (1 + std::fabs(rows[i].at(axes[k]))) * (high - low) / 131070 * 1.001;
-          b.log_scale[k] = range_of(rows, {"scale_0", "scale_1", "scale_2"}) / 255;
-          b.colour[k] = range_of(rows, {"f_dc_0", "f_dc_1", "f_dc_2"}) / 255 * 0.2820948;
+      double squeezed_range[3];
+      QuantisedBounds b;
+      for (std::size_t k = 0; k < 3; ++k) {
+        double low = 1e9, high = -1e9;
+        for (const PlyRow& row : rows) {
+          const double v = row.at(axes[k]), squeezed = std::copysign(std::log1p(std::fabs(v)), v);
+          low = std::min(low, squeezed);
+          high = std::max(high, squeezed);
         }
-        b.opacity = 0.5 / 255;
-        b.quat = std::sqrt(0.5) / 255;
-        b.rest = rest == 0 ? 0 : range_of(rows, bands) / 255;
+        squeezed_range[k] = high - low;
+        b.log_scale[k] = range_of(rows, {"scale_0", "scale_1", "scale_2"}) / 255;
+        b.colour[k] = range_of(rows, {"f_dc_0", "f_dc_1", "f_dc_2"}) / 255 * 0.2820948;
+      }
+      b.opacity = 0.5 / 255;
+      b.quat = std::sqrt(0.5) / 255;
+      b.rest = rest == 0 ? 0 : range_of(rows, bands) / 255;
+      for (std::size_t i = 0; i < n; ++i) {
+        for (std::size_t k = 0; k < 3; ++k) {
+          b.mean[k] = (1 + std::fabs(rows[i].at(axes[k]))) * squeezed_range[k] / 131070 * 1.001;
+        }
         check_quantised(loaded.cloud, i, rows[i], rest, b);
       }
     }
