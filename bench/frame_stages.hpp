@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "gsnav/render/render.hpp"
@@ -35,6 +36,7 @@ class FrameStages {
         tile_offsets_(backend),
         tile_splats_(backend),
         spans_(backend),
+        words_(backend),
         images_(backend) {
     prepare_projection(camera);
     project();
@@ -134,9 +136,10 @@ class FrameStages {
     projected_.counts = counts_.view();
     projected_.grid = gsnav::TileGrid::of(camera.width, camera.height,
                                           gsnav::tile_size_of<B>(config_, camera.width, camera.height));
-    constexpr bool kSpans = sizeof(S) == sizeof(float) && requires { B::bins_in_lanes; };
-    spans_.resize_discard(kSpans ? slots : 0);
+    spans_.resize_discard(gsnav::detail::bins_by_entries<S, B> ? slots : 0);
+    words_.resize_discard(spans_.size());
     projected_.spans = spans_.view();
+    projected_.words = words_.view();
     project_.offsets = offsets_.view();
     images_.resize_discard(static_cast<std::size_t>(3 * camera.width) *
                            static_cast<std::size_t>(camera.height));
@@ -154,6 +157,13 @@ class FrameStages {
     std::stable_sort(order.begin(), order.end(),
                      [&](std::uint32_t a, std::uint32_t b) { return keys[a] < keys[b]; });
     order_.upload(order.data(), order.size());
+    if constexpr (gsnav::detail::bins_by_entries<S, B>) {
+      bin_.entry = gsnav::SplatEntry::of(keys.size(), projected_.grid.count());
+      entries_.clear();
+      for (const std::uint32_t slot : order)
+        entries_.push_back(bin_.entry(0, words_.view()[slot], slot));
+      bin_.entries = gsnav::view_of(std::as_const(entries_));
+    }
   }
 
   void prepare_bins() {
@@ -182,6 +192,8 @@ class FrameStages {
   gsnav::Buffer<std::uint64_t, B> cursors_, tile_offsets_;
   gsnav::Buffer<std::uint32_t, B> tile_splats_;
   gsnav::Buffer<gsnav::TileSpans, B> spans_;
+  gsnav::Buffer<std::uint32_t, B> words_;
+  std::vector<std::uint64_t> entries_;
   gsnav::Buffer<S, B> images_;
   gsnav::ViewedSet<S> project_;
   gsnav::ProjectOutputs<S> projected_;

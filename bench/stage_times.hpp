@@ -73,9 +73,10 @@ class TimedBackend : public Base {
                          std::is_same_v<F, gsnav::ScanTileIntersections<S>> ||
                          std::is_same_v<F, gsnav::ScatterTileIntersections<S>>) {
       return Stage::bin;
-    } else if constexpr (requires(const F& f) { f.digit; } ||
-                         std::is_same_v<F,
-                                        gsnav::detail::RankTiesOfRange>) {  // passes of the radix sort
+    } else if constexpr (
+        requires(const F& f) { f.digit; } ||  // passes of the radix sort
+        requires(const F& f) { f.first_record; } || std::is_same_v<F, gsnav::detail::CountInRange> ||
+        std::is_same_v<F, gsnav::detail::SortTiesOfRange<gsnav::detail::EntryTies>>) {
       return Stage::sort;
     } else {
       return Stage::other;

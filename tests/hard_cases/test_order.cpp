@@ -431,7 +431,7 @@ TEST_CASE("N79_near_ties one step of float32 apart are in order") {
     REQUIRE(key(i) == wanted);
     REQUIRE(key(i) == std::nextafter(key(i + 1), 1e9f));
   }
-  render_everywhere({&cloud}, camera, {}, [&](const auto& f, const auto&) {
+  const auto in_order = [&](const auto& f, const auto&) {
     int wrong = 0;
     for (int i = 0; i < kSide * kSide; ++i) {
       const int row = i / kSide * kPitch + kPitch / 2, column = i % kSide * kPitch + kPitch / 2;
@@ -439,5 +439,11 @@ TEST_CASE("N79_near_ties one step of float32 apart are in order") {
       wrong += f.rgb[3 * pixel] > f.rgb[3 * pixel + 2] ? 0 : 1;
     }
     CHECK(wrong == 0);
-  });
+  };
+  render_everywhere({&cloud}, camera, {}, in_order);
+  // The same before something faint at 10^12 m: such a range of keys takes 29 bits.
+  const Vec3d in_camera = Vec3d{0, 0, 1e12} - camera.viewmat.translation;
+  const GaussianCloud far =
+      cloud_of({gaussian(transpose(camera.viewmat.linear) * in_camera, {1e11, 1e11, 1e11}, 0.01, {})});
+  render_everywhere({&cloud, &far}, camera, {}, in_order);
 }

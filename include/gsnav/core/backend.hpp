@@ -51,8 +51,8 @@ struct NoopFunctor {
 /// - `concurrency() -> std::size_t`: number of pieces to cut work into. Default: 1.
 /// - `one_thread() -> B`: a backend of the same kind that uses only the calling thread. Batches of
 ///   cameras then run one frame per thread (detail/render/thread_frames.hpp).
-/// - `static constexpr bool bins_in_lanes`: true if binning reads BinArgs::spans. Projection then fills
-///   that array.
+/// - `static constexpr bool bins_in_lanes`: true if binning reads BinArgs::entries and spans. The
+///   projection then fills ProjectOutputs::words and spans.
 /// - `batch_renderer`: a type that draws many cameras in one call (detail/sim/frame_batch.hpp).
 /// - `host_threads() -> ThreadPool&`: threads for the host's part of the work, such as stepping the
 ///   worlds of a batch (detail/core/host_threads.hpp). Backends that use host memory need none.

@@ -56,6 +56,12 @@ void blend_pixels(B& backend, const RasterArgs<S>& args) {
   });
 }
 
+/// True if a backend bins the frames of scalar S by entries (SplatEntry).
+template <class S, Backend B>
+inline constexpr bool bins_by_entries = sizeof(S) == sizeof(float) && requires {
+  B::bins_in_lanes;
+};
+
 /// Sizes the scratch memory of one camera's frame and writes the arguments of the projection.
 template <class S, Backend B>
 void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
@@ -80,8 +86,9 @@ void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> 
   ws.depths.resize_discard(depth ? slots : 0);
   ws.perspectives.resize_discard(config.response != Response::ewa ? slots : 0);
   ws.visible.counts.resize_discard(chunks);
-  constexpr bool kSpans = sizeof(S) == sizeof(float) && requires { B::bins_in_lanes; };
-  ws.spans.resize_discard(kSpans ? slots : 0);
+  ws.visible.drawn.resize_discard(bins_by_entries<S, B> ? chunks : 0);
+  ws.spans.resize_discard(bins_by_entries<S, B> ? slots : 0);
+  ws.visible.words.resize_discard(ws.spans.size());
   ProjectOutputs<S>& out = ws.projected;
   out = {};
   out.geometry = ws.geometry.view();
@@ -94,6 +101,7 @@ void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> 
   out.counts = ws.visible.counts.view();
   out.grid = grid_of<B>(config, camera);
   out.spans = ws.spans.view();
+  out.words = ws.visible.words.view();
 
   const ProjectionRules rules = projection_rules(config);
   ws.host_offsets.clear();
@@ -141,15 +149,22 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   std::uint32_t base = range.low;  // lower bound of all keys
   if (!ws.projections.empty())     // all sets have the same near plane
     base = std::max(base, ws.projections[0].camera.key_code.lowest(ws.projections[0].camera.near_plane));
-  const Result<std::size_t> ordered =
-      order_visible(backend, ws.visible, base, config.quality.key_bits, range);
-  if (!ordered) return ordered.status();
-  const std::size_t visible = ordered.value();
-
-  // ---- bin
   BinArgs<S> bin;
   bin.grid = grid_of<B>(config, camera);
-  bin.order = ws.visible.order.view();
+  std::size_t visible = 0;
+  if constexpr (bins_by_entries<S, B>) {
+    bin.entry = SplatEntry::of(ws.visible.words.size(), bin.grid.count());
+    bin.entries = order_entries(backend, ws.visible, bin.entry, base, range);
+    visible = bin.entries.size;
+  } else {
+    const Result<std::size_t> ordered =
+        order_visible(backend, ws.visible, base, config.quality.key_bits, range);
+    if (!ordered) return ordered.status();
+    visible = ordered.value();
+    bin.order = ws.visible.order.view();
+  }
+
+  // ---- bin
   bin.geometry = ws.geometry.view();
   bin.bounds = ws.bounds.view();
   bin.log2_alpha_min = static_cast<S>(log2_alpha_min(config.quality));
@@ -237,7 +252,8 @@ Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Cam
       static_cast<std::size_t>(grid.tile_size) * static_cast<std::size_t>(grid.tile_size);
   ws.open.resize_discard(grid.count());
   ws.states.resize_discard(grid.count() * pixels * blend_state_values(images.depth_mode()));
-  std::fill(ws.visible.counts.data(), ws.visible.counts.data() + ws.visible.counts.size(), 0u);
+  for (Buffer<std::uint32_t, B>* const of_chunks : {&ws.visible.counts, &ws.visible.drawn})
+    std::fill_n(of_chunks->data(), of_chunks->size(), 0u);
   for (int s = 0; s <= last; ++s) {
     for (const ViewedSet<float>& args : sets) {
       const View<const std::uint32_t> chunks = slices.chunks(s, args, ws.projected.open);
@@ -284,6 +300,7 @@ Status render_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gauss
     }
   }
   if (!drawn) {
+    ws.visible.drawn.resize_discard(0);  // one slice
     for (std::size_t i = 0; i < sets.size(); ++i) {
       const ViewedSet<S>& args = ws.projections[i];
       if constexpr (sizeof(S) == sizeof(float) && ProjectsChunks<B, S>) {

@@ -45,58 +45,56 @@ struct SortBlocks {
   }
 };
 
-/// Bits [shift, shift + bits) of a key.
+/// Bits [shift, shift + bits) of a record.
 struct RadixDigit {
   int shift = 0, bits = 0;
   GSNAV_HD std::size_t size() const noexcept { return std::size_t{1} << bits; }
-  GSNAV_HD std::size_t operator()(std::uint32_t key) const noexcept {
-    return (key >> shift) & ((std::uint32_t{1} << bits) - 1);
+  GSNAV_HD std::size_t operator()(std::uint64_t record) const noexcept {
+    return static_cast<std::size_t>(record >> shift) & (size() - 1);
   }
 };
 
-/// Keys and values in two arrays: the source of the first pass.
+/// Keys and values in two arrays: the source of the first pass of a sort of pairs. Their records have
+/// the key in the upper 32 bits and the value in the lower.
 struct PairSource {
   View<const std::uint32_t> keys, values;
   SortBlocks split;
   template <class F>
   GSNAV_HD void for_each(std::size_t block, const F& f) const noexcept {
     const std::size_t end = split.begin(block + 1);
-    for (std::size_t i = split.begin(block); i < end; ++i) f(keys[i], values[i]);
+    for (std::size_t i = split.begin(block); i < end; ++i) f(std::uint64_t{keys[i]} << 32 | values[i]);
   }
 };
 
-/// Records written by a pass, the source of the next pass. The key is in the upper 32 bits, the value in
-/// the lower.
+/// Records written by a pass, the source of the next pass.
 struct RecordSource {
   View<const std::uint64_t> records;
   SortBlocks split;
   template <class F>
   GSNAV_HD void for_each(std::size_t block, const F& f) const noexcept {
     const std::size_t end = split.begin(block + 1);
-    for (std::size_t i = split.begin(block); i < end; ++i) {
-      f(static_cast<std::uint32_t>(records[i] >> 32), static_cast<std::uint32_t>(records[i]));
-    }
+    for (std::size_t i = split.begin(block); i < end; ++i) f(records[i]);
   }
 };
 
-/// Counts the first digit of the keys of a block, in row [block][block] of `counts`, and computes the
-/// bitwise or of its keys.
+/// Counts the first digit of the records of a block, in row [block][block] of `counts`, and computes the
+/// bitwise or of its records.
 template <class Source>
 struct RadixCount {
   Source source;
   SortBlocks split;
   RadixDigit digit;
   View<std::uint32_t> counts;  ///< [blocks][blocks][digit]
-  View<std::uint32_t> used;    ///< [blocks], bitwise or of the keys
+  View<std::uint64_t> used;    ///< [blocks], bitwise or of the records
   GSNAV_HD void operator()(std::size_t block) const noexcept {
     const std::size_t row = split.blocks * digit.size();
     std::uint32_t* const own = counts.data + block * row;
     for (std::size_t d = 0; d < row; ++d) own[d] = 0;
     std::uint32_t* const h = own + block * digit.size();
-    std::uint32_t bits = 0;
-    source.for_each(block, [&bits, h, d = digit](std::uint32_t key, std::uint32_t) {
-      ++h[d(key)];
-      bits |= key;
+    std::uint64_t bits = 0;
+    source.for_each(block, [&bits, h, d = digit](std::uint64_t record) GSNAV_INLINED {
+      ++h[d(record)];
+      bits |= record;
     });
     used[block] = bits;
   }
@@ -141,30 +139,76 @@ struct RadixScatter {
     for (std::size_t d = 0; d < row; ++d) h[d] = 0;
     std::uint32_t* const at = cursors.data + block * digit.size();
     std::uint64_t* const to = out.data;
-    source.for_each(block, [=, c = split, d = digit, e = next](std::uint32_t key, std::uint32_t value) {
-      const std::uint32_t place = at[d(key)]++;
-      to[place] = std::uint64_t{key} << 32 | value;
-      ++h[c.block_of(place) * e.size() + e(key)];
+    source.for_each(block, [=, c = split, d = digit, e = next](std::uint64_t record) GSNAV_INLINED {
+      const std::uint32_t place = at[d(record)]++;
+      to[place] = record;
+      ++h[c.block_of(place) * e.size() + e(record)];
     });
   }
 };
 
-/// Last pass: moves keys and values to their final positions, as separate arrays.
-template <class Source>
+/// Last pass: gives the records of a block to `sink` with their final positions.
+template <class Source, class Sink>
 struct RadixFinish {
   Source source;
   RadixDigit digit;
-  View<std::uint32_t> cursors, keys, values;
+  View<std::uint32_t> cursors;
+  Sink sink;
   GSNAV_HD void operator()(std::size_t block) const noexcept {
     std::uint32_t* const at = cursors.data + block * digit.size();
-    std::uint32_t *const to_keys = keys.data, *const to_values = values.data;
-    source.for_each(block, [=, d = digit](std::uint32_t key, std::uint32_t value) {
-      const std::uint32_t place = at[d(key)]++;
-      to_keys[place] = key;
-      to_values[place] = value;
-    });
+    source.for_each(block, [=, to = sink, d = digit](std::uint64_t record)
+                               GSNAV_INLINED { to(at[d(record)]++, record); });
   }
 };
+
+/// Writes sorted pairs as two arrays.
+struct PairSink {
+  View<std::uint32_t> keys, values;
+  GSNAV_HD void operator()(std::uint32_t place, std::uint64_t record) const noexcept {
+    keys.data[place] = static_cast<std::uint32_t>(record >> 32);
+    values.data[place] = static_cast<std::uint32_t>(record);
+  }
+};
+
+/// Writes sorted records.
+struct RecordSink {
+  View<std::uint64_t> records;
+  GSNAV_HD void operator()(std::uint32_t place, std::uint64_t record) const noexcept {
+    records.data[place] = record;
+  }
+};
+
+/// Sorts `n` items in place, by `less`. Insertion for a few; else a heap sort, which takes n log n steps
+/// in place and without recursion.
+template <class T, class Less>
+GSNAV_HD void sort_in_place(T* items, std::size_t n, const Less& less) noexcept {
+  constexpr std::size_t kFew = 12;
+  if (n <= kFew) {
+    for (std::size_t i = 1; i < n; ++i) {
+      const T item = items[i];
+      std::size_t at = i;
+      for (; at > 0 && less(item, items[at - 1]); --at) items[at] = items[at - 1];
+      items[at] = item;
+    }
+    return;
+  }
+  const auto sift_down = [items, &less](std::size_t root, std::size_t size) GSNAV_INLINED {
+    const T item = items[root];
+    for (std::size_t child; (child = 2 * root + 1) < size; root = child) {
+      if (child + 1 < size && less(items[child], items[child + 1])) ++child;
+      if (!less(item, items[child])) break;
+      items[root] = items[child];
+    }
+    items[root] = item;
+  };
+  for (std::size_t root = n / 2; root-- > 0;) sift_down(root, n);
+  for (std::size_t end = n; end-- > 1;) {
+    const T last = items[end];
+    items[end] = items[0];
+    items[0] = last;
+    sift_down(0, end);
+  }
+}
 
 }  // namespace detail
 
@@ -175,7 +219,8 @@ struct SortScratch {
   Buffer<std::uint32_t, B> keys, values;   ///< result of sort_pairs before it is swapped with the
                                            ///< caller's arrays
   Buffer<std::uint64_t, B> first, second;  ///< records between passes
-  Buffer<std::uint32_t, B> counts, cursors, used;
+  Buffer<std::uint32_t, B> counts, cursors;
+  Buffer<std::uint64_t, B> used;
 
   /// Calls f(a.member, b.member) for each buffer.
   template <class A, class C, class F>
@@ -193,17 +238,17 @@ std::size_t sort_blocks(const B& backend, std::size_t n) noexcept {
   return n / kLeast + 1 < blocks ? n / kLeast + 1 : blocks;
 }
 
-/// Sorts the pairs of `source` stably by the lowest `bits` bits of the key into `keys` and `values`.
-/// Higher bits must be zero. `split` cuts the source into blocks; it holds 1 to 2^32 - 1 pairs. LSD
-/// radix sort with as many passes as the bits in use need.
-template <class Source, Backend B>
-void sort_from(B& backend, const Source& source, const detail::SortBlocks& split, int bits,
-               SortScratch<B>& s, View<std::uint32_t> keys, View<std::uint32_t> values) {
-  // Two passes if 22 bits suffice. Otherwise digits of 9 bits, whose 512 write positions stay in the L1
-  // cache.
-  const int digit_bits = bits <= 22 ? (bits + 1) / 2 : 9;
-  const auto digit = [digit_bits](int pass) {
-    return detail::RadixDigit{pass * digit_bits, digit_bits};
+/// Sorts the records of `source` stably by their bits [low, low + bits) into `sink`. Higher bits must be
+/// zero. `split` cuts the source into blocks; it holds 1 to 2^32 - 1 records. LSD radix sort with as
+/// many passes as the bits in use need. The source may be in `s.second`, the sink in neither.
+template <class Source, class Sink, Backend B>
+void sort_from(B& backend, const Source& source, const detail::SortBlocks& split, int low, int bits,
+               SortScratch<B>& s, const Sink& sink) {
+  // Two passes if 22 bits suffice, three if 27 do. Otherwise digits of 9 bits, whose 512 write positions
+  // stay in the L1 cache.
+  const int digit_bits = bits <= 22 ? (bits + 1) / 2 : bits <= 27 ? (bits + 2) / 3 : 9;
+  const auto digit = [low, digit_bits](int pass) {
+    return detail::RadixDigit{low + pass * digit_bits, digit_bits};
   };
   const std::size_t row = split.blocks * digit(0).size();
   s.first.resize_discard(split.size);
@@ -214,29 +259,32 @@ void sort_from(B& backend, const Source& source, const detail::SortBlocks& split
 
   backend.parallel_for(
       split.blocks, detail::RadixCount<Source>{source, split, digit(0), s.counts.view(), s.used.view()});
-  std::array<std::uint32_t, 64> used{};
+  std::array<std::uint64_t, 64> used{};
   s.used.download(used.data(), split.blocks);
   backend.synchronize().throw_if_error();
-  std::uint32_t all = 0;
-  for (std::size_t block = 0; block < split.blocks; ++block) all |= used[block];
+  std::uint64_t all = 0;
+  for (std::size_t block = 0; block < split.blocks; ++block) all |= used[block] >> low;
   int passes = 1;
-  while (passes * digit_bits < 32 && (all >> (passes * digit_bits)) != 0) ++passes;
+  while (passes * digit_bits < bits && (all >> (passes * digit_bits)) != 0) ++passes;
 
   const auto run_pass = [&](const auto& from, int pass) {
     using From = std::remove_cvref_t<decltype(from)>;
     backend.parallel_for(1, detail::RadixOffsets{split, digit(pass), s.counts.view(), s.cursors.view()});
     if (pass + 1 < passes) {
-      backend.parallel_for(
-          split.blocks, detail::RadixScatter<From>{from, split, digit(pass), digit(pass + 1),
-                                                   s.cursors.view(), s.counts.view(), s.second.view()});
-      std::swap(s.first, s.second);
+      View<std::uint64_t> out = pass % 2 == 0 ? s.first.view() : s.second.view();
+      backend.parallel_for(split.blocks,
+                           detail::RadixScatter<From>{from, split, digit(pass), digit(pass + 1),
+                                                      s.cursors.view(), s.counts.view(), out});
     } else {
       backend.parallel_for(split.blocks,
-                           detail::RadixFinish<From>{from, digit(pass), s.cursors.view(), keys, values});
+                           detail::RadixFinish<From, Sink>{from, digit(pass), s.cursors.view(), sink});
     }
   };
   run_pass(source, 0);
-  for (int pass = 1; pass < passes; ++pass) run_pass(detail::RecordSource{s.first.view(), split}, pass);
+  for (int pass = 1; pass < passes; ++pass) {
+    const auto& from = pass % 2 == 1 ? s.first : s.second;
+    run_pass(detail::RecordSource{from.view(), split}, pass);
+  }
 }
 
 /// Sorts fewer than 2^32 (key, value) pairs stably by the lowest `bits` bits of the key. Higher bits
@@ -254,8 +302,8 @@ void sort_pairs(B& backend, Buffer<std::uint32_t, B>& keys, Buffer<std::uint32_t
                                     scratch.values.data(), n, bits);
   } else {
     const auto split = detail::SortBlocks::of(n, sort_blocks(backend, n));
-    sort_from(backend, detail::PairSource{keys.view(), values.view(), split}, split, bits, scratch,
-              scratch.keys.view(), scratch.values.view());
+    sort_from(backend, detail::PairSource{keys.view(), values.view(), split}, split, 32, bits, scratch,
+              detail::PairSink{scratch.keys.view(), scratch.values.view()});
   }
   if (in_scratch) {
     std::swap(keys, scratch.keys);

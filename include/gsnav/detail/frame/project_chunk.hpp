@@ -78,10 +78,12 @@ struct ProjectOutputs {
   View<std::uint32_t> keys;   ///< camera.key_code of the float32 key
   View<std::uint32_t> ranks;  ///< decides between equal keys; empty: the slot decides
   View<std::uint32_t> counts;
-  TileGrid grid;          ///< read if `spans` is not empty
-  View<TileSpans> spans;  ///< Tiles of each slot's splat, for backends that find them during projection;
-                          ///< else empty.
-  OpenSquares open;       ///< Backends may skip splats that reach none of these squares.
+  TileGrid grid;  ///< read if `spans` is not empty
+  /// Tiles of each slot's splat, for backends that find them during projection; else empty. Where a word
+  /// has the tiles, neither `bounds` nor `spans` is written.
+  View<std::uint32_t> words;
+  View<TileSpans> spans;
+  OpenSquares open;  ///< Backends may skip splats that reach none of these squares.
 };
 
 /// True if some Gaussian of chunk c may be visible. Conservative: never false if one is visible.
@@ -198,7 +200,10 @@ GSNAV_HD void write_splat(const ViewedSet<S>& args, const ProjectOutputs<S>& out
   out.geometry[slot] = row.splat.geometry;
   if (args.camera.response != Response::ewa) out.perspectives[slot] = row.splat.perspective;
   if (!out.depths.empty()) out.depths[slot] = row.splat.depth;
-  if (!out.spans.empty()) out.spans[slot].rows = TileSpans::kLarge;
+  if (!out.spans.empty()) {
+    out.words[slot] = 0;
+    out.spans[slot].rows = TileSpans::kLarge;
+  }
   out.keys[slot] = args.camera.key_code(row.key);
   if (!out.ranks.empty()) out.ranks[slot] = args.rank_of(static_cast<std::uint32_t>(i));
   if (!out.colors.empty()) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 
@@ -128,6 +129,47 @@ struct TileSpans {
   std::uint8_t columns[kRows][2];
 };
 
+/// The tiles of a splat in a word, if they are in a square of 3 x 3 tiles, as those of most splats are.
+/// The lowest bits have one bit for each tile, row by row. The others are the index of the top left tile
+/// of the square. If the lowest bits are 0, the splat's TileSpans has its tiles.
+struct TileWord {
+  static constexpr int kSide = 3, kMaskBits = kSide * kSide;
+  static constexpr std::uint32_t kMask = (1u << kMaskBits) - 1u;
+  /// The bits of the upper left 2 x 2 tiles.
+  static constexpr std::uint32_t kFour = 3u | 3u << kSide;
+};
+
+/// A splat in 64 bits while it is sorted and binned: its key, its TileWord and its slot. Both stages
+/// read entries in sequence; an index would send them to random places. The key's lowest bits may have
+/// no room. Splats that differ only in them are then sorted once more, by their whole keys.
+struct SplatEntry {
+  static constexpr int kMostKeyBits = 27;  ///< for a sort in three passes
+  int slot_bits = 32, word_bits = 32;
+
+  /// For slots below `slots` and tiles below `tiles`. An image has at most 2^22 tiles, so a word has at
+  /// most 31 bits.
+  static SplatEntry of(std::size_t slots, std::size_t tiles) noexcept {
+    const auto bits_for = [](std::size_t n) {
+      return static_cast<int>(std::bit_width(n > 1 ? n - 1 : n));
+    };
+    return {bits_for(slots), bits_for(tiles) + TileWord::kMaskBits};
+  }
+  GSNAV_HD int key_shift() const noexcept { return slot_bits + word_bits; }
+  GSNAV_HD int key_bits() const noexcept {
+    return 64 - key_shift() < kMostKeyBits ? 64 - key_shift() : kMostKeyBits;
+  }
+  GSNAV_HD std::uint64_t operator()(std::uint32_t key, std::uint32_t word,
+                                    std::uint32_t slot) const noexcept {
+    return (std::uint64_t{key} << word_bits | word) << slot_bits | slot;
+  }
+  GSNAV_HD std::uint32_t slot(std::uint64_t entry) const noexcept {
+    return static_cast<std::uint32_t>(entry & ((std::uint64_t{1} << slot_bits) - 1));
+  }
+  GSNAV_HD std::uint32_t word(std::uint64_t entry) const noexcept {
+    return static_cast<std::uint32_t>(entry >> slot_bits & ((std::uint64_t{1} << word_bits) - 1));
+  }
+};
+
 /// Arguments of binning, which lists for each tile the visible splats that may cover it.
 template <class S>
 struct BinArgs {
@@ -141,8 +183,11 @@ struct BinArgs {
   View<std::uint64_t> cursors;       ///< [blocks][tiles], counts, later write positions
   View<std::uint64_t> tile_offsets;  ///< [tiles + 1]
   View<std::uint32_t> tile_splats;   ///< splats of all tiles; those of each tile in `order`
-  View<TileSpans> spans;  ///< [slots], filled by the projection of backends with bins_in_lanes; else
-                          ///< empty
+  /// For backends with bins_in_lanes, in place of `order`: the visible splats front to back, and the
+  /// format of these entries.
+  View<const std::uint64_t> entries;
+  SplatEntry entry;
+  View<const TileSpans> spans;  ///< [slots], filled by the projection of such backends
 };
 
 /// Calls f(tile) for each tile that the footprint of a splat may reach.
@@ -185,19 +230,26 @@ GSNAV_HD void for_each_intersection(const BinArgs<S>& args, const Cull& cull, st
 }
 
 /// Counts the items of each tile for one block. `each(f)` calls f(tile, item) for the items of the
-/// block, in order.
+/// block, in order. A third argument of 0 says that the tile is not the item's after all, so that
+/// callers need no branch.
 template <class S, class Each>
 GSNAV_HD void count_in_tiles(const BinArgs<S>& args, std::size_t block, const Each& each) noexcept {
   std::uint64_t* counts = args.cursors.data + block * args.grid.count();
   for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
-  each([=](std::size_t tile, std::uint32_t) GSNAV_INLINED { ++counts[tile]; });
+  each([=](std::size_t tile, std::uint32_t, std::uint32_t covered = 1)
+           GSNAV_INLINED { counts[tile] += covered; });
 }
 /// Writes the items of one block to the lists of their tiles, in order, after ScanTileIntersections.
 template <class S, class Each>
 GSNAV_HD void scatter_to_tiles(const BinArgs<S>& args, std::size_t block, const Each& each) noexcept {
   std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
   std::uint32_t* out = args.tile_splats.data;
-  each([=](std::size_t tile, std::uint32_t item) GSNAV_INLINED { out[cursors[tile]++] = item; });
+  std::uint32_t nowhere = 0;
+  each([=, &nowhere](std::size_t tile, std::uint32_t item, std::uint32_t covered = 1) GSNAV_INLINED {
+    const std::uint64_t at = cursors[tile];
+    *(covered != 0 ? out + at : &nowhere) = item;
+    cursors[tile] = at + covered;
+  });
 }
 }  // namespace detail
 

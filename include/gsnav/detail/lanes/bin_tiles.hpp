@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 
@@ -13,99 +14,105 @@ inline namespace GSNAV_LANES_TAG {
 
 namespace detail {
 
-/// Calls small(splat, spans) for each splat of a block of `order` whose tiles are in its TileSpans, and
-/// large(splat) for the others.
-template <class Small, class Large>
-GSNAV_HD void for_each_splat(const BinArgs<float>& args, std::size_t block, const Small& small,
-                             const Large& large) noexcept {
+/// Calls f(tile) for each tile of a splat that has no TileWord, in order.
+template <class F>
+GSNAV_HD void for_each_other_tile(const BinArgs<float>& args, std::uint32_t splat, const F& f) noexcept {
+  const TileSpans& s = args.spans[splat];
+  if (s.rows == TileSpans::kLarge) {
+    gsnav::for_each_tile(args, splat, f);
+    return;
+  }
+  for (std::size_t r = 0; r < s.rows; ++r) {
+    const std::size_t row = s.tile + r * static_cast<std::size_t>(args.grid.columns);
+    for (std::size_t x = s.columns[r][0]; x < s.columns[r][1]; ++x) f(row + x);
+  }
+}
+
+/// Offsets of the tiles of a TileWord from the top left one, by bit.
+struct WordTiles {
+  std::size_t offsets[TileWord::kMaskBits];
+
+  GSNAV_HD explicit WordTiles(const TileGrid& grid) noexcept {
+    for (std::size_t k = 0; k < TileWord::kMaskBits; ++k) {
+      constexpr std::size_t kSide = TileWord::kSide;
+      offsets[k] = k / kSide * static_cast<std::size_t>(grid.columns) + k % kSide;
+    }
+  }
+  /// Calls f(tile, covered) for the tiles of a word. If all are among 2 x 2, it calls f for these four
+  /// without a branch, which could not be predicted; `covered` is 1 or 0. A tile that is not the splat's
+  /// is then replaced by the top left one, which can be accessed.
+  template <class F>
+  GSNAV_HD void for_each(std::size_t first, std::uint32_t bits, const F& f) const noexcept {
+    if ((bits & ~TileWord::kFour) != 0) {
+      for (; bits != 0; bits &= bits - 1) f(first + offsets[std::countr_zero(bits)], 1u);
+      return;
+    }
+    for (const int k : {0, 1, TileWord::kSide, TileWord::kSide + 1}) {
+      const std::uint32_t covered = bits >> k & 1u;
+      f(first + covered * offsets[k], covered);
+    }
+  }
+};
+
+/// Calls f(tile, splat, covered) for the tiles of each splat of a block, in order (WordTiles).
+template <class F>
+GSNAV_HD void for_each_intersection(const BinArgs<float>& args, std::size_t block, const F& f) noexcept {
   constexpr std::size_t kAhead = 24;
-  const BlockRange r = BlockRange::of(block, args.blocks, args.order.size);
+  const BlockRange r = BlockRange::of(block, args.blocks, args.entries.size);
+  const SplatEntry entry = args.entry;
+  const WordTiles tiles(args.grid);
   for (std::size_t i = r.begin; i < r.end; ++i) {
-    if (i + kAhead < r.end) __builtin_prefetch(&args.spans[args.order[i + kAhead]]);
-    const std::uint32_t splat = args.order[i];
-    const TileSpans& s = args.spans[splat];
-    if (s.rows == TileSpans::kLarge) {
-      large(splat);
+    const std::uint64_t e = args.entries[i], next = args.entries[i + kAhead < r.end ? i + kAhead : i];
+    const bool needs_spans = (entry.word(next) & TileWord::kMask) == 0;
+    __builtin_prefetch(needs_spans ? static_cast<const void*>(&args.spans[entry.slot(next)]) : &args);
+    const std::uint32_t word = entry.word(e), bits = word & TileWord::kMask, splat = entry.slot(e);
+    const auto visit = [&](std::size_t tile, std::uint32_t covered = 1)
+                           GSNAV_INLINED { f(tile, splat, covered); };
+    if (bits != 0) [[likely]] {
+      tiles.for_each(word >> TileWord::kMaskBits, bits, visit);
     } else {
-      small(splat, s);
+      for_each_other_tile(args, splat, visit);
     }
   }
 }
 
-/// Calls f(tile, splat) for the tiles of each splat of a block, without those that `cull` hides.
-template <class Cull, class F>
-GSNAV_HD void for_each_intersection(const BinArgs<float>& args, const Cull& cull, std::size_t block,
-                                    const F& f) noexcept {
-  const std::size_t columns = static_cast<std::size_t>(args.grid.columns);
-  const auto visit = [=](std::size_t tile, std::uint32_t splat) GSNAV_INLINED {
-    if (!cull.hides(tile, splat)) f(tile, splat);
-  };
-  for_each_splat(
-      args, block,
-      [=](std::uint32_t splat, const TileSpans& s) GSNAV_INLINED {
-        for (std::size_t r = 0; r < s.rows; ++r) {
-          const std::size_t row = s.tile + r * columns;
-          for (std::size_t x = s.columns[r][0]; x < s.columns[r][1]; ++x) visit(row + x, splat);
-        }
-      },
-      [&](std::uint32_t splat) GSNAV_INLINED {
-        gsnav::for_each_tile(args, splat, [&](std::size_t tile) GSNAV_INLINED { visit(tile, splat); });
-      });
+/// for_each_intersection() without the splats that the mesh hides.
+template <class F>
+GSNAV_HD void for_each_before_mesh(const BinArgs<float>& args, const MeshCull<float>& cull,
+                                   std::size_t block, const F& f) noexcept {
+  for_each_intersection(args, block,
+                        [&](std::size_t tile, std::uint32_t splat, std::uint32_t covered) GSNAV_INLINED {
+                          if (covered != 0 && !cull.hides(tile, splat)) f(tile, splat);
+                        });
 }
 
 }  // namespace detail
 
-/// CountTileIntersections with the tiles that the projection found (BinArgs::spans). It records only
-/// where each row of tiles starts and ends, then computes prefix sums. Long rows therefore cost no more
-/// than short ones.
+/// CountTileIntersections by the tiles that the projection found (BinArgs::entries).
 inline void count_tiles(const CountTileIntersections<float>& kernel, std::size_t block) noexcept {
-  const BinArgs<float>& args = kernel.args;
-  const std::size_t tiles = args.grid.count(), columns = static_cast<std::size_t>(args.grid.columns);
-  std::uint64_t* change = args.cursors.data + block * tiles;
-  for (std::size_t t = 0; t < tiles; ++t) change[t] = 0;
-  std::uint64_t beyond = 0;  // receives the ends beyond the last tile
-  const auto note = [=, &beyond](std::size_t begin, std::size_t end) noexcept {
-    ++change[begin];
-    --*(end < tiles ? change + end : &beyond);
-  };
-  detail::for_each_splat(
-      args, block,
-      [=](std::uint32_t, const TileSpans& s) noexcept {
-        // Most splats have one row or two. A missing second row is an empty run.
-        const std::size_t second = s.tile + (s.rows > 1 ? columns : 0);
-        note(s.tile + s.columns[0][0], s.tile + s.columns[0][1]);
-        note(second + s.columns[1][0], second + s.columns[1][1]);
-        for (std::size_t r = 2; r < s.rows; ++r) {
-          const std::size_t row = s.tile + r * columns;
-          note(row + s.columns[r][0], row + s.columns[r][1]);
-        }
-      },
-      [&](std::uint32_t splat) noexcept {
-        gsnav::for_each_tile(args, splat, [=](std::size_t tile) { note(tile, tile + 1); });
-      });
-  std::uint64_t count = 0;
-  for (std::size_t t = 0; t < tiles; ++t) change[t] = count += change[t];
+  gsnav::detail::count_in_tiles(kernel.args, block, [&](const auto& f) GSNAV_INLINED {
+    detail::for_each_intersection(kernel.args, block, f);
+  });
 }
-/// CountTileIntersections for frames with a mesh. Counts tile by tile, because the mesh hides a splat in
-/// only some of its tiles.
+/// CountTileIntersections for frames with a mesh, which hides a splat in only some of its tiles.
 inline void count_tiles_before_mesh(const CountTileIntersections<float, MeshCull<float>>& kernel,
                                     std::size_t block) noexcept {
-  const BinArgs<float>& args = kernel.args;
-  std::uint64_t* counts = args.cursors.data + block * args.grid.count();
-  for (std::size_t t = 0; t < args.grid.count(); ++t) counts[t] = 0;
-  detail::for_each_intersection(args, kernel.cull, block,
-                                [=](std::size_t tile, std::uint32_t) { ++counts[tile]; });
+  gsnav::detail::count_in_tiles(kernel.args, block, [&](const auto& f) GSNAV_INLINED {
+    detail::for_each_before_mesh(kernel.args, kernel.cull, block, f);
+  });
 }
-
-/// ScatterTileIntersections with the tiles that the projection found.
-template <class Cull>
-void scatter_tiles(const ScatterTileIntersections<float, Cull>& kernel, std::size_t block) noexcept {
-  const BinArgs<float>& args = kernel.args;
-  std::uint64_t* cursors = args.cursors.data + block * args.grid.count();
-  std::uint32_t* out = args.tile_splats.data;
-  detail::for_each_intersection(args, kernel.cull, block,
-                                [=](std::size_t tile, std::uint32_t splat)
-                                    GSNAV_INLINED { out[cursors[tile]++] = splat; });
+/// ScatterTileIntersections by the tiles that the projection found.
+inline void scatter_tiles(const ScatterTileIntersections<float>& kernel, std::size_t block) noexcept {
+  gsnav::detail::scatter_to_tiles(kernel.args, block, [&](const auto& f) GSNAV_INLINED {
+    detail::for_each_intersection(kernel.args, block, f);
+  });
+}
+/// ScatterTileIntersections for frames with a mesh.
+inline void scatter_tiles_before_mesh(const ScatterTileIntersections<float, MeshCull<float>>& kernel,
+                                      std::size_t block) noexcept {
+  gsnav::detail::scatter_to_tiles(kernel.args, block, [&](const auto& f) GSNAV_INLINED {
+    detail::for_each_before_mesh(kernel.args, kernel.cull, block, f);
+  });
 }
 
 }  // namespace GSNAV_LANES_TAG

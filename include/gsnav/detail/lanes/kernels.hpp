@@ -33,7 +33,7 @@ constexpr Table kernel_table(const char* name) noexcept {
           .count_tiles = &count_tiles,
           .count_tiles_before_mesh = &count_tiles_before_mesh,
           .scatter_tiles = &scatter_tiles,
-          .scatter_tiles_before_mesh = &scatter_tiles,
+          .scatter_tiles_before_mesh = &scatter_tiles_before_mesh,
           .rasterize_tile = &rasterize_tile_any,
           .composite_tile = &composite_tile_any,
           .project_mesh_vertices = &project_mesh_vertices,

@@ -44,11 +44,14 @@ GSNAV_HD std::uint32_t reaching_open(const OpenSquares& open, const PixelBox<F>&
   return found;
 }
 
-/// One TileSpans per lane, as the four words that it consists of.
+/// One TileWord and one TileSpans per lane, the latter as the four words that it consists of.
 struct SpanWords {
+  F::ints tile_word{};
   F::ints word[4]{};
 };
 static_assert(sizeof(TileSpans) == 4 * sizeof(std::int32_t) && TileSpans::kRows == 5);
+
+GSNAV_HD F as_floats(F::ints x) noexcept { return F(gsnav::detail::floats<kWidth>(x)); }
 
 /// Finds the tiles of kWidth splats, one splat per lane. They are the tiles that for_each_tile() finds.
 /// `lanes` has the bits of the lanes that are needed; the words of the others mean nothing.
@@ -67,6 +70,8 @@ GSNAV_HD SpanWords find_tiles(const TileGrid& grid, const SplatGeometry<F>& g, f
 
   SpanWords out;
   out.word[0] = whole(tiles.y0) * grid.columns + whole(tiles.x0);
+  F mask = zero;
+  const auto power = [](F::ints x) noexcept { return as_floats((x + 127) << 23); };  // 2^x
   out.word[1] = whole(select(large, F(static_cast<float>(TileSpans::kLarge)), rows));
   F begin = zero, end = one;  // for a single tile
   if (wanted != 0) {
@@ -84,6 +89,9 @@ GSNAV_HD SpanWords find_tiles(const TileGrid& grid, const SplatGeometry<F>& g, f
         end = select(single, one, end);
       }
       const F::ints b = whole(begin), e = whole(end);
+      if (r < TileWord::kSide) {  // the bits of columns [begin, end)
+        mask = fma(F(static_cast<float>(1 << (r * TileWord::kSide))), power(e) - power(b), mask);
+      }
       // Bytes 5 + 2 r and 6 + 2 r of the 16 bytes of a TileSpans.
       out.word[(5 + 2 * r) / 4] |= b << (8 * ((5 + 2 * r) % 4));
       out.word[(6 + 2 * r) / 4] |= e << (8 * ((6 + 2 * r) % 4));
@@ -91,7 +99,11 @@ GSNAV_HD SpanWords find_tiles(const TileGrid& grid, const SplatGeometry<F>& g, f
     }
   } else {
     out.word[1] |= whole(begin) << 8 | whole(end) << 16;
+    mask = one;
   }
+  const F side(static_cast<float>(TileWord::kSide));
+  const auto in_square = (rows <= side) && (tiles.x1 - tiles.x0 < side);
+  out.tile_word = out.word[0] << TileWord::kMaskBits | whole(select(in_square, mask, zero));
   return out;
 }
 
@@ -101,8 +113,6 @@ GSNAV_HD void copy_record(T& record, const float* from) noexcept {
   static_assert(std::is_trivially_copyable_v<T> && sizeof(T) == N * sizeof(float));
   std::memcpy(static_cast<void*>(&record), from, sizeof(T));
 }
-
-GSNAV_HD F as_floats(F::ints x) noexcept { return F(gsnav::detail::floats<kWidth>(x)); }
 
 /// Writes bounds and tile spans of kWidth splats, eight words per splat.
 GSNAV_HD void store_bounds(const PixelBox<F>& box, const SpanWords& spans, float* to) noexcept {
@@ -118,11 +128,20 @@ GSNAV_HD void store_bounds(const PixelBox<F>& box, const SpanWords& spans, float
   store_columns<8>(columns, to);
 }
 
-/// Ranks of kWidth rows. Rows beyond the end of the set get the rank of the last one.
-GSNAV_HD void ranks_of(const ViewedSet<float>& args, const std::uint32_t (&rows)[kWidth],
-                       std::uint32_t* ranks) noexcept {
-  const std::uint32_t last = static_cast<std::uint32_t>(args.gaussians.size() - 1);
-  for (int l = 0; l < kWidth; ++l) ranks[l] = args.rank_of(rows[l] < last ? rows[l] : last);
+/// Writes the ranks of the lanes `kept` to out[0], out[1], ... Lane l is row `first + l`.
+GSNAV_HD void store_ranks(const ViewedSet<float>& args, std::size_t first, std::uint32_t kept,
+                          std::uint32_t* out) noexcept {
+  constexpr std::size_t n = static_cast<std::size_t>(kWidth);
+  const std::size_t size = args.gaussians.size();
+  std::uint32_t ranks[kWidth];
+  if (first + n <= size && !args.gaussians.row_ids.empty()) {  // ids that follow each other in memory
+    std::memcpy(ranks, args.gaussians.row_ids.data + first, sizeof ranks);
+    for (std::size_t l = 0; l < n; ++l) ranks[l] += args.first_rank;
+  } else {
+    for (std::size_t l = 0; l < n; ++l)
+      ranks[l] = args.rank_of(static_cast<std::uint32_t>(first + l < size ? first + l : size - 1));
+  }
+  store_lanes(kept, ranks, out);
 }
 
 /// Appends the lanes `kept` to the `count` survivors that color_survivors will colour.
@@ -174,6 +193,7 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
 
   // Transpose the records from lanes to consecutive memory.
   alignas(64) float geometry[kWidth * 8], bounds[kWidth * 8], depths[2][kWidth * 8];
+  std::uint32_t words[kWidth];
   {
     const F columns[8] = {g.ref_x, g.ref_y, g.a, g.k, g.b, g.w1, g.w2, g.log2_opacity};
     store_columns<8>(columns, geometry);
@@ -184,6 +204,7 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
       spans = detail::find_tiles(out.grid, g, camera.log2_alpha_min, box, bits & ~alone);
     }
     detail::store_bounds(box, spans, bounds);
+    std::memcpy(words, &spans.tile_word, sizeof words);
   }
   if (depth) {
     const SplatDepth<F> d = make_splat_depth(camera, pack.projected.axes, p);
@@ -204,10 +225,13 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
     const std::size_t l = static_cast<std::size_t>(std::countr_zero(left)), at = slot + written;
     if ((alone >> l & 1u) != 0) {
       if (!detail::project_alone(args, out, at, rows[l])) continue;
+      words[l] = 0;
     } else {
       detail::copy_record<8>(out.geometry[at], geometry + 8 * l);
-      detail::copy_record<4>(out.bounds[at], bounds + 8 * l);
-      if (!out.spans.empty()) detail::copy_record<4>(out.spans[at], bounds + 8 * l + 4);
+      if ((words[l] & TileWord::kMask) == 0) {
+        detail::copy_record<4>(out.bounds[at], bounds + 8 * l);
+        if (!out.spans.empty()) detail::copy_record<4>(out.spans[at], bounds + 8 * l + 4);
+      }
       if (depth) {
         float both[13];
         std::memcpy(both, depths[0] + 8 * l, 8 * sizeof(float));
@@ -219,11 +243,8 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
     ++written;
   }
   store_lanes(kept, keys, out.keys.data + slot);
-  if (!out.ranks.empty()) {
-    std::uint32_t ranks[kWidth];
-    detail::ranks_of(args, rows, ranks);
-    store_lanes(kept, ranks, out.ranks.data + slot);
-  }
+  if (!out.words.empty()) store_lanes(kept, words, out.words.data + slot);
+  if (!out.ranks.empty()) detail::store_ranks(args, pack.first, kept, out.ranks.data + slot);
   if (color) detail::keep_survivors(kept, rows, pack.key.delta, count, survivors);
   return written;
 }

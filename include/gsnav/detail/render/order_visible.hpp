@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "gsnav/core/status.hpp"
 #include "gsnav/core/view.hpp"
 #include "gsnav/detail/core/parallel.hpp"
+#include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/frame/gaussians.hpp"
 
 namespace gsnav {
@@ -27,10 +29,25 @@ struct KeyRange {
 template <Backend B>
 struct VisibleOrder {
   explicit VisibleOrder(B& b)
-      : chunk_keys(b), ranks(b), counts(b), taken(b), keys(b), order(b), offsets(b), sort(b) {}
-  Buffer<std::uint32_t, B> chunk_keys, ranks, counts;  ///< [slots]; [slots] or empty; [chunks]
-  Buffer<std::uint32_t, B> taken;        ///< [chunks], number of rows whose key is in the range
+      : chunk_keys(b),
+        ranks(b),
+        words(b),
+        counts(b),
+        taken(b),
+        largest(b),
+        drawn(b),
+        keys(b),
+        order(b),
+        entries(b),
+        offsets(b),
+        sort(b) {}
+  Buffer<std::uint32_t, B> chunk_keys, ranks, words;  ///< [slots]; the others [slots] or empty
+  Buffer<std::uint32_t, B> counts;                    ///< [chunks]
+  /// [chunks], rows whose key is in the range: their number, and the largest of the keys
+  Buffer<std::uint32_t, B> taken, largest;
+  Buffer<std::uint32_t, B> drawn;        ///< [chunks], rows of the frame's earlier slices; or empty
   Buffer<std::uint32_t, B> keys, order;  ///< keys and slots of the visible Gaussians, front to back
+  Buffer<std::uint64_t, B> entries;      ///< of the visible Gaussians, in place of `keys` and `order`
   Buffer<std::uint64_t, B> offsets;  ///< [chunks], first index of each chunk; used if the host cannot
                                      ///< read `counts`
   SortScratch<B> sort;
@@ -40,9 +57,10 @@ struct VisibleOrder {
   /// Calls f(a.member, b.member) for each buffer and vector.
   template <class A, class C, class F>
   static void for_each(A& a, C& b, const F& f) {
-    f(a.chunk_keys, b.chunk_keys), f(a.ranks, b.ranks), f(a.counts, b.counts), f(a.taken, b.taken);
+    f(a.chunk_keys, b.chunk_keys), f(a.ranks, b.ranks), f(a.words, b.words), f(a.counts, b.counts);
+    f(a.taken, b.taken), f(a.largest, b.largest), f(a.drawn, b.drawn);
     f(a.keys, b.keys);
-    f(a.order, b.order), f(a.offsets, b.offsets);
+    f(a.order, b.order), f(a.entries, b.entries), f(a.offsets, b.offsets);
     f(a.host_counts, b.host_counts), f(a.host_offsets, b.host_offsets);
     SortScratch<B>::for_each(a.sort, b.sort, f);
   }
@@ -64,108 +82,181 @@ struct GatherSlot {
   }
 };
 
-/// Kernel that counts the visible splats of a chunk whose key is in a range.
+/// Kernel that counts the visible splats of a chunk whose key is in a range, and finds their largest
+/// key.
 struct CountInRange {
   View<const std::uint32_t> chunk_keys, counts;
   KeyRange range;
-  View<std::uint32_t> taken;
+  View<std::uint32_t> taken, largest;
+  View<std::uint32_t> drawn;  ///< [chunks], splats in the ranges of earlier calls; or empty
   GSNAV_HD void operator()(std::size_t c) const noexcept {
     const std::uint32_t* const k = chunk_keys.data + c * kProjectChunk;
-    std::uint32_t n = 0;
-    for (std::uint32_t i = 0; i < counts[c]; ++i) n += range.contains(k[i]) ? 1u : 0u;
+    const std::uint32_t count = drawn.empty() || drawn[c] < counts[c] ? counts[c] : 0;
+    std::uint32_t n = 0, most = 0;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const bool in = range.contains(k[i]);
+      n += in ? 1u : 0u;
+      const std::uint32_t key = in ? k[i] : 0u;
+      most = key > most ? key : most;
+    }
     taken[c] = n;
+    largest[c] = most;
+    if (!drawn.empty()) drawn[c] += n;
   }
 };
 
-/// Source of a sort that reads the list of GatherSlot directly from the chunks, in blocks of about equal
-/// numbers of splats.
-struct VisibleSource {
+/// Kernel that writes the records of the visible splats in slot order, for blocks of chunks with about
+/// the same number of splats. `record(key, slot)` makes a record; keys are without `base`.
+template <class Record>
+struct GatherRecords {
   static constexpr std::size_t kMostBlocks = 64;
   View<const std::uint32_t> chunk_keys, counts, taken;
   KeyRange range;
   std::uint32_t base;  ///< subtracted from all keys; no key is less
-  std::array<std::size_t, kMostBlocks + 1> first_chunk;
+  Record record;
+  View<std::uint64_t> records;
+  std::size_t blocks = 1;
+  /// Each block's first chunk, and the place of its first record.
+  std::array<std::size_t, kMostBlocks + 1> first_chunk{}, first_record{};
 
-  /// Cuts the chunks so that each block has about the same number of splats.
-  void split_by(const SortBlocks& split) noexcept {
-    first_chunk[0] = 0;
-    std::size_t block = 1, seen = 0;
-    for (std::size_t c = 0; c < taken.size && block < split.blocks; ++c) {
-      while (block < split.blocks && seen >= split.begin(block)) first_chunk[block++] = c;
+  /// Cuts the chunks into blocks.
+  void split(std::size_t n) noexcept {
+    blocks = n;
+    std::size_t block = 0, seen = 0;
+    for (std::size_t c = 0; c < taken.size; ++c) {
+      for (; block < n && seen >= BlockRange::of(block, n, records.size).begin; ++block) {
+        first_chunk[block] = c;
+        first_record[block] = seen;
+      }
       seen += taken[c];
     }
-    for (; block <= split.blocks; ++block) first_chunk[block] = taken.size;
+    for (; block <= n; ++block) {
+      first_chunk[block] = taken.size;
+      first_record[block] = seen;
+    }
   }
-  template <class F>
-  GSNAV_HD void for_each(std::size_t block, const F& f) const noexcept {
+  GSNAV_HD void operator()(std::size_t block) const noexcept {
+    std::uint64_t* out = records.data + first_record[block];
     for (std::size_t c = first_chunk[block]; c < first_chunk[block + 1]; ++c) {
       const std::uint32_t* const k = chunk_keys.data + c * kProjectChunk;
       const std::uint32_t n = counts[c], slot = static_cast<std::uint32_t>(c * kProjectChunk);
       if (taken[c] == n) {
-        for (std::uint32_t i = 0; i < n; ++i) f(k[i] - base, slot + i);
+        for (std::uint32_t i = 0; i < n; ++i) out[i] = record(k[i] - base, slot + i);
+        out += n;
       } else if (taken[c] != 0) {
-        for (std::uint32_t i = 0; i < n; ++i) {
-          if (range.contains(k[i])) f(k[i] - base, slot + i);
+        // Without a branch, which could not be predicted.
+        std::uint64_t* const end = out + taken[c];
+        for (std::uint32_t i = 0; out != end; ++i) {
+          *out = record(k[i] - base, slot + i);
+          out += range.contains(k[i]) ? 1 : 0;
         }
       }
     }
   }
 };
 
-/// Kernel that sorts slots of equal keys by rank. Work item i handles the run of equal keys that starts
-/// at i.
-struct RankTies {
-  View<const std::uint32_t> keys, ranks;
-  View<std::uint32_t> order;
-  GSNAV_HD void operator()(std::size_t i) const noexcept {
-    const std::size_t n = keys.size;
-    if (i + 1 >= n || keys[i + 1] != keys[i] || (i > 0 && keys[i - 1] == keys[i])) return;
-    std::size_t end = i + 2;
-    while (end < n && keys[end] == keys[i]) ++end;
-    heap_sort(order.data + i, end - i);
+/// Record of a pair of key and slot.
+struct PairRecord {
+  GSNAV_HD std::uint64_t operator()(std::uint32_t key, std::uint32_t slot) const noexcept {
+    return std::uint64_t{key} << 32 | slot;
   }
-
- private:
-  /// Heap sort: ties are usually few, but a wall parallel to the image can make one long run. It takes n
-  /// log n steps, in place and without recursion.
-  GSNAV_HD void heap_sort(std::uint32_t* slots, std::size_t n) const noexcept {
-    for (std::size_t root = n / 2; root-- > 0;) sift_down(slots, root, n);
-    for (std::size_t end = n; end-- > 1;) {
-      const std::uint32_t last = slots[end];
-      slots[end] = slots[0];
-      slots[0] = last;
-      sift_down(slots, 0, end);
-    }
-  }
-  GSNAV_HD void sift_down(std::uint32_t* slots, std::size_t root, std::size_t n) const noexcept {
-    const std::uint32_t slot = slots[root];
-    for (std::size_t child; (child = 2 * root + 1) < n; root = child) {
-      if (child + 1 < n && ranks[slots[child + 1]] > ranks[slots[child]]) ++child;
-      if (ranks[slots[child]] <= ranks[slot]) break;
-      slots[root] = slots[child];
-    }
-    slots[root] = slot;
+};
+/// Record of a SplatEntry, without the lowest `dropped` bits of the key.
+struct EntryRecord {
+  SplatEntry entry;
+  View<const std::uint32_t> words;
+  int dropped;
+  GSNAV_HD std::uint64_t operator()(std::uint32_t key, std::uint32_t slot) const noexcept {
+    return entry(key >> dropped, words[slot], slot);
   }
 };
 
-/// RankTies with one work item per kRange keys. It tests many keys at a time for equality, since most
-/// have no equal neighbour.
-struct RankTiesOfRange {
-  static constexpr std::size_t kRange = 4096;
-  RankTies ties;
+/// Sorted pairs in which slots of equal keys are to be sorted by rank.
+struct PairTies {
+  View<const std::uint32_t> keys, ranks;
+  View<std::uint32_t> items;
+  GSNAV_HD bool equal(std::size_t i) const noexcept { return keys[i] == keys[i + 1]; }
+  GSNAV_HD bool less(std::uint32_t a, std::uint32_t b) const noexcept { return ranks[a] < ranks[b]; }
+};
+/// Sorted entries in which those with equal upper bits of the key are to be sorted by the key, then by
+/// rank, or by slot if there are no ranks.
+struct EntryTies {
+  View<const std::uint32_t> keys, ranks;  ///< [slots]
+  SplatEntry entry;
+  View<std::uint64_t> items;
+  GSNAV_HD bool equal(std::size_t i) const noexcept {
+    return (items[i] ^ items[i + 1]) >> entry.key_shift() == 0;
+  }
+  GSNAV_HD bool less(std::uint64_t a, std::uint64_t b) const noexcept {
+    const std::uint32_t x = entry.slot(a), y = entry.slot(b);
+    if (keys[x] != keys[y]) return keys[x] < keys[y];
+    return ranks.empty() ? x < y : ranks[x] < ranks[y];
+  }
+};
+
+/// Kernel that sorts ties. Work item i handles the run of equal items that starts at i.
+template <class Ties>
+struct SortTies {
+  Ties ties;
+  GSNAV_HD void operator()(std::size_t i) const noexcept {
+    const std::size_t n = ties.items.size;
+    if (i + 1 >= n || !ties.equal(i) || (i > 0 && ties.equal(i - 1))) return;
+    std::size_t end = i + 2;
+    while (end < n && ties.equal(end - 1)) ++end;
+    sort_in_place(ties.items.data + i, end - i,
+                  [this](auto a, auto b) GSNAV_INLINED { return ties.less(a, b); });
+  }
+};
+
+/// SortTies with one work item per kRange items. It tests kStep items without a branch for each, since
+/// most have no equal neighbour.
+template <class Ties>
+struct SortTiesOfRange {
+  static constexpr std::size_t kRange = 4096, kStep = 32;
+  SortTies<Ties> one;
   GSNAV_HD void operator()(std::size_t range) const noexcept {
-    constexpr std::size_t kStep = 32;
-    const std::uint32_t* const keys = ties.keys.data;
-    const std::size_t n = ties.keys.size, end = (range + 1) * kRange < n ? (range + 1) * kRange : n;
+    const std::size_t n = one.ties.items.size, end = (range + 1) * kRange < n ? (range + 1) * kRange : n;
     std::size_t i = range * kRange;
     for (; i + kStep < end; i += kStep) {
       std::uint32_t equal = 0;
-      for (std::size_t k = i; k < i + kStep; ++k) equal |= keys[k] == keys[k + 1] ? 1u : 0u;
-      for (std::size_t k = i; equal != 0 && k < i + kStep; ++k) ties(k);
+      for (std::size_t k = 0; k < kStep; ++k)
+        equal |= static_cast<std::uint32_t>(one.ties.equal(i + k)) << k;
+      for (; equal != 0; equal &= equal - 1) one(i + static_cast<std::size_t>(std::countr_zero(equal)));
     }
-    for (; i < end; ++i) ties(i);
+    for (; i < end; ++i) one(i);
   }
 };
+
+/// Numbers of visible splats: of each chunk, of them in a range of keys, and the sum of the latter.
+struct VisibleCounts {
+  View<const std::uint32_t> counts, taken;
+  std::size_t visible;
+};
+
+/// Sorts the records of the visible splats in a range of keys by their bits [low, low + bits) into
+/// `sink`.
+template <class Record, class Sink, Backend B>
+void sort_visible(B& backend, VisibleOrder<B>& v, const VisibleCounts& n, const KeyRange& range,
+                  std::uint32_t base, const Record& record, int low, int bits, const Sink& sink) {
+  v.sort.second.resize_discard(n.visible);
+  const View<std::uint64_t> records = v.sort.second.view();
+  const auto split = SortBlocks::of(n.visible, sort_blocks(backend, n.visible));
+  GatherRecords<Record> gather{v.chunk_keys.view(), n.counts, n.taken, range, base, record, records};
+  gather.split(split.blocks);
+  backend.parallel_for(split.blocks, gather);
+  sort_from(backend, RecordSource{{records.data, records.size}, split}, split, low, bits, v.sort, sink);
+}
+
+/// Sorts the ties of sorted items.
+template <class Ties, Backend B>
+void sort_ties(B& backend, const Ties& ties) {
+  if constexpr (is_host_backend<B>) {
+    constexpr std::size_t kRange = SortTiesOfRange<Ties>::kRange;
+    backend.parallel_for((ties.items.size + kRange - 1) / kRange, SortTiesOfRange<Ties>{{ties}});
+  } else {
+    backend.parallel_for(ties.items.size, SortTies<Ties>{ties});
+  }
+}
 
 }  // namespace detail
 
@@ -188,8 +279,10 @@ Result<std::size_t> order_visible(B& backend, VisibleOrder<B>& v, std::uint32_t 
   if constexpr (is_host_backend<B>) {
     if (!range.whole()) {
       v.taken.resize_discard(chunks);
-      backend.parallel_for(chunks,
-                           detail::CountInRange{v.chunk_keys.view(), counts, range, v.taken.view()});
+      v.largest.resize_discard(chunks);
+      backend.parallel_for(
+          chunks, detail::CountInRange{
+                      v.chunk_keys.view(), counts, range, v.taken.view(), v.largest.view(), {}});
       taken = v.taken.view();
     }
   }
@@ -200,10 +293,8 @@ Result<std::size_t> order_visible(B& backend, VisibleOrder<B>& v, std::uint32_t 
   if (visible == 0) return visible;
 
   if constexpr (is_host_backend<B>) {
-    const auto split = detail::SortBlocks::of(visible, sort_blocks(backend, visible));
-    detail::VisibleSource source{v.chunk_keys.view(), counts, taken, range, base, {}};
-    source.split_by(split);
-    sort_from(backend, source, split, bits, v.sort, v.keys.view(), v.order.view());
+    detail::sort_visible(backend, v, {counts, taken, visible}, range, base, detail::PairRecord{}, 32,
+                         bits, detail::PairSink{v.keys.view(), v.order.view()});
   } else {
     v.host_offsets.resize(chunks);
     std::uint64_t sum = 0;
@@ -216,16 +307,41 @@ Result<std::size_t> order_visible(B& backend, VisibleOrder<B>& v, std::uint32_t 
                                                    v.offsets.view(), v.keys.view(), v.order.view()});
     sort_pairs(backend, v.keys, v.order, v.sort, bits);
   }
-  if (v.ranks.size() != 0) {
-    const detail::RankTies ties{v.keys.view(), v.ranks.view(), v.order.view()};
-    if constexpr (is_host_backend<B>) {
-      constexpr std::size_t kRange = detail::RankTiesOfRange::kRange;
-      backend.parallel_for((visible + kRange - 1) / kRange, detail::RankTiesOfRange{ties});
-    } else {
-      backend.parallel_for(visible, ties);
-    }
-  }
+  if (v.ranks.size() != 0)
+    detail::sort_ties(backend, detail::PairTies{v.keys.view(), v.ranks.view(), v.order.view()});
   return visible;
+}
+
+/// order_visible() for backends that bin by entries (SplatEntry): sorts the visible splats whose key is
+/// in `range` front to back. Returns their entries, which hold until `v` is used again.
+template <Backend B>
+requires is_host_backend<B> View<const std::uint64_t> order_entries(B& backend, VisibleOrder<B>& v,
+                                                                    const SplatEntry& entry,
+                                                                    std::uint32_t base,
+                                                                    const KeyRange& range) {
+  const std::size_t chunks = v.counts.size();
+  v.taken.resize_discard(chunks);
+  v.largest.resize_discard(chunks);
+  backend.parallel_for(chunks, detail::CountInRange{v.chunk_keys.view(), v.counts.view(), range,
+                                                    v.taken.view(), v.largest.view(), v.drawn.view()});
+  std::size_t visible = 0;
+  std::uint32_t largest = base;
+  for (std::size_t c = 0; c < chunks; ++c) {
+    visible += v.taken.data()[c];
+    largest = largest > v.largest.data()[c] ? largest : v.largest.data()[c];
+  }
+  if (visible == 0) return {};
+  const int width = static_cast<int>(std::bit_width(largest - base));
+  const int bits = width < entry.key_bits() ? width : entry.key_bits(), dropped = width - bits;
+
+  v.entries.resize_discard(visible);
+  const View<std::uint64_t> entries = v.entries.view();
+  detail::sort_visible(backend, v, {v.counts.view(), v.taken.view(), visible}, range, base,
+                       detail::EntryRecord{entry, v.words.view(), dropped}, entry.key_shift(), bits,
+                       detail::RecordSink{entries});
+  if (dropped != 0 || v.ranks.size() != 0)
+    detail::sort_ties(backend, detail::EntryTies{v.chunk_keys.view(), v.ranks.view(), entry, entries});
+  return {entries.data, entries.size};
 }
 
 }  // namespace gsnav
