@@ -87,7 +87,7 @@ class TileBlender {
   void load_batch(std::uint64_t first, int n) noexcept {
     const std::uint32_t* ids = args_.tile_splats.data + first;
     // Records are in the order of slots, not of the tile, so prefetch them.
-    constexpr std::uint64_t kAhead = 16;
+    constexpr std::uint64_t kAhead = 64;
     const std::uint64_t left = args_.tile_splats.size - first;
     for (int j = 0; j < n; ++j) {
       if (static_cast<std::uint64_t>(j) + kAhead < left) {
