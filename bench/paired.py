@@ -55,6 +55,9 @@ def main():
     parser.add_argument("--every", type=int, default=1, help="draw every n-th view")
     options = parser.parse_args()
     names = [row.rpartition(":")[::2] for row in options.rows]
+    for row, (program, what) in zip(options.rows, names):
+        if "/" not in what or not os.access(program, os.X_OK):
+            parser.error(f"{row}: must be a program that exists, `:`, and an output and a profile such as rgb/fast")
     engines = {program: None for program, _ in names}
     for program in engines:
         engines[program] = Engine(os.path.abspath(program), options)
