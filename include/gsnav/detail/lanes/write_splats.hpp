@@ -233,10 +233,9 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
         if (!out.spans.empty()) detail::copy_record<4>(out.spans[at], bounds + 8 * l + 4);
       }
       if (depth) {
-        float both[13];
-        std::memcpy(both, depths[0] + 8 * l, 8 * sizeof(float));
-        std::memcpy(both + 8, depths[1] + 8 * l, 5 * sizeof(float));
-        detail::copy_record<13>(out.depths[at], both);
+        char* const to = reinterpret_cast<char*>(&out.depths[at]);
+        std::memcpy(to, depths[0] + 8 * l, 8 * sizeof(float));
+        std::memcpy(to + 8 * sizeof(float), depths[1] + 8 * l, 5 * sizeof(float));
       }
     }
     kept |= 1u << l;
