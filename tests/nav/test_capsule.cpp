@@ -9,6 +9,7 @@
 #include "capsule_oracle.hpp"
 #include "gsnav/sweep/capsule.hpp"
 #include "gsnav/sweep/sweep.hpp"
+#include "support/random_cases.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -96,12 +97,12 @@ SweepCount check_sweeps(int n, double step, double speed) {
 }  // namespace
 
 TEST_CASE("segments: distance against a search in long double") {
-  CHECK(worst_error<float>(20000, -1) <= 1e-5);
-  CHECK(worst_error<float>(20000, 1e-4) <= 1e-5);
-  CHECK(worst_error<float>(20000, 1e-7) <= 1e-5);
-  CHECK(worst_error<double>(20000, -1) <= 1e-13);
-  CHECK(worst_error<double>(20000, 1e-9) <= 1e-13);
-  CHECK(worst_error<long double>(5000, -1) <= 1e-15);
+  CHECK(worst_error<float>(cases(20000), -1) <= 1e-5);
+  CHECK(worst_error<float>(cases(20000), 1e-4) <= 1e-5);
+  CHECK(worst_error<float>(cases(20000), 1e-7) <= 1e-5);
+  CHECK(worst_error<double>(cases(20000), -1) <= 1e-13);
+  CHECK(worst_error<double>(cases(20000), 1e-9) <= 1e-13);
+  CHECK(worst_error<long double>(cases(5000), -1) <= 1e-15);
 }
 
 TEST_CASE("oracle: its two distances agree") {
