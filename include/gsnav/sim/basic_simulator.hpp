@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// BasicSimulator. Programs that draw a simulator's scene by themselves find SceneOnBackend and CutSets
+// here, too (detail/sim/scene_on_backend.hpp and scene_levels.hpp).
+
 #include <cstdint>
 #include <memory>
 #include <utility>
 #include <vector>
 
+#include "gsnav/detail/sim/scene_levels.hpp"
 #include "gsnav/detail/sim/scene_on_backend.hpp"
 #include "gsnav/detail/sim/sensor_rig.hpp"
 #include "gsnav/sim/config.hpp"
