@@ -25,7 +25,8 @@ template <class L>
 GSNAV_HD Skinned<L> skin(const DualQuat<L>& blend, const Vec3<L>& mean, const Quat<L>& quat) noexcept {
   Skinned<L> out;
   out.rotation = detail::unit(blend.real);
-  out.mean = detail::moved(rotation_matrix(out.rotation), translation_of(blend), mean);
+  const Vec3<L> translation = translation_of(blend);  // before the matrix: fewer registers on a GPU
+  out.mean = detail::moved(rotation_matrix(out.rotation), translation, mean);
   out.quat = detail::unit(out.rotation * quat);
   return out;
 }
