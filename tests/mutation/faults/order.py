@@ -49,9 +49,9 @@ FAULTS = [
           "    if (open.any(corner(0), corner(1), corner(2), corner(3))) found |= 1u << l;\n",
           "    if (open.any(corner(0), corner(1), corner(0) + 1, corner(1) + 1)) found |= 1u << l;\n",
           "tests/hard_cases/test_slices.cpp", "N65_cull_invariance of slices of depth"),
-    fault("ties_in_sorted_order", "SortTies",
-          "    sort_in_place(ties.items.data + i, end - i,\n"
-          "                  [this](auto a, auto b) GSNAV_INLINED { return ties.less(a, b); });\n", "",
+    fault("ties_in_sorted_order", "sort_run",
+          "  sort_in_place(ties.items.data + i, after - i,\n"
+          "                [&ties](auto a, auto b) GSNAV_INLINED { return ties.less(a, b); });\n", "",
           CULLING, "N21_depth_ties_keep_file_order when rows are sorted in space"),
     fault("perspective_box_centred", "add_perspective",
           "  out.center_x = select(ellipse, center_x, zero);\n"

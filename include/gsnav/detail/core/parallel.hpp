@@ -178,38 +178,6 @@ struct RecordSink {
   }
 };
 
-/// Sorts `n` items in place, by `less`. Insertion for a few; else a heap sort, which takes n log n steps
-/// in place and without recursion.
-template <class T, class Less>
-GSNAV_HD void sort_in_place(T* items, std::size_t n, const Less& less) noexcept {
-  constexpr std::size_t kFew = 12;
-  if (n <= kFew) {
-    for (std::size_t i = 1; i < n; ++i) {
-      const T item = items[i];
-      std::size_t at = i;
-      for (; at > 0 && less(item, items[at - 1]); --at) items[at] = items[at - 1];
-      items[at] = item;
-    }
-    return;
-  }
-  const auto sift_down = [items, &less](std::size_t root, std::size_t size) GSNAV_INLINED {
-    const T item = items[root];
-    for (std::size_t child; (child = 2 * root + 1) < size; root = child) {
-      if (child + 1 < size && less(items[child], items[child + 1])) ++child;
-      if (!less(item, items[child])) break;
-      items[root] = items[child];
-    }
-    items[root] = item;
-  };
-  for (std::size_t root = n / 2; root-- > 0;) sift_down(root, n);
-  for (std::size_t end = n; end-- > 1;) {
-    const T last = items[end];
-    items[end] = items[0];
-    items[0] = last;
-    sift_down(0, end);
-  }
-}
-
 }  // namespace detail
 
 /// Scratch memory of sorts.

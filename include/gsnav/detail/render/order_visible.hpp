@@ -14,6 +14,7 @@
 #include "gsnav/core/view.hpp"
 #include "gsnav/detail/core/parallel.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
+#include "gsnav/detail/render/sort_ties.hpp"
 #include "gsnav/frame/gaussians.hpp"
 
 namespace gsnav {
@@ -171,62 +172,6 @@ struct EntryRecord {
   }
 };
 
-/// Sorted pairs in which slots of equal keys are to be sorted by rank.
-struct PairTies {
-  View<const std::uint32_t> keys, ranks;
-  View<std::uint32_t> items;
-  GSNAV_HD bool equal(std::size_t i) const noexcept { return keys[i] == keys[i + 1]; }
-  GSNAV_HD bool less(std::uint32_t a, std::uint32_t b) const noexcept { return ranks[a] < ranks[b]; }
-};
-/// Sorted entries in which those with equal upper bits of the key are to be sorted by the key, then by
-/// rank, or by slot if there are no ranks.
-struct EntryTies {
-  View<const std::uint32_t> keys, ranks;  ///< [slots]
-  SplatEntry entry;
-  View<std::uint64_t> items;
-  GSNAV_HD bool equal(std::size_t i) const noexcept {
-    return (items[i] ^ items[i + 1]) >> entry.key_shift() == 0;
-  }
-  GSNAV_HD bool less(std::uint64_t a, std::uint64_t b) const noexcept {
-    const std::uint32_t x = entry.slot(a), y = entry.slot(b);
-    if (keys[x] != keys[y]) return keys[x] < keys[y];
-    return ranks.empty() ? x < y : ranks[x] < ranks[y];
-  }
-};
-
-/// Kernel that sorts ties. Work item i handles the run of equal items that starts at i.
-template <class Ties>
-struct SortTies {
-  Ties ties;
-  GSNAV_HD void operator()(std::size_t i) const noexcept {
-    const std::size_t n = ties.items.size;
-    if (i + 1 >= n || !ties.equal(i) || (i > 0 && ties.equal(i - 1))) return;
-    std::size_t end = i + 2;
-    while (end < n && ties.equal(end - 1)) ++end;
-    sort_in_place(ties.items.data + i, end - i,
-                  [this](auto a, auto b) GSNAV_INLINED { return ties.less(a, b); });
-  }
-};
-
-/// SortTies with one work item per kRange items. It tests kStep items without a branch for each, since
-/// most have no equal neighbour.
-template <class Ties>
-struct SortTiesOfRange {
-  static constexpr std::size_t kRange = 4096, kStep = 32;
-  SortTies<Ties> one;
-  GSNAV_HD void operator()(std::size_t range) const noexcept {
-    const std::size_t n = one.ties.items.size, end = (range + 1) * kRange < n ? (range + 1) * kRange : n;
-    std::size_t i = range * kRange;
-    for (; i + kStep < end; i += kStep) {
-      std::uint32_t equal = 0;
-      for (std::size_t k = 0; k < kStep; ++k)
-        equal |= static_cast<std::uint32_t>(one.ties.equal(i + k)) << k;
-      for (; equal != 0; equal &= equal - 1) one(i + static_cast<std::size_t>(std::countr_zero(equal)));
-    }
-    for (; i < end; ++i) one(i);
-  }
-};
-
 /// Numbers of visible splats: of each chunk, of them in a range of keys, and the sum of the latter.
 struct VisibleCounts {
   View<const std::uint32_t> counts, taken;
@@ -245,17 +190,6 @@ void sort_visible(B& backend, VisibleOrder<B>& v, const VisibleCounts& n, const 
   gather.split(split.blocks);
   backend.parallel_for(split.blocks, gather);
   sort_from(backend, RecordSource{{records.data, records.size}, split}, split, low, bits, v.sort, sink);
-}
-
-/// Sorts the ties of sorted items.
-template <class Ties, Backend B>
-void sort_ties(B& backend, const Ties& ties) {
-  if constexpr (is_host_backend<B>) {
-    constexpr std::size_t kRange = SortTiesOfRange<Ties>::kRange;
-    backend.parallel_for((ties.items.size + kRange - 1) / kRange, SortTiesOfRange<Ties>{{ties}});
-  } else {
-    backend.parallel_for(ties.items.size, SortTies<Ties>{ties});
-  }
 }
 
 }  // namespace detail
