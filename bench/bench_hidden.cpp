@@ -18,7 +18,6 @@
 
 #include "frame_stages.hpp"
 #include "gsnav/backends/openmp.hpp"
-#include "gsnav/backends/serial.hpp"
 #include "gsnav/detail/render/count_culled.hpp"
 #include "workload.hpp"
 
@@ -53,8 +52,7 @@ Shares shares_of(OpenMPBackend& backend, const GaussianCloud& cloud, const Camer
   RenderConfig config;
   config.tuning.tile_size = 16;
   config.outputs = kAlpha;
-  SerialBackend serial;  // a backend that writes the bounds of all splats
-  const FrameStages<float, SerialBackend> stages(serial, cloud, camera, config);
+  const FrameStages<float, OpenMPBackend> stages(backend, cloud, camera, config);
   const BinArgs<float>& bins = stages.bins();
   const BlendRules<float> rules = blend_rules<float>(config);
   std::vector<BlendState<float, DepthMode::none>> pixels(std::size_t{kSide} * kSide);

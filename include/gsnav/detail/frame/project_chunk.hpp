@@ -80,7 +80,7 @@ struct ProjectOutputs {
   View<std::uint32_t> counts;
   TileGrid grid;  ///< read if `spans` is not empty
   /// Tiles of each slot's splat, for backends that find them during projection; else empty. Where a word
-  /// has the tiles, neither `bounds` nor `spans` is written.
+  /// has the tiles, `spans` is not written.
   View<std::uint32_t> words;
   View<TileSpans> spans;
   OpenSquares open;  ///< Backends may skip splats that reach none of these squares.

@@ -228,10 +228,9 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
       words[l] = 0;
     } else {
       detail::copy_record<8>(out.geometry[at], geometry + 8 * l);
-      if ((words[l] & TileWord::kMask) == 0) {
-        detail::copy_record<4>(out.bounds[at], bounds + 8 * l);
-        if (!out.spans.empty()) detail::copy_record<4>(out.spans[at], bounds + 8 * l + 4);
-      }
+      detail::copy_record<4>(out.bounds[at], bounds + 8 * l);
+      if ((words[l] & TileWord::kMask) == 0 && !out.spans.empty())
+        detail::copy_record<4>(out.spans[at], bounds + 8 * l + 4);
       if (depth) {
         char* const to = reinterpret_cast<char*>(&out.depths[at]);
         std::memcpy(to, depths[0] + 8 * l, 8 * sizeof(float));
