@@ -31,7 +31,7 @@ F root(F x) noexcept {
   return gsnav::sqrt(gsnav::max(x, F(0.0f)));
 }
 
-Ints truncated(F x) noexcept { return __builtin_convertvector(x.v, Ints); }
+Ints whole(F x) noexcept { return __builtin_convertvector(x.v, Ints); }
 
 /// Ellipses of many pairs (splat, tile) by planes, relative to the tile's corner. Planes: mean, half
 /// width, height at which the right edge is farthest, 1 / half height, slope of the middle line.
@@ -62,7 +62,7 @@ Ints block_masks(const Ellipses& e, std::size_t i) noexcept {
     const F reached = gsnav::clamp(fma(right_mid + right_half, F(0.25f), F(0.875f)), F(0.0f), F(4.0f));
     const F nearest = gsnav::clamp(F(0.0f), low, high) * inv;  // the strip's row nearest to the mean
     const F end = select(nearest * nearest <= F(1.0f), reached, F(0.0f));
-    const Ints row = ((one << truncated(end)) - 1) & -(one << (truncated(begin) - 1));
+    const Ints row = ((one << whole(end)) - 1) & -(one << (whole(begin) - 1));
     masks |= row << (4 * strip);
   }
   return masks;
