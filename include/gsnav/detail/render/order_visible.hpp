@@ -116,13 +116,11 @@ struct GatherRecords {
   std::uint32_t base;  ///< subtracted from all keys; no key is less
   Record record;
   View<std::uint64_t> records;
-  std::size_t blocks = 1;
   /// Each block's first chunk, and the place of its first record.
   std::array<std::size_t, kMostBlocks + 1> first_chunk{}, first_record{};
 
-  /// Cuts the chunks into blocks.
+  /// Cuts the chunks into n blocks.
   void split(std::size_t n) noexcept {
-    blocks = n;
     std::size_t block = 0, seen = 0;
     for (std::size_t c = 0; c < taken.size; ++c) {
       for (; block < n && seen >= BlockRange::of(block, n, records.size).begin; ++block) {
