@@ -137,7 +137,7 @@ bool project(const gsnav::GaussianCloud& cloud, std::size_t n, const gsnav::Came
   Real mean[3];
   for (std::size_t k = 0; k < 3; ++k) mean[k] = cloud.means[k][n];
   if (!cloud.origins.empty()) {
-    const auto& origin = cloud.origins[cloud.origin_ids[n]];
+    const auto& origin = cloud.origins[cloud.origin_ids.empty() ? 0 : cloud.origin_ids[n]];
     mean[0] += origin.x;
     mean[1] += origin.y;
     mean[2] += origin.z;
