@@ -13,11 +13,6 @@ namespace {
 
 using Policy = cuda::policy::Regions;
 
-/// Largest squared radius of a footprint, in standard deviations.
-double largest_radius2(const RenderConfig& config) {
-  return -log2_alpha_min(config.quality) / (kWhitenScale * kWhitenScale);
-}
-
 /// Pixels outside the image at which a record may need double (detail::needs_double). The whitened form
 /// of a pixel is at most this factor times its distance.
 double whitened_per_pixel(const GaussianSet& set) {
@@ -99,7 +94,7 @@ void CudaBatchRenderer::State::plan_regions(std::span<const GaussianSet> sets,
   args.tiles = args.cameras * static_cast<std::uint32_t>(args.grid.count());
   args.log2_alpha_min = static_cast<float>(log2_alpha_min(config.quality));
   args.elliptic = true;
-  const double radius2 = largest_radius2(config);
+  const double radius2 = footprint_radius2(-log2_alpha_min(config.quality));  // of an opaque Gaussian
   cuda::RegionArgs& r = region_args;
   r.columns = (first.width + cuda::kRegion - 1) / cuda::kRegion;
   r.rows = (first.height + cuda::kRegion - 1) / cuda::kRegion;

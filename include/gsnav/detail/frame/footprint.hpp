@@ -14,15 +14,50 @@ struct PixelColumns {
   L first, end;  ///< valid if `any`
 };
 
+/// Ellipse of a splat's footprint, without its size r. With a, b, k of SplatGeometry, and X, Y from the
+/// mean, it is (a X)^2 + (k X + b Y)^2 = r^2. Its edges in the row of pixel centres at Y are -s Y
+/// +- sqrt((r^2 - (beta Y)^2) / alpha^2), where alpha^2 = a^2 + k^2, s = k b / alpha^2 and beta = a b /
+/// alpha.
+///
+/// @tparam Rough uses sqrt_above and reciprocal_near
+template <class L, bool Rough = false>
+struct FootprintEllipse {
+  L inv_a, inv_b;    ///< 1 / a, 1 / b
+  L mean_x, mean_y;  ///< mean, from the reference pixel
+  L pulled;          ///< k mean_x, a term of mean_y
+  L aa, inv_aa;      ///< alpha^2, 1 / alpha^2
+  L slope, beta2;    ///< s, beta^2
+
+  GSNAV_HD explicit FootprintEllipse(const SplatGeometry<L>& g) noexcept
+      : inv_a(inverse(g.a)),
+        inv_b(inverse(g.b)),
+        mean_x(-(g.w1 * inv_a)),
+        pulled(g.k * mean_x),
+        aa(fma(g.a, g.a, g.k * g.k)),
+        inv_aa(inverse(aa)) {
+    mean_y = -((pulled + g.w2) * inv_b);
+    slope = (g.k * g.b) * inv_aa;
+    const L beta = g.a * g.b;
+    beta2 = (beta * beta) * inv_aa;
+  }
+
+  GSNAV_HD static L root(L a) noexcept {
+    if constexpr (Rough) return sqrt_above(a);
+    return sqrt(a);
+  }
+  GSNAV_HD static L inverse(L a) noexcept {
+    if constexpr (Rough) return reciprocal_near(a);
+    return L(scalar_of<L>(1)) / a;
+  }
+};
+
 /// Columns that the ellipse of a splat's footprint covers in horizontal strips. Tiles, and blocks of a
 /// tile, are listed by it. L is one splat, or a pack with one splat per lane. The result contains all
 /// pixels that pass the pixel test in scalar_of<L>, because the ellipse is enlarged by the rounding of
 /// both computations.
 ///
-/// With a, b, k of SplatGeometry, the ellipse is (a X)^2 + (k X + b Y)^2 = r^2. Its right edge is -s Y
-/// + sqrt((r^2 - (beta Y)^2) / alpha^2), where alpha^2 = a^2 + k^2, s = k b / alpha^2 and beta = a b /
-/// alpha. The edge is concave with its maximum at Y* = -k r / (a b). A strip's rightmost point is
-/// therefore at Y* clamped to the strip, and its leftmost point at -Y* clamped.
+/// The right edge of FootprintEllipse is concave with its maximum at Y* = -k r / (a b). A strip's
+/// rightmost point is therefore at Y* clamped to the strip, and its leftmost point at -Y* clamped.
 ///
 /// @tparam Rough uses sqrt_above and reciprocal_near: faster; lengths are up to 0.3 % larger
 template <class L, bool Rough = false>
@@ -38,37 +73,31 @@ class FootprintStrips {
   GSNAV_HD FootprintStrips(const SplatGeometry<L>& g, S log2_alpha_min, L x0, L x1, L y0,
                            L y1) noexcept {
     const L zero(S(0));
-    const L inv_a = inverse(g.a), inv_b = inverse(g.b);
-    const L mean_x = -(g.w1 * inv_a);
-    const L pulled = g.k * mean_x;
-    const L mean_y = -((pulled + g.w2) * inv_b);
-    const L aa = fma(g.a, g.a, g.k * g.k);
-    const L inv_aa = inverse(aa);
-    slope_ = (g.k * g.b) * inv_aa;
-    const L beta = g.a * g.b;
-    beta2_ = (beta * beta) * inv_aa;
-    inv_alpha_ = root(inv_aa);
+    const Ellipse e(g);
+    slope_ = e.slope;
+    beta2_ = e.beta2;
+    inv_alpha_ = root(e.inv_aa);
 
     // The error of w in the pixel test, and of the centre here, is a few roundings of this size.
     const L far_x = max(abs(x0 - g.ref_x), abs(x1 - g.ref_x));
     const L far_y = max(abs(y0 - g.ref_y), abs(y1 - g.ref_y));
     const L k = abs(g.k);
-    const L size = fma(g.a + k, far_x, fma(g.b, far_y, abs(g.w1) + abs(g.w2) + abs(pulled)));
+    const L size = fma(g.a + k, far_x, fma(g.b, far_y, abs(g.w1) + abs(g.w2) + abs(e.pulled)));
     const L edge = root(max(g.log2_opacity - L(log2_alpha_min), zero));
     const L r = fma(size, L(S(2e-6)), edge * L(S(1.000002)));
     r2_ = r * r;
-    turn_y_ = ((k * r) * inv_a) * inv_b;
+    turn_y_ = ((k * r) * e.inv_a) * e.inv_b;
     negative_k_ = g.k < zero;
     if constexpr (Rough) {
-      half_height_ = (r * root(aa)) * (abs(inv_a) * inv_b);
+      half_height_ = (r * root(e.aa)) * (abs(e.inv_a) * e.inv_b);
     } else {
       half_height_ = r / sqrt(beta2_);
     }
-    center_x_ = g.ref_x + mean_x;
-    center_y_ = g.ref_y + mean_y;
-    pad_x_ =
-        fma(fma(abs(slope_), far_y + abs(mean_y), abs(g.ref_x) + abs(mean_x)), L(S(1e-6)), L(S(1e-3)));
-    pad_y_ = fma(abs(g.ref_y) + abs(mean_y), L(S(1e-6)), L(S(1e-3)));
+    center_x_ = g.ref_x + e.mean_x;
+    center_y_ = g.ref_y + e.mean_y;
+    pad_x_ = fma(fma(abs(slope_), far_y + abs(e.mean_y), abs(g.ref_x) + abs(e.mean_x)), L(S(1e-6)),
+                 L(S(1e-3)));
+    pad_y_ = fma(abs(g.ref_y) + abs(e.mean_y), L(S(1e-6)), L(S(1e-3)));
   }
 
   /// Range [left, right] of x that the ellipse covers for pixel centres in the rows [y0, y1]. Returns
@@ -99,14 +128,8 @@ class FootprintStrips {
   }
 
  private:
-  GSNAV_HD static L root(L a) noexcept {
-    if constexpr (Rough) return sqrt_above(a);
-    return sqrt(a);
-  }
-  GSNAV_HD static L inverse(L a) noexcept {
-    if constexpr (Rough) return reciprocal_near(a);
-    return L(S(1)) / a;
-  }
+  using Ellipse = FootprintEllipse<L, Rough>;
+  GSNAV_HD static L root(L a) noexcept { return Ellipse::root(a); }
 
   L center_x_{}, center_y_{}, pad_x_{}, pad_y_{};
   L slope_{}, beta2_{}, inv_alpha_{}, r2_{};

@@ -11,6 +11,12 @@ namespace gsnav {
 
 /// sqrt(log2(e) / 2). With it, |w|^2 in the whitened coordinates of SplatGeometry is log2(e) q / 2.
 inline constexpr double kWhitenScale = 0.84932180028801904272;
+/// Squared radius of a footprint, in standard deviations. `excess` is log2 of the opacity over the
+/// smallest alpha.
+template <class S>
+GSNAV_HD constexpr S footprint_radius2(S excess) noexcept {
+  return excess * S(1 / (kWhitenScale * kWhitenScale));
+}
 inline constexpr double kLn2 = 0.69314718055994530942;
 
 /// A Gaussian in camera axes: mean, factor M of its covariance M M^T, and cofactors of M.
