@@ -2,7 +2,7 @@
 #include "gsnav/backends/cuda.hpp"
 
 #include "engines_on.hpp"
-#include "gsnav/detail/sim/frame_batch.hpp"
+#include "gsnav/detail/render/frame_batch.hpp"
 
 namespace gsnav::detail {
 namespace {

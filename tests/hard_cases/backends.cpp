@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "hard_cases/arrays.hpp"
+#include "ops/stage_frames.hpp"
 #include "support/image_hashes.hpp"
 #if defined(GSNAV_HAS_CUDA)
 #include "ops/cuda_batch_images.hpp"
@@ -52,6 +53,20 @@ struct UploadedExtras {
   }
 };
 
+/// Draws by BasicRenderer. On a backend with a renderer of batches, which BatchCases draws with, by the
+/// stages.
+template <class S, class B>
+Frames<S> draw(B& backend, std::span<const GaussianSet> sets, std::span<const Camera> cameras,
+               const RenderConfig& config, std::span<const MeshInstance> meshes) {
+  if constexpr (BatchBackend<B>) {
+    return draw_by_stages<S>(backend, sets, cameras, config, {meshes, {}});
+  } else {
+    BasicRenderer<S, B> renderer(backend, config);
+    renderer.set_meshes(meshes);
+    return renderer.render(sets, cameras).value();
+  }
+}
+
 }  // namespace
 
 template <class S, class B>
@@ -59,9 +74,7 @@ Frames<S> CaseRenderer<S, B>::render(const std::vector<Placed>& scene,
                                      const std::vector<Camera>& cameras, const RenderConfig& config,
                                      const std::vector<MeshInstance>& meshes) {
   const Uploaded<B> there(*backend_, scene, meshes);
-  BasicRenderer<S, B> renderer(*backend_, config);
-  renderer.set_meshes(there.instances);
-  Frames<S> frames = renderer.render(there.sets, cameras).value();
+  Frames<S> frames = draw<S>(*backend_, there.sets, cameras, config, there.instances);
   REQUIRE(frames.stats.size() == cameras.size());  // only batches have none
   record_hashes(frames, this->name());
   return frames;
@@ -71,8 +84,7 @@ template <class S, class B>
 Frames<S> CaseRenderer<S, B>::render_with(const GaussianCloud& cloud, const SetExtras& extras,
                                           const Camera& camera, const RenderConfig& config) {
   const UploadedExtras<B> there(*backend_, cloud, extras);
-  BasicRenderer<S, B> renderer(*backend_, config);
-  Frames<S> frames = renderer.render(there.set, camera).value();
+  Frames<S> frames = draw<S>(*backend_, std::span(&there.set, 1), std::span(&camera, 1), config, {});
   REQUIRE(frames.stats.size() == 1);
   record_hashes(frames, this->name());
   return frames;

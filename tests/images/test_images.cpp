@@ -71,24 +71,30 @@ TEST_CASE("images: every storage and selection of rows draws the same bits on ev
     if (scene.on_device && CudaBackend::device_count() > 0) {
       CudaBackend cuda;
       const SceneThere<CudaBackend> there(cuda, scene);
-      const Frames<float> single = draw<float>(cuda, scene, "cuda");
+      const Frames<float> single = draw_by_stages<float>(cuda, there.sets(), std::span(&scene.camera, 1),
+                                                         there.config(), {there.meshes(), {}});
+      record_hashes(single, "cuda, " + scene.name);
       if (there.config().quality.exponential == Exponential::exact) {
         check_same_bits(single, reference);
       } else if (!reference.rgb
                       .empty()) {  // the device has an exponential of its own there (docs/notes/cuda.md)
         CHECK(image_error(single.rgb, reference.rgb, 3).psnr > 80);
       }
-      for (const bool by_regions : {false, true}) {
-        if (!scene.in_batches) break;
-        CudaBatchRenderer renderer(cuda, there.config());
-        renderer.set_least_of_regions(by_regions ? 1 : 2, 0);
-        const Batch batch = draw_batch(cuda, renderer, there.sets(), {scene.camera}, {},
-                                       scene.config.outputs, false, {MeshFrame{there.meshes(), {}}});
-        if (by_regions && !batch.stats.by_regions) continue;
-        by_regions_count += by_regions ? 1 : 0;
-        record_hashes(batch.frames, (by_regions ? "cuda regions, " : "cuda batch, ") + scene.name);
-        check_same_bits(batch.frames, single);
-      }
+      BasicRenderer<float, CudaBackend> renderer(cuda, there.config());
+      renderer.set_meshes(there.meshes());
+      const Frames<float> one = renderer.render(there.sets(), std::span(&scene.camera, 1)).value();
+      check_same_bits(one, single);
+      if (!scene.in_batches) continue;
+      CHECK(one.stats[0].visible == 0);  // A batch of one, which counts none.
+      record_hashes(one, "cuda batch, " + scene.name);
+      CudaBatchRenderer regions(cuda, there.config());
+      regions.set_least_of_regions(1, 0);
+      const Batch batch = draw_batch(cuda, regions, there.sets(), {scene.camera}, {},
+                                     scene.config.outputs, false, {MeshFrame{there.meshes(), {}}});
+      if (!batch.stats.by_regions) continue;
+      ++by_regions_count;
+      record_hashes(batch.frames, "cuda regions, " + scene.name);
+      check_same_bits(batch.frames, single);
     }
 #endif
   }

@@ -7,6 +7,7 @@
 #include "gsnav/backends/cuda/batch.hpp"
 #include "ops/backends.hpp"
 #include "ops/no_gpu.hpp"
+#include "ops/stage_frames.hpp"
 #include "support/frame_images.hpp"
 #include "support/scenes.hpp"
 
@@ -82,12 +83,11 @@ inline Batch draw_batch(CudaBackend& cuda, CudaBatchRenderer& renderer,
   return out;
 }
 
-/// The same cameras one at a time through the generic path.
+/// The same cameras one at a time, by the stages of draw_frame.
 inline Frames<float> singly(CudaBackend& cuda, const std::vector<GaussianSet>& sets,
                             const std::vector<Camera>& cameras, const Lists& lists, RenderConfig config,
                             unsigned outputs, const std::vector<MeshFrame>& meshes = {}) {
   config.outputs = outputs;
-  BasicRenderer<float, CudaBackend> renderer(cuda, config);
   Frames<float> all;
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     std::vector<GaussianSet> seen;
@@ -95,8 +95,8 @@ inline Frames<float> singly(CudaBackend& cuda, const std::vector<GaussianSet>& s
     if (!lists.empty()) {
       for (const std::uint32_t s : lists[c]) seen.push_back(sets[s]);
     }
-    if (!meshes.empty()) renderer.set_meshes(meshes[c].instances, meshes[c].light);
-    const Frames<float> f = renderer.render(seen, std::vector<Camera>{cameras[c]}).value();
+    const Frames<float> f = draw_by_stages<float>(cuda, seen, std::span(&cameras[c], 1), config,
+                                                  meshes.empty() ? MeshFrame{} : meshes[c]);
     for_each_image(all, f, [](std::vector<float>& to, const std::vector<float>& from) {
       to.insert(to.end(), from.begin(), from.end());
     });

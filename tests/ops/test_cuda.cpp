@@ -12,20 +12,30 @@
 #if defined(GSNAV_HAS_CUDA)
 #include "gsnav/backends/cuda.hpp"
 #include "ops/no_gpu.hpp"
+#include "ops/stage_frames.hpp"
+#include "support/frame_images.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
 
 namespace {
 
+/// A frame by the stages. BasicRenderer, which draws it as a batch of one, must have the same bits.
 Frames<float> on_gpu(CudaBackend& cuda, const std::vector<const GaussianCloud*>& clouds,
                      const Camera& camera, const RenderConfig& config) {
   std::vector<GaussianArrays<CudaBackend>> arrays;
   std::vector<GaussianSet> sets;
   arrays.reserve(clouds.size());
   for (const GaussianCloud* c : clouds) sets.push_back(arrays.emplace_back(cuda, *c).set());
+  const Frames<float> frames = draw_by_stages<float>(cuda, sets, std::span(&camera, 1), config);
   BasicRenderer<float, CudaBackend> renderer(cuda, config);
-  return renderer.render(sets, std::vector<Camera>{camera}).value();
+  const Frames<float> batch = renderer.render(sets, std::span(&camera, 1)).value();
+  for_each_image(frames, batch, [](const auto& a, const auto& b) { CHECK(a == b); });
+  CHECK(batch.stats[0].gaussians == frames.stats[0].gaussians);
+  // Batches count no visible Gaussians. Their tiles have another size.
+  CHECK(batch.stats[0].visible == 0);
+  CHECK((batch.stats[0].tile_intersections > 0) == (frames.stats[0].tile_intersections > 0));
+  return frames;
 }
 
 double largest_difference(const std::vector<float>& a, const std::vector<float>& b) {

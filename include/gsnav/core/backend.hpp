@@ -53,7 +53,8 @@ struct NoopFunctor {
 ///   cameras then run one frame per thread (detail/render/thread_frames.hpp).
 /// - `static constexpr bool bins_in_lanes`: true if binning reads BinArgs::entries and spans. The
 ///   projection then fills ProjectOutputs::words and spans.
-/// - `batch_renderer`: a type that draws many cameras in one call (detail/sim/frame_batch.hpp).
+/// - `batch_renderer`: a type that draws many cameras in one call, or one
+///   (detail/render/frame_batch.hpp).
 /// - `host_threads() -> ThreadPool&`: threads for the host's part of the work, such as stepping the
 ///   worlds of a batch (detail/core/host_threads.hpp). Backends that use host memory need none.
 /// - `static allocate_host(bytes) -> void*` and `deallocate_host(p)`: host memory for copies that do not

@@ -18,7 +18,8 @@ struct MeshStats {
       0;  ///< Pixels of see-through surfaces (MeshAlpha::blend) that are not behind opaque ones.
 };
 
-/// Counts of one camera's frame.
+/// Counts of one camera's frame. A GPU does not count `visible`, and pairs and triangles only for one
+/// camera at a time. They are 0 then.
 struct RenderStats {
   std::uint64_t gaussians = 0;  ///< Gaussians in all sets
   std::uint64_t visible = 0;  ///< Gaussians whose footprint bounds reach the image, without those found

@@ -4,15 +4,18 @@
 #include <unistd.h>
 
 #include <cstddef>
+#include <functional>
 #include <iterator>
 #include <limits>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/detail/render/draw_frame.hpp"
+#include "gsnav/detail/render/frame_batch.hpp"
 #include "gsnav/detail/render/thread_frames.hpp"
 #include "gsnav/detail/scene/gaussian_arrays.hpp"
 #include "gsnav/render/frames.hpp"
@@ -31,6 +34,9 @@ namespace gsnav {
 /// All arithmetic is done in `S`; sort keys are float32 for every `S`. Scratch memory is kept between
 /// calls, so that a second frame of the same size allocates only what the caller's vectors need.
 ///
+/// On a backend with a renderer of batches (CudaBackend) frames are drawn by it, in float: one frame is
+/// a batch of one. The stages of draw_frame draw other frames, with the same bits.
+///
 /// The backend must outlive the renderer. So must the arrays of the meshes that are set; sets and
 /// cameras are read during a call only (docs/reference/ownership.md). A moved-from renderer keeps its
 /// settings, has no meshes and no scratch, and may render again.
@@ -42,7 +48,11 @@ class BasicRenderer {
  public:
   /// Keeps a pointer to `backend`, which must outlive the renderer.
   explicit BasicRenderer(B& backend, const RenderConfig& config = {})
-      : backend_(&backend), config_(config), workspace_(backend), device_images_(backend) {}
+      : backend_(&backend),
+        config_(config),
+        workspace_(backend),
+        device_images_(backend),
+        batches_(backend) {}
 
   /// Settings of the coming frames.
   const RenderConfig& config() const noexcept { return config_; }
@@ -91,33 +101,18 @@ class BasicRenderer {
   /// camera's size; an image with a null pointer is not made. The bits are those of rendering one job at
   /// a time.
   /// @param stats one element for each job, at least jobs.size().
-  /// @return the error of the first job that fails; errors are those of render above.
-  Status render(std::span<const FrameJob<S>> jobs, std::span<RenderStats> stats) {
-    if (stats.size() < jobs.size()) {
-      return {Errc::invalid_argument, "stats has room for " + std::to_string(stats.size()) + " of " +
-                                          std::to_string(jobs.size()) + " frames"};
-    }
-    if ((jobs.data() == nullptr || stats.data() == nullptr) && !jobs.empty()) {
-      return {Errc::invalid_argument, "jobs or stats: a null pointer with a size"};
-    }
-    for (const FrameJob<S>& job : jobs) {
-      if (job.camera == nullptr || job.config == nullptr) {
-        return {Errc::invalid_argument, "FrameJob: camera and config must not be null"};
-      }
-      if (Status s = validate(*job.camera); !s) return s;  // scratch is sized by the camera
-    }
-    return render_jobs(
-        jobs.size(), [&](std::size_t c) { return jobs[c]; }, stats);
+  /// @param idle Called before each wait for a batch of frames, if given.
+  /// @return the error of the first job that fails, of those drawn in batches before others; errors are
+  /// those of render above.
+  Status render(std::span<const FrameJob<S>> jobs, std::span<RenderStats> stats,
+                const std::function<void()>& idle = {}) {
+    return check_and_render(jobs, stats, Images::host, idle);
   }
 
-  /// Starts one frame with images in the backend's memory. They are complete once the backend has been
-  /// synchronised. Errors: those of render above; `synchronize()` reports failures on the device after
-  /// this call.
-  Status render_on_backend(const FrameJob<S>& job, RenderStats& stats) {
-    if (job.camera == nullptr || job.config == nullptr) {
-      return {Errc::invalid_argument, "FrameJob: camera and config must not be null"};
-    }
-    return with_sizes(1, job, [&] { return draw(job, stats); });
+  /// Renders independent frames like `render`, with images in the backend's memory.
+  Status render_on_backend(std::span<const FrameJob<S>> jobs, std::span<RenderStats> stats,
+                           const std::function<void()>& idle = {}) {
+    return check_and_render(jobs, stats, Images::on_backend, idle);
   }
 
   /// Sizes `out` for the images `outputs` (a bitmask of kRgb, ...) of these cameras. Errors: those of
@@ -154,10 +149,26 @@ class BasicRenderer {
   std::size_t scratch_bytes() const noexcept {
     std::size_t sum = workspace_.capacity_bytes();
     if constexpr (ThreadFramesBackend<B>) sum += thread_frames_.capacity_bytes();
+    if constexpr (kBatches) sum += batches_.capacity_bytes();
     return sum;
   }
 
  private:
+  /// True if frames are drawn by the backend's renderer of batches where it supports them.
+  static constexpr bool kBatches = std::is_same_v<S, float> && BatchBackend<B>;
+  enum class Images { host, on_backend };  // where the images of jobs are
+
+  struct NoBatches {
+    explicit NoBatches(B&) {}
+  };
+  template <class T>
+  struct BatchesOf {
+    using type = NoBatches;
+  };
+  template <BatchBackend T>
+  struct BatchesOf<T> {
+    using type = std::conditional_t<kBatches, FrameBatch<T>, NoBatches>;
+  };
   struct NoThreadFrames {};
   template <class T>
   struct ThreadFramesOf {
@@ -201,11 +212,6 @@ class BasicRenderer {
     return s.ok() ? s : refused("cannot be allocated: render fewer at a time");
   }
 
-  Status draw(const FrameJob<S>& job, RenderStats& stats) {
-    return draw_frame<S>(*backend_, workspace_, job.sets, job.meshes, *job.camera, *job.config,
-                         job.images, &stats);
-  }
-
   /// Calls `run`, which may throw. To an out_of_memory error it adds the size of the frames and their
   /// number of Gaussians.
   template <class Run>
@@ -223,13 +229,52 @@ class BasicRenderer {
                                      std::to_string(gaussians) + " Gaussians: " + s.message()};
   }
 
-  template <class JobOf>
-  Status render_jobs(std::size_t count, const JobOf& job_of, std::span<RenderStats> stats) {
-    if (count == 0) return backend_->synchronize();
-    return with_sizes(count, job_of(0), [&] { return draw_jobs(count, job_of, stats); });
+  Status check_and_render(std::span<const FrameJob<S>> jobs, std::span<RenderStats> stats, Images where,
+                          const std::function<void()>& idle) {
+    if (stats.size() < jobs.size()) {
+      return {Errc::invalid_argument, "stats has room for " + std::to_string(stats.size()) + " of " +
+                                          std::to_string(jobs.size()) + " frames"};
+    }
+    if ((jobs.data() == nullptr || stats.data() == nullptr) && !jobs.empty()) {
+      return {Errc::invalid_argument, "jobs or stats: a null pointer with a size"};
+    }
+    for (const FrameJob<S>& job : jobs) {
+      if (job.camera == nullptr || job.config == nullptr) {
+        return {Errc::invalid_argument, "FrameJob: camera and config must not be null"};
+      }
+      if (Status s = validate(*job.camera); !s) return s;  // scratch is sized by the camera
+    }
+    return render_jobs(
+        jobs.size(), [&](std::size_t c) { return jobs[c]; }, stats, where, idle);
   }
   template <class JobOf>
-  Status draw_jobs(std::size_t count, const JobOf& job_of, std::span<RenderStats> stats) {
+  Status render_jobs(std::size_t count, const JobOf& job_of, std::span<RenderStats> stats,
+                     Images where = Images::host, const std::function<void()>& idle = {}) {
+    if (count == 0) return backend_->synchronize();
+    return with_sizes(count, job_of(0), [&] { return draw_jobs(count, job_of, stats, where, idle); });
+  }
+  /// Chooses how frames are drawn: by the backend's renderer of batches, by a thread each, or one by
+  /// one.
+  template <class JobOf>
+  Status draw_jobs(std::size_t count, const JobOf& job_of, std::span<RenderStats> stats, Images where,
+                   const std::function<void()>& idle) {
+    if constexpr (kBatches) {
+      jobs_.clear();
+      together_.clear();
+      alone_.clear();
+      for (std::size_t c = 0; c < count; ++c) {
+        jobs_.push_back(job_of(c));
+        (FrameBatch<B>::supports(jobs_[c]) ? together_ : alone_).push_back(c);
+      }
+      const CopyKind to = where == Images::host ? CopyKind::device_to_host : CopyKind::device_to_device;
+      if (!together_.empty()) {
+        if (Status s = batches_.render(jobs_, together_, stats, to, idle); !s) return s;
+      }
+      for (const std::size_t c : alone_) {
+        if (Status s = draw_alone(jobs_[c], stats[c], where); !s) return s;
+      }
+      return backend_->synchronize();
+    }
     if constexpr (ThreadFramesBackend<B>) {
       if (ThreadFrames<S, B>::worth_it(*backend_, count)) {
         if (Status s = thread_frames_.render(*backend_, count, job_of, stats); !s) return s;
@@ -237,27 +282,27 @@ class BasicRenderer {
       }
     }
     for (std::size_t c = 0; c < count; ++c) {
-      if (Status s = render_job(job_of(c), stats[c]); !s) return s;
+      if (Status s = draw_alone(job_of(c), stats[c], where); !s) return s;
     }
     return backend_->synchronize();
   }
-  Status render_job(const FrameJob<S>& job, RenderStats& stats) {
-    if constexpr (is_host_backend<B>) {
-      return draw(job, stats);
-    } else {
-      const std::size_t pixels =
-          static_cast<std::size_t>(job.camera->width) * static_cast<std::size_t>(job.camera->height);
-      FrameImages<S> images = device_images(job.images, pixels);
-      FrameJob<S> there = job;
-      there.images = images;
-      if (Status s = draw(there, stats); !s) return s;
-      for (const ImageKind<S>& k : kImages<S>) {
-        if (job.images.*k.image == nullptr) continue;
-        backend_->copy(job.images.*k.image, images.*k.image, pixels * k.channels * sizeof(S),
-                       CopyKind::device_to_host);
-      }
-      return {};
+  /// Draws a frame by the stages of draw_frame.
+  Status draw_alone(const FrameJob<S>& job, RenderStats& stats, Images where) {
+    const auto draw = [&](const FrameImages<S>& images) {
+      return draw_frame<S>(*backend_, workspace_, job.sets, job.meshes, *job.camera, *job.config, images,
+                           &stats);
+    };
+    if (is_host_backend<B> || where == Images::on_backend) return draw(job.images);
+    const std::size_t pixels =
+        static_cast<std::size_t>(job.camera->width) * static_cast<std::size_t>(job.camera->height);
+    const FrameImages<S> images = device_images(job.images, pixels);
+    if (Status s = draw(images); !s) return s;
+    for (const ImageKind<S>& k : kImages<S>) {
+      if (job.images.*k.image == nullptr) continue;
+      backend_->copy(job.images.*k.image, images.*k.image, pixels * k.channels * sizeof(S),
+                     CopyKind::device_to_host);
     }
+    return {};
   }
   MeshFrame mesh_frame() const noexcept { return {meshes_, light_}; }
 
@@ -274,6 +319,10 @@ class BasicRenderer {
   RenderWorkspace<S, B> workspace_;
   Buffer<S, B> device_images_;
   [[no_unique_address]] typename ThreadFramesOf<B>::type thread_frames_;
+  [[no_unique_address]] typename BatchesOf<B>::type batches_;
+  // Frames of a call, where there are batches:
+  std::vector<FrameJob<S>> jobs_;
+  std::vector<std::size_t> together_, alone_;
 };
 
 /// Deduces float arithmetic.

@@ -4,6 +4,7 @@ from . import fault
 
 BATCH = "tests/emulated/test_batch_rules.cu"
 FUNCTIONS = "tests/math/test_functions.cpp"
+ONE = "tests/ops/test_batch_of_one.cpp"
 POOL = "tests/ops/test_thread_pool.cpp"
 PIECES = "what pieces throw or return becomes one Status*"
 BYTE = "return static_cast<std::uint8_t>(static_cast<int>(whole) + (scaled - whole >= S(0.5) ? 1 : 0));"
@@ -23,6 +24,14 @@ FAULTS = [
           "a byte is the nearest*"),
     fault("byte_truncated_on_a_gpu", "to_byte", BYTE, "return static_cast<std::uint8_t>(static_cast<int>(whole));",
           "tests/ops/test_cuda_batch.cpp", "cuda batch: an empty view*", device=True),
+    fault("set_of_a_frame_listed_once", "place_of", "std::ranges::find(of_camera, at->second) == of_camera.end()",
+          "true", ONE, "a set that a frame has twice*"),
+    fault("call_without_memory_given_up", "draw_what_fits", "|| count == 1", "|| count != 0", ONE,
+          "a call whose cameras memory*"),
+    fault("kinds_of_frames_kept", "FrameBatch::render", "calls_ - k.last_call >= kForgotten", "false", ONE,
+          "the memory of kinds of frames*"),
+    fault("bad_sets_go_to_a_batch", "list_sets", "if (Status s = validate(set); !s) return s;", "", ONE,
+          "bad frames get the errors*"),
     fault("errors_lose_their_code", "guarded", "return Status(e.code(), e.what());",
           "return Status(Errc::out_of_memory, e.what());", POOL, PIECES),
     fault("no_memory_is_a_broken_device", "guarded", "return Status(Errc::out_of_memory, name.empty()",

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "gsnav/detail/core/host_threads.hpp"
-#include "gsnav/detail/sim/frame_batch.hpp"
 #include "gsnav/detail/sim/scene_levels.hpp"
 #include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/sim/config.hpp"
@@ -22,34 +21,23 @@ struct ImageRequest : FrameJob<float> {
                                          ///< `sets`.
 };
 
-/// Renders independent images. It selects the visible part of the assets for each, renders what the
-/// backend's batch renderer supports in one batch, and renders the rest one by one with BasicRenderer.
-/// Both return the same bits.
+/// Renders independent images by BasicRenderer. It selects the visible part of the assets for each.
 template <Backend B>
 class ImageRenderer {
  public:
-  explicit ImageRenderer(B& backend)
-      : backend_(&backend), renderer_(backend), batches_(backend), chosen_(backend) {}
+  explicit ImageRenderer(B& backend) : backend_(&backend), renderer_(backend), chosen_(backend) {}
 
   /// Renders all requests into images in `memory`. Replaces the sets and rules in the requests by those
   /// that were drawn; they are valid until the next call. Throws gsnav::Error (out_of_memory).
-  /// @param idle Called before each wait for a batch (FrameBatch::render).
+  /// @param idle Called before each wait for a batch (BasicRenderer::render).
   /// @return an error of rendering.
   Status render(std::span<ImageRequest> requests, ImageMemory memory,
-                [[maybe_unused]] const std::function<void()>& idle = {}) {
+                const std::function<void()>& idle = {}) {
     choose_levels(requests);
-    jobs_.clear();
-    if constexpr (BatchBackend<B>) {
-      single_.clear();
-      for (const ImageRequest& r : requests) (batches_.supports(r) ? jobs_ : single_).push_back(r);
-      const bool there = memory == ImageMemory::backend;
-      const CopyKind to = there ? CopyKind::device_to_device : CopyKind::device_to_host;
-      if (Status s = batches_.render(jobs_, to, idle); !s) return s;
-      return there ? render_on_backend(single_) : render_by_one(single_);
-    } else {
-      jobs_.assign(requests.begin(), requests.end());
-      return render_by_one(jobs_);
-    }
+    jobs_.assign(requests.begin(), requests.end());
+    stats_.assign(jobs_.size(), {});
+    return memory == ImageMemory::backend ? renderer_.render_on_backend(jobs_, stats_, idle)
+                                          : renderer_.render(jobs_, stats_, idle);
   }
 
   /// Renders one request into `out`, which is resized. `request.config->outputs` selects the images;
@@ -61,22 +49,10 @@ class ImageRenderer {
     return renderer_.render(request.sets, std::span(request.camera, 1), out);
   }
 
-  /// Statistics of each request of the last call. Empty except on host backends.
+  /// Statistics of each request of the last call. FrameBatch says what is counted in batches.
   std::span<const RenderStats> stats() const noexcept { return stats_; }
 
  private:
-  struct NoBatches {
-    explicit NoBatches(B&) {}
-  };
-  template <class T>
-  struct BatchesOf {
-    using type = NoBatches;
-  };
-  template <BatchBackend T>
-  struct BatchesOf<T> {
-    using type = FrameBatch<T>;
-  };
-
   void choose_levels(std::span<ImageRequest> requests) {
     leveled_.clear();
     for (ImageRequest& r : requests) {
@@ -90,25 +66,12 @@ class ImageRenderer {
     });
     chosen_.place(std::span(cuts_).first(leveled_.size()));
   }
-  Status render_by_one(std::span<const FrameJob<float>> jobs) {
-    stats_.assign(jobs.size(), {});
-    return renderer_.render(jobs, stats_);
-  }
-  Status render_on_backend(std::span<const FrameJob<float>> jobs) {
-    RenderStats stats;
-    for (const FrameJob<float>& job : jobs) {
-      if (Status s = renderer_.render_on_backend(job, stats); !s) return s;
-    }
-    return backend_->synchronize();
-  }
-
   B* backend_;
   BasicRenderer<float, B> renderer_;
-  [[no_unique_address]] typename BatchesOf<B>::type batches_;
   ChosenChunks<B> chosen_;
   std::vector<CutSets> cuts_;  // One per element of leveled_.
   std::vector<ImageRequest*> leveled_;
-  std::vector<FrameJob<float>> jobs_, single_;
+  std::vector<FrameJob<float>> jobs_;
   std::vector<RenderStats> stats_;
 };
 

@@ -51,7 +51,7 @@ class SensorRig {
   void resize(SensorImages<B>& images, std::size_t rows) const { images.resize(*backend_, plan_, rows); }
 
   /// Renders all sensors of all views into their rows.
-  /// @param idle Called before each wait for a batch (FrameBatch::render).
+  /// @param idle Called before each wait for a batch (BasicRenderer::render).
   /// @return an error of rendering.
   Status render(std::span<const SensorView> views, SensorImages<B>& images,
                 const std::function<void()>& idle = {}) {

@@ -50,8 +50,9 @@ struct BatchStats {
   MeshStats meshes;         ///< Statistics of the meshes.
 };
 
-/// Renders many cameras in one call on one GPU (docs/notes/cuda.md). Images are bit-identical to those
-/// of `BasicRenderer<float, CudaBackend>` for each camera alone, whatever the batch.
+/// Renders many cameras in one call on one GPU, or one (docs/notes/cuda.md). Images are bit-identical to
+/// those of draw_frame for each camera alone, whatever the batch. `BasicRenderer<float, CudaBackend>`
+/// draws by it.
 ///
 /// @code
 /// gsnav::CudaBatchRenderer batch(cuda, config);
