@@ -13,6 +13,44 @@ namespace gsnav {
 
 namespace {
 
+/// Counts the tiles that each visible splat intersects, and the splats of each tile.
+template <class Cull>
+struct CountSplatTiles {
+  BinArgs<float> args;
+  Cull cull;
+  std::uint32_t* per_splat;
+  std::uint32_t* per_tile;
+  __device__ void operator()(std::size_t i) const {
+    const std::uint32_t splat = args.order[i];
+    std::uint32_t n = 0;
+    for_each_tile(args, splat, [&](std::size_t tile) {
+      if (cull.hides(tile, splat)) return;
+      atomicAdd(per_tile + tile, 1u);  // Order does not matter for a sum of ones.
+      ++n;
+    });
+    per_splat[i] = n;
+  }
+};
+
+/// Writes (tile, splat) pairs in depth order. A stable sort by tile then gives the lists.
+template <class Cull>
+struct EmitSplatTiles {
+  BinArgs<float> args;
+  Cull cull;
+  const std::uint64_t* offsets;
+  std::uint32_t* tiles;
+  std::uint32_t* splats;
+  __device__ void operator()(std::size_t i) const {
+    const std::uint32_t splat = args.order[i];
+    std::uint64_t at = offsets[i];
+    for_each_tile(args, splat, [&](std::size_t tile) {
+      if (cull.hides(tile, splat)) return;
+      tiles[at] = static_cast<std::uint32_t>(tile);
+      splats[at++] = splat;
+    });
+  }
+};
+
 std::string describe(int device, int error, const char* what) {
   return std::string("CUDA device ") + std::to_string(device) + ": " + what +
          " failed: " + cudaGetErrorString(static_cast<cudaError_t>(error));
@@ -152,13 +190,6 @@ bool CudaBackend::sort_pairs(std::uint32_t* keys, std::uint32_t* values, std::ui
   return k.Current() == keys_alt;
 }
 
-void CudaBackend::run(stage::Project, const ViewedSet<float>& args, const ProjectOutputs<float>& out) {
-  if (!usable() || args.gaussians.size() == 0) return;
-  cuda::project_kernel<<<static_cast<unsigned>(args.chunk_count()), cuda::kProjectThreads, 0, stream_>>>(
-      args, out);
-  note(cudaGetLastError(), "the projection");
-}
-
 template <class Cull>
 void CudaBackend::list(const BinArgs<float>& args, const Cull& cull) {
   if (!usable()) return;
@@ -168,7 +199,7 @@ void CudaBackend::list(const BinArgs<float>& args, const Cull& cull) {
   auto* offsets = static_cast<std::uint64_t*>(scratch(kSplatOffsets, (n + 1) * sizeof(std::uint64_t)));
   fill(per_splat + n, 0, sizeof(std::uint32_t));
   fill(per_tile, 0, (tiles + 1) * sizeof(std::uint32_t));
-  parallel_for(n, cuda::CountSplatTiles<Cull>{args, cull, per_splat, per_tile});
+  parallel_for(n, CountSplatTiles<Cull>{args, cull, per_splat, per_tile});
   const auto scan = [&](const std::uint32_t* counts, std::uint64_t* out, std::size_t count) {
     std::size_t bytes = 0;
     note(cub::DeviceScan::ExclusiveScan(nullptr, bytes, counts, out, ::cuda::std::plus<>{},
@@ -190,7 +221,7 @@ void CudaBackend::scatter(const BinArgs<float>& args, const Cull& cull) {
   auto* tiles = static_cast<std::uint32_t*>(scratch(kPairTiles, 2 * pairs * sizeof(std::uint32_t)));
   auto* splats = static_cast<std::uint32_t*>(scratch(kPairSplats, pairs * sizeof(std::uint32_t)));
   const auto* offsets = static_cast<const std::uint64_t*>(scratch_[kSplatOffsets].data);
-  parallel_for(args.order.size, cuda::EmitSplatTiles<Cull>{args, cull, offsets, tiles, splats});
+  parallel_for(args.order.size, EmitSplatTiles<Cull>{args, cull, offsets, tiles, splats});
   const int bits = std::bit_width(args.grid.count() - 1) + (args.grid.count() == 1 ? 1 : 0);
   std::size_t bytes = 0;
   note(cub::DeviceRadixSort::SortPairs(nullptr, bytes, tiles, tiles + pairs, splats,
@@ -215,28 +246,11 @@ void CudaBackend::run(stage::ScatterTiles, const BinArgs<float>& args, const Mes
   scatter(args, cull);
 }
 
-void CudaBackend::run(stage::Blend, const RasterArgs<float>& args) {
-  if (!usable()) return;
-  const unsigned threads = static_cast<unsigned>(args.grid.tile_size * args.grid.tile_size);
-  dispatch_raster(args, [&]<bool C, DepthMode D, Exp2 M, bool P>() {
-    cuda::rasterize_kernel<C, D, cuda::device_exp2(M), P, false>
-        <<<static_cast<unsigned>(args.grid.count()), threads, 0, stream_>>>(args);
-  });
-  note(cudaGetLastError(), "the blending");
-}
-
-void CudaBackend::run(stage::BlendWithMeshes, const RasterArgs<float>& args) {
-  if (!usable()) return;
-  const unsigned threads = static_cast<unsigned>(args.grid.tile_size * args.grid.tile_size);
-  dispatch_composite(args, [&]<bool C, DepthMode D, bool G>() {
-    cuda::rasterize_kernel<C, D, Exp2::degree5, G, true>
-        <<<static_cast<unsigned>(args.grid.count()), threads, 0, stream_>>>(args);
-  });
-  note(cudaGetLastError(), "the blending among meshes");
-}
-
 GSNAV_FRAME_FUNCTIONS(, float, CudaBackend);
 GSNAV_SKIN_FUNCTIONS(, CudaBackend);
+template void run<CudaBackend, stage::Project>(CudaBackend&, stage::Project, const ViewedSet<float>&,
+                                               const ProjectOutputs<float>&);
+template void run<CudaBackend, stage::Blend>(CudaBackend&, stage::Blend, const RasterArgs<float>&);
 template void CudaBackend::parallel_for<CutDepth>(std::size_t, const CutDepth&);
 
 }  // namespace gsnav

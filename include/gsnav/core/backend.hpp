@@ -53,6 +53,8 @@ struct NoopFunctor {
 ///   cameras then run one frame per thread (detail/render/thread_frames.hpp).
 /// - `static constexpr bool bins_in_lanes`: true if binning reads BinArgs::entries and spans. The
 ///   projection then fills ProjectOutputs::words and spans.
+/// - `static constexpr exp2_of(Exp2) -> Exp2`: exponential of blending, where it is not the one that
+///   RenderConfig::quality asks for.
 /// - `batch_renderer`: a type that draws many cameras in one call, or one
 ///   (detail/render/frame_batch.hpp).
 /// - `host_threads() -> ThreadPool&`: threads for the host's part of the work, such as stepping the

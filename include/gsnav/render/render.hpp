@@ -42,12 +42,22 @@ struct RasterizeRow {
   }
 };
 
+/// Exponential that a backend's kernels use where `asked` is asked for.
+template <Backend B>
+constexpr Exp2 exp2_on(Exp2 asked) noexcept {
+  if constexpr (requires { B::exp2_of(asked); }) {
+    return B::exp2_of(asked);
+  } else {
+    return asked;
+  }
+}
+
 template <class S, Backend B>
 void blend_pixels(B& backend, const RasterArgs<S>& args) {
   const std::size_t width = static_cast<std::size_t>(args.grid.width);
   const std::size_t height = static_cast<std::size_t>(args.grid.height);
   dispatch_raster(args, [&]<bool C, DepthMode D, Exp2 M, bool P>() {
-    using Kernel = RasterizePixel<S, C, D, M, P>;
+    using Kernel = RasterizePixel<S, C, D, exp2_on<B>(M), P>;
     if constexpr (is_host_backend<B>) {
       backend.parallel_for(height, RasterizeRow<S, Kernel>{{args}, width});
     } else {

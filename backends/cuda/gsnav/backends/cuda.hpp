@@ -90,6 +90,8 @@ class CudaBackend {
   /// @return backend_failure if a call since the last synchronize() failed.
   Status synchronize();
 
+  /// Exponential of its kernels that blend.
+  static constexpr Exp2 exp2_of(Exp2 asked) noexcept { return cuda::device_exp2(asked); }
   /// Number of pieces into which callers should divide work.
   std::size_t concurrency() const noexcept { return 1; }
   /// Index of the GPU.
@@ -110,8 +112,6 @@ class CudaBackend {
                   std::uint32_t* values_alt, std::size_t n, int bits);
 
   // Stages with their own kernels (core/stages.hpp).
-  /// Projects a set.
-  void run(stage::Project, const ViewedSet<float>& args, const ProjectOutputs<float>& out);
   /// Counts the splats of each tile.
   void run(stage::CountTiles, const BinArgs<float>& args, const NoCull& cull);
   /// Counts the splats of each tile that are not behind a mesh.
@@ -120,10 +120,6 @@ class CudaBackend {
   void run(stage::ScatterTiles, const BinArgs<float>& args, const NoCull& cull);
   /// Writes the splats that are not behind a mesh to the lists of their tiles.
   void run(stage::ScatterTiles, const BinArgs<float>& args, const MeshCull<float>& cull);
-  /// Blends the splats of each tile.
-  void run(stage::Blend, const RasterArgs<float>& args);
-  /// Blends splats and meshes.
-  void run(stage::BlendWithMeshes, const RasterArgs<float>& args);
   /// Rasterizes the triangles of meshes.
   void run(stage::RasterizeMesh, const MeshRasterArgs<float>& args);
   /// Projects the vertices of meshes.
@@ -184,6 +180,11 @@ static_assert(Backend<CudaBackend>);
 // Templates compiled into gsnav::cuda, because a host compiler cannot compile them.
 GSNAV_FRAME_FUNCTIONS(extern, float, CudaBackend);
 GSNAV_SKIN_FUNCTIONS(extern, CudaBackend);
+extern template void run<CudaBackend, stage::Project>(CudaBackend&, stage::Project,
+                                                      const ViewedSet<float>&,
+                                                      const ProjectOutputs<float>&);
+extern template void run<CudaBackend, stage::Blend>(CudaBackend&, stage::Blend,
+                                                    const RasterArgs<float>&);
 extern template void CudaBackend::parallel_for<CutDepth>(std::size_t, const CutDepth&);
 extern template Status capsule_gaps<CudaBackend, float>(CudaBackend&, const CapsuleGapArgs<float>&);
 extern template Status capsule_gaps<CudaBackend, double>(CudaBackend&, const CapsuleGapArgs<double>&);

@@ -168,8 +168,10 @@ struct Skin {
 /// Stages of a single-camera frame outside a batch (core/stages.hpp).
 struct Stages {
   static constexpr unsigned kEachThreads = 128;
-  static constexpr int kProjectThreads = 128;
-  static constexpr int kBlendChunk = 64;  ///< Splats staged at a time.
+  /// Fewer than kFewItems work items are long ones, such as chunks. They go to as many multiprocessors
+  /// as possible.
+  static constexpr unsigned kFewThreads = 32;
+  static constexpr std::size_t kFewItems = 32768;
 };
 
 /// Copies to the device from memory that is not pinned.
