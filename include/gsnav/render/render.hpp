@@ -228,19 +228,6 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   return {};
 }
 
-/// Number of depth slices for a frame with at most `candidates` visible Gaussians.
-inline int depth_slices_of(const RenderConfig& config, std::size_t candidates,
-                           const Camera& camera) noexcept {
-  if (config.response != Response::ewa || config.compat != Compat::none || config.quality.key_bits < 32)
-    return 1;
-  if (config.tuning.depth_slices != 0) return config.tuning.depth_slices;
-  // With few Gaussians per pixel, projection is a small part of the frame, and slices cannot save much.
-  constexpr std::size_t kFew = 131072;
-  const std::size_t pixels =
-      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
-  return candidates < kFew || candidates < pixels / 2 ? 1 : 4;
-}
-
 /// Projects and draws a frame in slices of depth, front to back. Returns false, having drawn nothing,
 /// when a single slice would be as fast.
 template <class B>

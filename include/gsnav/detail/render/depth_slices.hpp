@@ -14,6 +14,7 @@
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/render/order_visible.hpp"
+#include "gsnav/image/camera.hpp"
 #include "gsnav/render/config.hpp"
 
 namespace gsnav {
@@ -186,5 +187,22 @@ class DepthSlices {
   std::size_t candidates_ = 0;
   int count_ = 1;
 };
+
+namespace detail {
+
+/// Number of depth slices for a frame with at most `candidates` visible Gaussians.
+inline int depth_slices_of(const RenderConfig& config, std::size_t candidates,
+                           const Camera& camera) noexcept {
+  if (config.response != Response::ewa || config.compat != Compat::none || config.quality.key_bits < 32)
+    return 1;
+  if (config.tuning.depth_slices != 0) return config.tuning.depth_slices;
+  // With few Gaussians per pixel, projection is a small part of the frame, and slices cannot save much.
+  constexpr std::size_t kFew = 131072;
+  const std::size_t pixels =
+      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  return candidates < kFew || candidates < pixels / 2 ? 1 : 4;
+}
+
+}  // namespace detail
 
 }  // namespace gsnav
