@@ -53,7 +53,8 @@ void bind_frames(nb::module_& m) {
       .def_ro("fragments", &MeshStats::fragments, "Pixels of see-through surfaces.");
   nb::class_<RenderStats>(m, "RenderStats", "Counts of one camera's frame.")
       .def_ro("gaussians", &RenderStats::gaussians, "Gaussians in all sets.")
-      .def_ro("visible", &RenderStats::visible, "Gaussians whose footprint bounds reach the image.")
+      .def_ro("visible", &RenderStats::visible,
+              "Gaussians whose footprint bounds reach the image. 0 on a GPU.")
       .def_ro("tile_intersections", &RenderStats::tile_intersections, "(tile, Gaussian) pairs.")
       .def_ro("meshes", &RenderStats::meshes, "Counts of the meshes.");
 
