@@ -105,6 +105,53 @@ TEST_CASE("cuda batch regions: several scenes, placed, in lists of each camera's
   }
 }
 
+TEST_CASE("cuda batch regions: tiles that warps divide have the bits of whole ones") {
+  if (no_gpu("cuda batch regions in parts")) return;
+  CudaBackend cuda;
+  // Faint rows in front of others, so that lists are long and pixels close at different rows.
+  const int count = is_emulated() ? 2500 : 40000;
+  GaussianCloud faint = faint_cloud(
+      count, [](double z) { return 0.02 * z; },
+      [](int, Rng& rng) {
+        return Vec3d{1.5 * rng.uniform(-1, 1), 1.5 * rng.uniform(-1, 1), 4 + 1.5 * rng.uniform(-1, 1)};
+      });
+  GaussianCloud solid = random_cloud(9, {.count = count / 4, .sh_degree = 0});
+  sort_spatially(faint);
+  sort_spatially(solid);
+  const GaussianArrays<CudaBackend> on_faint(cuda, faint), on_solid(cuda, solid);
+  const std::vector<GaussianSet> sets{on_faint.set(), on_solid.set()};
+  struct Least {
+    std::uint32_t pairs, rows;
+    bool always;
+  };
+  for (const auto& size : {std::pair{21, 13}, {64, 64}}) {
+    if (is_emulated() && size.first == 64) continue;
+    const std::vector<Camera> cameras = ring(kCameras, size.first, size.second);
+    RenderConfig config;
+    config.background = {0.25, 0.5, 0.75};
+    CudaBatchRenderer renderer(cuda, config);
+    renderer.set_least_of_regions(cuda::policy::Regions::kLeastCameras, 0);
+    for (const unsigned outputs : kSmallOutputs) {
+      CAPTURE(outputs);
+      const auto draw = [&](const Least& least) {
+        renderer.set_least_of_parts(least.pairs, least.rows, least.always);
+        return draw_batch(cuda, renderer, sets, cameras, {}, outputs, outputs == kRgb);
+      };
+      const Batch whole = draw({64, 0, false});
+      CHECK(whole.stats.parts_given == 0);
+      check_some(cuda, whole, sets, cameras, {}, config, outputs);
+      for (const Least& least : {Least{2, 0, true}, {9, 1, true}, {2, 100, true}, {2, 0, false}}) {
+        CAPTURE(least.pairs);
+        CAPTURE(least.rows);
+        const Batch divided = draw(least);
+        if (least.always) CHECK(divided.stats.parts_given > 0);
+        check_same(divided.frames, whole.frames);
+        CHECK(divided.rgb8 == whole.rgb8);
+      }
+    }
+  }
+}
+
 TEST_CASE("cuda batch regions: rows that need double, and more of them than have records") {
   if (no_gpu("cuda batch regions in double")) return;
   CudaBackend cuda;
@@ -162,13 +209,18 @@ TEST_CASE("cuda batch regions: thousands of rows of one key are in order of rank
     CudaBatchRenderer renderer(cuda, config);
     renderer.set_least_of_regions(cuda::policy::Regions::kLeastCameras, 0);
     const unsigned outputs = kMedianOnly;
-    const Batch got = draw_batch(cuda, renderer, {arrays.set()}, cameras, {}, outputs, false);
-    REQUIRE(got.stats.by_regions);
     RenderConfig of_one = config;
     of_one.outputs = outputs;
     const Frames<float> one = render<float>(serial, {cloud.set()}, camera, of_one);
-    check_same(of_cameras(got.frames, {0}), one);
-    check_same(of_cameras(got.frames, {kCameras - 1}), one);
+    for (const bool divided : {false, true}) {
+      CAPTURE(divided);
+      if (divided) renderer.set_least_of_parts(5, 0, true);
+      const Batch got = draw_batch(cuda, renderer, {arrays.set()}, cameras, {}, outputs, false);
+      REQUIRE(got.stats.by_regions);
+      CHECK((got.stats.parts_given > 0 || !divided));
+      check_same(of_cameras(got.frames, {0}), one);
+      check_same(of_cameras(got.frames, {kCameras - 1}), one);
+    }
   }
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "batch_regions.cuh"
+#include "batch_region_parts.cuh"
 #include "gsnav/backends/cuda.hpp"
 #include "gsnav/core/buffer.hpp"
 
@@ -24,13 +24,14 @@ struct BatchRegions {
         zeroed(b),
         pairs(b),
         precise_rows(b),
-        precise_records(b) {}
+        precise_records(b),
+        parts(b) {}
   std::size_t bytes() const noexcept {
     return positions.capacity_bytes() + shapes.capacity_bytes() + bounds.capacity_bytes() +
            in_view.capacity_bytes() + rows_in_view.capacity_bytes() + lists.capacity_bytes() +
            bases.capacity_bytes() + precise_begins.capacity_bytes() + order.capacity_bytes() +
            zeroed.capacity_bytes() + pairs.capacity_bytes() + precise_rows.capacity_bytes() +
-           precise_records.capacity_bytes();
+           precise_records.capacity_bytes() + parts.capacity_bytes();
   }
   Array<float4> positions, shapes;
   Array<RowGroup> bounds;
@@ -39,6 +40,7 @@ struct BatchRegions {
   Array<RegionRow> pairs;
   Array<PreciseRow> precise_rows;
   Array<SplatGeometry<float>> precise_records;
+  Array<TilePart> parts;
   std::uint32_t pair_capacity = 0, precise_capacity = 0, group_capacity = 0;
   // State of the prepared call.
   std::size_t groups_in_view = 0, zeroed_words = 0;

@@ -27,8 +27,15 @@ __global__ void __launch_bounds__(kDrawThreads, InDouble ? 1 : Policy::kDrawResi
       if (item < items) break;
       item -= items;
     }
-    if (kind == kEnd) return;
-    warp.draw(r.order[std::size_t{4} * b.batch.tiles * kind + item]);
+    std::uint32_t part = kNoPart;
+    if (kind == kEnd) {
+      if constexpr (!InDouble) part = take_part(r);
+      if (part == kNoPart) return;
+    } else {
+      item = r.order[std::size_t{4} * b.batch.tiles * kind + item];
+    }
+    warp.draw(item, part);
+    if constexpr (!InDouble) finish_item(r);
   }
 }
 
@@ -62,8 +69,11 @@ __global__ void __launch_bounds__(Policy::kOrderThreads)
     const unsigned votes = __ballot_sync(kAll, kind == k);
     if (votes == 0) continue;
     std::uint32_t place = 0;
-    if (lane == 0)
-      place = atomicAdd(&r.counters->items[k], parts * static_cast<std::uint32_t>(__popc(votes)));
+    const std::uint32_t items = parts * static_cast<std::uint32_t>(__popc(votes));
+    if (lane == 0) {
+      place = atomicAdd(&r.counters->items[k], items);
+      if (k != kInDouble) atomicAdd(&r.counters->unfinished, items);
+    }
     place = __shfl_sync(kAll, place, 0) +
             parts * static_cast<std::uint32_t>(__popc(votes & ((1u << lane) - 1)));
     if (kind != k) continue;

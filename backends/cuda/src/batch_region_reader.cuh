@@ -14,6 +14,12 @@ struct ReaderShared {
   std::uint32_t columns[64], lines[64];  ///< By the two ranges of a rectangle.
 };
 
+/// How far a list has been read.
+struct ReaderState {
+  std::uint32_t next, restart, held, target;
+  std::uint32_t begin_key, end_key, first_rank, crowded;
+};
+
 /// Work of a warp. All lanes must call every function together.
 class TileReader {
  public:
@@ -38,6 +44,28 @@ class TileReader {
     target_ = Policy::kTarget;
     crowded_ = false;
   }
+
+  /// Between keep_rest() and collect(). The rows held are copied to `rows`.
+  __device__ ReaderState save(uint2* rows) const {
+    for (std::uint32_t i = lane_; i < held_; i += 32) rows[i] = rows_[i];
+    return {next_, restart_, held_, target_, begin_key_, end_key_, first_rank_, crowded_ ? 1u : 0u};
+  }
+  /// After begin(): goes on where the reader that was saved had stopped.
+  __device__ void resume(const ReaderState& from, const uint2* rows) {
+    next_ = from.next;
+    restart_ = from.restart;
+    held_ = from.held;
+    target_ = from.target;
+    begin_key_ = from.begin_key;
+    end_key_ = from.end_key;
+    first_rank_ = from.first_rank;
+    crowded_ = from.crowded != 0;
+    for (std::uint32_t i = lane_; i < held_; i += 32) rows_[i] = rows[i];
+    __syncwarp();
+  }
+
+  /// Number of rows of the list that were not read.
+  __device__ std::uint32_t left() const { return list_.length - min(next_, list_.length); }
 
   /// Pairs of pixels that the rectangle of a row reaches.
   __device__ std::uint32_t reached(std::uint32_t word) const {

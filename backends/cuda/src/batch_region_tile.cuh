@@ -2,7 +2,7 @@
 #pragma once
 
 #include "batch_blend.cuh"
-#include "batch_region_reader.cuh"
+#include "batch_region_parts.cuh"
 #include "batch_region_splat.cuh"
 
 // A warp draws a tile, or a part of one, from the list of its region.
@@ -44,6 +44,8 @@ __device__ inline std::uint32_t transposed(std::uint32_t x) {
 template <bool Color, DepthMode D, Exp2 M, bool InDouble>
 class TileWarp {
  public:
+  static_assert(std::is_same_v<BlendState<float, kBlendedDepth<D>>, BlendState<float, DepthMode::none>>);
+
   __device__ TileWarp(const BlendArgs& b, const RegionArgs& r, TileShared<Color>& s)
       : b_(b),
         a_(b.batch),
@@ -61,34 +63,47 @@ class TileWarp {
     __syncwarp();
   }
 
-  __device__ void draw(std::uint32_t item) {
-    begin(item);
+  /// Draws the part of a tile that `item` names, or, if it is not kNoPart, one that a warp has given.
+  __device__ void draw(std::uint32_t item, std::uint32_t part) {
+    bool divides = false;  ///< All rows that were collected are drawn or kept.
+    if (part == kNoPart) {
+      begin(item & 0x0fffffffu, lanes_of(item >> 28));
+    } else {
+      resume(r_.parts[part]);
+      divides = true;
+    }
     for (;;) {
+      if constexpr (!InDouble) {
+        for (int i = 0; divides && i < policy::Regions::kGives; ++i) divides = give_half();
+      }
       const std::uint32_t safe = reader_.collect(open_);
       const bool last = reader_.done();
-      if (!blend_rows(safe, last) || last) break;
+      if constexpr (!InDouble) divides = !last && divisible() && wanted();
+      if (!blend_rows(safe, last || divides) || last) break;
       reader_.keep_rest(safe);
     }
     finish();
   }
 
  private:
-  __device__ void begin(std::uint32_t item) {
-    const std::uint32_t tile = item & 0x0fffffffu, part = item >> 28;
+  /// Lanes of a tile, of a half or of a quarter.
+  static __device__ std::uint32_t lanes_of(std::uint32_t part) {
+    return part == 0  ? ~0u
+           : part < 3 ? 0xffffu << (16 * (part - 1))
+                      : 0x0f0fu << (4 * ((part - 3) & 1u) + 16 * ((part - 3) >> 1));
+  }
+
+  __device__ void begin(std::uint32_t tile, std::uint32_t lanes) {
     const std::uint32_t tiles = static_cast<std::uint32_t>(a_.grid.count());
-    const std::uint32_t pixels = part == 0 ? ~0u
-                                 : part < 3
-                                     ? 0xffffu << (16 * (part - 1))
-                                     : 0x0f0fu << (4 * ((part - 3) & 1u) + 16 * ((part - 3) >> 1));
     camera_ = tile / tiles;
     const int at = static_cast<int>(tile % tiles);
     tile_x_ = at % a_.grid.columns * kRegionTile;
     tile_y_ = at / a_.grid.columns * kRegionTile;
     const int x = tile_x_ + static_cast<int>(lane_ % 8), y = tile_y_ + static_cast<int>(lane_ / 8 * 2);
     for (int k = 0; k < 2; ++k) {
-      inside_[k] = (pixels >> lane_ & 1u) != 0 && x < a_.grid.width && y + k < a_.grid.height;
+      inside_[k] = (lanes >> lane_ & 1u) != 0 && x < a_.grid.width && y + k < a_.grid.height;
       state_[k] = {};
-      if (!inside_[k]) state_[k].transmittance = 0;
+      if (!inside_[k]) state_[k].transmittance = kNotMine;
       median_[k] = kNoSlot;
       py_[k] = static_cast<float>(y + k) + 0.5f;
     }
@@ -98,13 +113,67 @@ class TileWarp {
     waiting_ = staged_ = 0;
   }
 
+  /// Goes on with a part where the warp that gave it had stopped.
+  __device__ void resume(const TilePart& part) {
+    begin(part.tile, part.lanes);
+    for (int k = 0; k < 2; ++k) {
+      if (!inside_[k]) continue;
+      const float4 p = part.pixels[k][lane_];
+      state_[k].transmittance = p.x;
+      state_[k].r = p.y;
+      state_[k].g = p.z;
+      state_[k].b = p.w;
+      median_[k] = part.medians[k][lane_];
+    }
+    open_ = __ballot_sync(kAll, is_open());
+    reader_.resume(part.reader, part.rows);
+  }
+
+  __device__ bool divisible() const {
+    return __popc(open_) >= static_cast<int>(r_.least_pairs) && reader_.left() >= r_.least_rows;
+  }
+  __device__ bool wanted() const {
+    const bool wants = lane_ == 0 && wants_part(r_);
+    return __any_sync(kAll, wants) != 0;
+  }
+
+  /// Gives half of the open pixels to an idle warp, if there is one. No row may be waiting or staged.
+  __device__ bool give_half() {
+    if (!divisible()) return false;
+    std::uint32_t place = kNoPart;
+    if (lane_ == 0) place = place_for_part(r_);
+    place = __shfl_sync(kAll, place, 0);
+    if (place >= kParts) return false;
+    TilePart& part = r_.parts[place];
+    const unsigned lanes = half_of(open_);
+    const ReaderState reader = reader_.save(part.rows);
+    if (lane_ == 0) {
+      part.tile =
+          camera_ * static_cast<std::uint32_t>(a_.grid.count()) +
+          static_cast<std::uint32_t>(tile_y_ / kRegionTile * a_.grid.columns + tile_x_ / kRegionTile);
+      part.lanes = lanes;
+      part.reader = reader;
+    }
+    if ((lanes >> lane_ & 1u) != 0) {
+      for (int k = 0; k < 2; ++k) {
+        part.pixels[k][lane_] = {state_[k].transmittance, state_[k].r, state_[k].g, state_[k].b};
+        part.medians[k][lane_] = median_[k];
+        inside_[k] = false;
+        state_[k].transmittance = kNotMine;
+      }
+    }
+    open_ &= ~lanes;
+    give_part(r_, place);
+    return true;
+  }
+
   __device__ bool is_open() const {
     return state_[0].open(b_.raster.rules) || state_[1].open(b_.raster.rules);
   }
 
-  /// Draws the first n rows collected. Returns false once all pixels are closed. `last`: no others
-  /// follow.
-  __device__ bool blend_rows(std::uint32_t n, bool last) {
+  /// Draws the first n rows collected. Returns false once all pixels are closed. Unless `all`, some of
+  /// them may be drawn by the next call.
+  __device__ bool blend_rows(std::uint32_t n, bool all) {
     std::uint32_t at = 0;
     for (;;) {
       while (waiting_ < 32 && at < n) {
@@ -118,7 +187,7 @@ class TileWarp {
         at += 32;
       }
       __syncwarp();
-      if (waiting_ < 32 && !last) return true;
+      if (waiting_ < 32 && !all) return true;
       const bool empty = waiting_ == 0;
       if (!empty) stage();
       if (staged_ + 32 > kStaged || (empty && staged_ != 0)) {
@@ -234,6 +303,8 @@ class TileWarp {
                              py_[k]);
     }
   }
+
+  static constexpr float kNotMine = -1;  ///< Transmittance of a pixel that another warp draws.
 
   const BlendArgs& b_;
   const BatchArgs& a_;

@@ -148,11 +148,16 @@ void CudaBatchRenderer::State::size_regions() {
   const std::size_t count = std::size_t{args.cameras} * static_cast<std::size_t>(r.columns * r.rows);
   constexpr std::size_t kCounterWords = sizeof(cuda::RegionCounters) / sizeof(std::uint32_t);
   const std::size_t views = (camera_sets.size() + 1) / 2 * 2;
-  regions.zeroed_words = kCounterWords + views + 2 * args.cameras;
+  regions.zeroed_words = kCounterWords + views + 2 * args.cameras + Policy::kParts;
   std::uint32_t* const words = with_room(regions.zeroed, regions.zeroed_words);
   r.counters = reinterpret_cast<cuda::RegionCounters*>(words);
   r.view_groups = words + kCounterWords;
   r.depths = reinterpret_cast<uint2*>(r.view_groups + views);
+  r.part_states = r.view_groups + views + 2 * args.cameras;
+  r.parts = with_room(regions.parts, Policy::kParts);
+  r.least_pairs = least_pairs_of_parts;
+  r.least_rows = least_rows_of_parts;
+  r.always_gives = always_gives_parts;
   r.positions = with_room(regions.positions, std::size_t{r.groups} * 32);
   r.shapes = with_room(regions.shapes, std::size_t{r.groups} * 64);
   r.bounds = with_room(regions.bounds, r.groups);

@@ -64,7 +64,11 @@ struct RegionCounters {
   alignas(kLine) std::uint32_t precise_rows;
   alignas(kLine) std::uint32_t next_item[2];  ///< For all kinds but kInDouble, and for that.
   alignas(kLine) std::uint32_t items[kItemKinds];
+  alignas(kLine) std::uint32_t unfinished;    ///< Tiles and parts that are not drawn, but kInDouble.
+  alignas(kLine) std::uint32_t given, taken;  ///< Parts of tiles, and warps that have asked for one.
 };
+
+struct TilePart;
 
 /// Arguments of the kernels of this path besides BatchArgs.
 struct RegionArgs {
@@ -92,7 +96,13 @@ struct RegionArgs {
   std::uint32_t* order;  ///< Items by class: tile | part << 28.
   PreciseRow* precise_rows;
   SplatGeometry<float>* precise_records;
+  TilePart* parts;             ///< Room for policy::Regions::kParts.
+  std::uint32_t* part_states;  ///< Per part.
   std::uint32_t pair_capacity, precise_capacity, group_capacity;
+  /// Fewest open pairs of pixels, and rows left, of which a warp gives half away. `always_gives`: even
+  /// if no warp is idle.
+  std::uint32_t least_pairs, least_rows;
+  bool always_gives;
   bool operator==(const RegionArgs&) const = default;
 };
 

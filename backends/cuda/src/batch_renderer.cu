@@ -194,6 +194,12 @@ void CudaBatchRenderer::set_least_of_regions(std::size_t cameras, std::uint64_t 
   state_->least_cameras_of_regions = cameras;
   state_->least_gaussians_of_regions = gaussians;
 }
+void CudaBatchRenderer::set_least_of_parts(std::uint32_t pairs, std::uint32_t rows,
+                                           bool always) noexcept {
+  state_->least_pairs_of_parts = std::max(pairs, 2u);
+  state_->least_rows_of_parts = rows;
+  state_->always_gives_parts = always;
+}
 
 Status CudaBatchRenderer::render(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                                  const BatchImages& images) {
@@ -273,6 +279,8 @@ Status CudaBatchRenderer::finish() {
     s.taken = {flight.key.args.cameras, n.slots, n.pairs};
     s.stats.tile_intersections = n.pairs;
     s.stats.by_regions = flight.key.regions.sets != nullptr;
+    s.stats.parts_given =
+        s.stats.by_regions ? std::min(flight.region_counters->given, cuda::policy::Regions::kParts) : 0;
     s.stats.parts_read = s.stats.by_regions ? 0 : n.items;
     s.stats.meshes = {flight.mesh_triangles, of_meshes.not_finite, of_meshes.drawn, 0};
     if (had_room || !last || !s.prepared) {

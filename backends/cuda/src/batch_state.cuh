@@ -286,6 +286,9 @@ struct CudaBatchRenderer::State {
   RenderConfig config;
   std::size_t least_cameras_of_regions = cuda::policy::Regions::kLeastCameras;
   std::uint64_t least_gaussians_of_regions = cuda::policy::Regions::kLeastGaussians;
+  std::uint32_t least_pairs_of_parts = cuda::policy::Regions::kLeastPairs,
+                least_rows_of_parts = cuda::policy::Regions::kLeastRows;
+  bool always_gives_parts = false;
   int multiprocessors = 0;
   std::uint32_t shared_bytes = 0;  ///< Largest shared memory of a block.
   std::array<cuda::Flight, cuda::policy::Batch::kInFlight> flights;

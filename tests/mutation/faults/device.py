@@ -6,6 +6,8 @@ BATCH = "tests/emulated/test_batch_rules.cu"
 FUNCTIONS = "tests/math/test_functions.cpp"
 ONE = "tests/ops/test_batch_of_one.cpp"
 POOL = "tests/ops/test_thread_pool.cpp"
+REGIONS = "tests/ops/test_cuda_batch_regions.cpp"
+DIVIDED = "cuda batch regions: tiles that warps divide*"
 PIECES = "what pieces throw or return becomes one Status*"
 BYTE = "return static_cast<std::uint8_t>(static_cast<int>(whole) + (scaled - whole >= S(0.5) ? 1 : 0));"
 
@@ -24,6 +26,13 @@ FAULTS = [
           "a byte is the nearest*"),
     fault("byte_truncated_on_a_gpu", "to_byte", BYTE, "return static_cast<std::uint8_t>(static_cast<int>(whole));",
           "tests/ops/test_cuda_batch.cpp", "cuda batch: an empty view*", device=True),
+    fault("part_reads_the_list_again", "TileReader::resume", "next_ = from.next;", "next_ = 0;", REGIONS, DIVIDED,
+          device=True),
+    fault("part_without_the_rows_held", "TileReader::resume", "held_ = from.held;", "held_ = 0;", REGIONS, DIVIDED,
+          device=True),
+    fault("part_given_while_rows_wait", "TileWarp::draw", "last || divides", "last", REGIONS, DIVIDED, device=True),
+    fault("part_without_its_medians", "TileWarp::resume", "median_[k] = part.medians[k][lane_];", "", REGIONS, DIVIDED,
+          device=True),
     fault("set_of_a_frame_listed_once", "place_of", "std::ranges::find(of_camera, at->second) == of_camera.end()",
           "true", ONE, "a set that a frame has twice*"),
     fault("call_without_memory_given_up", "draw_what_fits", "|| count == 1", "|| count != 0", ONE,

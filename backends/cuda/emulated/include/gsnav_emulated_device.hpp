@@ -176,6 +176,7 @@ template <class T>
 T atomicMin(T* to, std::type_identity_t<T> value) {
   return gsnav::emulated::atomically(to, [&](T before) { return value < before ? value : before; });
 }
+inline void __threadfence() { gsnav::emulated::interleave(); }
 inline void __nanosleep(unsigned) { gsnav::emulated::pause(); }
 
 inline int __popc(unsigned bits) { return __builtin_popcount(bits); }

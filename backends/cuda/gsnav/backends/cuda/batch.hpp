@@ -43,7 +43,9 @@ struct BatchStats {
   std::uint64_t parts_read = 0;  ///< Number of parts (kChunkPart rows) that may be in view, counted once
                                  ///< per 32 cameras. With lists of regions, 0.
   std::uint64_t scratch_bytes = 0;  ///< Device memory for scratch, in bytes, without scene and images.
-  int reruns = 0;                   ///< How often the batch was drawn again because scratch had to grow.
+  std::uint32_t parts_given = 0;  ///< Parts of tiles that a warp began and another one finished. Depends
+                                  ///< on timing. Without lists of regions, 0.
+  int reruns = 0;                 ///< How often the batch was drawn again because scratch had to grow.
   bool replayed = false;    ///< True if a recorded CUDA graph was replayed. Calls that differ only in
                             ///< their cameras are replayed.
   bool by_regions = false;  ///< True if the batch was drawn by lists of regions (docs/notes/cuda.md).
@@ -114,6 +116,12 @@ class CudaBatchRenderer {
   /// each of them must see on average. It changes the time of a call and no bit of an image. Default:
   /// policy::Regions::kLeastCameras and kLeastGaussians.
   void set_least_of_regions(std::size_t cameras, std::uint64_t gaussians) noexcept;
+
+  /// Sets when a warp that draws a tile of such a call gives half of it to an idle warp: the fewest
+  /// pairs of pixels that are open (2 or more), and the fewest rows of its list that are left. `always`:
+  /// even if no warp is idle. It changes the time of a call and no bit of an image. Default:
+  /// policy::Regions::kLeastPairs and kLeastRows.
+  void set_least_of_parts(std::uint32_t pairs, std::uint32_t rows, bool always = false) noexcept;
 
   /// Statistics of the last batch that finish() has completed.
   const BatchStats& stats() const noexcept;

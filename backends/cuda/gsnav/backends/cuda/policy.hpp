@@ -129,6 +129,13 @@ struct Regions {
   static constexpr float kQuarters = 0.8f, kHalves = 0.4f;
   static constexpr float kFirst = 2.5f;  ///< Tiles this much longer than kQuarters are drawn first.
   static constexpr unsigned kDrawWarps = 4, kDrawResident = 4;
+  /// Between two passes, a warp gives half of its open pixels to an idle one, up to kGives times, if at
+  /// least this many pairs of pixels are open and this many rows of its list are left.
+  static constexpr std::uint32_t kLeastPairs = 4, kLeastRows = 512;
+  static constexpr int kGives = 2;
+  static constexpr std::uint32_t kParts = 4096;  ///< Largest number of parts given in a call.
+  /// Idle warps look for a part at intervals that double from kLeastSleep to kMostSleep, nanoseconds.
+  static constexpr unsigned kLeastSleep = 500, kMostSleep = 4000;
   /// Numbers of rows: the most that a warp holds, those that it collects, and the fewest that it draws.
   static constexpr std::uint32_t kHeld = 256, kTarget = 160, kLeast = 48;
   static constexpr std::uint32_t kStaged = 64;     ///< Splats staged before they are drawn.
