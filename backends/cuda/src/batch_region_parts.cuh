@@ -85,7 +85,8 @@ __device__ inline unsigned half_of(unsigned open) {
   columns = (columns | columns >> 8) & 0xffu;
   const auto first = [](unsigned bits) { return __ffs(static_cast<int>(bits)) - 1; };
   const auto last = [](unsigned bits) { return 31 - __clz(static_cast<int>(bits)); };
-  const int width = last(columns) - first(columns) + 1, height = 2 * (last(open) / 8 - first(open) / 8 + 1);
+  const int width = last(columns) - first(columns) + 1,
+            height = 2 * (last(open) / 8 - first(open) / 8 + 1);
   const unsigned column = 0x01010101u << lane % 8, left = column - 0x01010101u;
   const unsigned before = width < height ? below : left | (column & below);
   const bool far = 2 * __popc(open & before) >= __popc(open);
