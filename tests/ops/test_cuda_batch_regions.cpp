@@ -224,6 +224,35 @@ TEST_CASE("cuda batch regions: thousands of rows of one key are in order of rank
   }
 }
 
+TEST_CASE("cuda batch regions: rows of few cameras are listed in parts") {
+  if (no_gpu("cuda batch regions listed in parts")) return;
+  CudaBackend cuda;
+  GaussianCloud a = random_cloud(21, {.count = is_emulated() ? 9000 : 60000, .scale = 0.05});
+  // Centres far outside most images, with records in double.
+  GaussianCloud b = random_cloud(22, {.count = 600, .sh_degree = 1, .needle = 1, .scale = 0.4});
+  sort_spatially(a);
+  sort_spatially(b);
+  const GaussianArrays<CudaBackend> on_a(cuda, a), on_b(cuda, b);
+  const std::vector<GaussianSet> sets{on_a.set(), on_b.set()};
+  const Camera away = Camera::look_at({0, 0, 50}, {0, 0, 90}, {0, -1, 0}, 40, 24, 60);
+  for (const std::size_t seeing : {1u, 2u, 5u}) {  // 8, 4 and 2 times the share of a part, emulated.
+    CAPTURE(seeing);
+    std::vector<Camera> cameras(kCameras, away);
+    const std::vector<Camera> some = ring(static_cast<int>(seeing), 40, 24);
+    std::vector<std::size_t> numbers;
+    for (std::size_t i = 0; i < seeing; ++i) {
+      numbers.push_back(17 * i + 3);
+      cameras[numbers.back()] = some[i];
+    }
+    const RenderConfig config;
+    CudaBatchRenderer renderer(cuda, config);
+    renderer.set_least_of_regions(cuda::policy::Regions::kLeastCameras, 0);
+    const Batch got = draw_batch(cuda, renderer, sets, cameras, {}, kMedianDepth, false);
+    REQUIRE(got.stats.by_regions);
+    check_same(of_cameras(got.frames, numbers), singly(cuda, sets, some, {}, config, kMedianDepth));
+  }
+}
+
 TEST_CASE("cuda batch regions: visible sets of chunks and rows; depth against float64") {
   if (no_gpu("cuda batch regions of visible sets")) return;
   CudaBackend cuda;

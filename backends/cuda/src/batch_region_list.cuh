@@ -12,10 +12,10 @@ inline constexpr unsigned kListThreads = policy::Regions::kListThreads, kListWar
 struct ListShared {
   PlainCamera camera;
   RegionView view;
+  CameraPart part;
   std::uint32_t sums[kListWarps];
   std::uint32_t instance, rows;  ///< Current instance, and rows of the camera's sets.
-  std::size_t group_base;        ///< First place of the camera's groups in rows_in_view.
-  std::uint32_t precise_rows, precise_reserved, total, base, pair_base, precise_base, fits;
+  std::uint32_t precise_rows, precise_reserved, total, base, pair_base, precise_base, fits, last;
 };
 
 /// Pixels [x0, x1] x [y0, y1] that a row may cover. Empty if x0 > x1 or y0 > y1.
@@ -26,7 +26,8 @@ struct RowPixels {
 
 /// Conservative: from the largest axis, without a covariance.
 __device__ inline RowPixels pixels_of(const BatchArgs& a, const RegionArgs& r, const PlainCamera& p,
-                               const RegionView& v, const RowKey<float>& key, std::uint32_t word) {
+                                      const RegionView& v, const RowKey<float>& key,
+                                      std::uint32_t word) {
   const PlainCamera::Axes& c = p.axes;
   const Vec3<float>& d = key.delta;
   const float x = ::fmaf(c.rotation[0], d.x, ::fmaf(c.rotation[1], d.y, c.rotation[2] * d.z));
@@ -70,7 +71,7 @@ class ListWarp {
   __device__ ListWarp(const BatchArgs& a, const RegionArgs& r, ListShared& s, std::uint32_t* bins)
       : a_(a), r_(r), s_(s), bins_(bins) {}
 
-  /// Counts the rows of all groups of the instance in s.view, and keeps their places.
+  /// Counts the rows of the part's groups of the instance in s.view, and keeps their places.
   __device__ void count(std::uint32_t groups, uint2* rows) const {
     for_groups(groups, [&](std::uint32_t first) {
       uint2 group[kAtOnce];
@@ -88,7 +89,7 @@ class ListWarp {
         const uint2 row = row_in_view(position[q]);
         if (row.x != 0) for_regions(row, [](int, int, std::uint32_t) {});
         if ((row.y & kPrecise) != 0) atomicAdd(&s_.precise_rows, 1u);
-        if (group[q].y != 0) rows[(first + q * kListWarps) * 32 + lane()] = row;
+        if (group[q].y != 0) rows[number(first, q) * 32 + lane()] = row;
       }
     });
   }
@@ -100,7 +101,7 @@ class ListWarp {
 #pragma unroll
       for (unsigned q = 0; q < kAtOnce; ++q) {
         group[q] = group_at(first, q, groups);
-        row[q] = group[q].y != 0 ? rows[(first + q * kListWarps) * 32 + lane()] : uint2{0, 0};
+        row[q] = group[q].y != 0 ? rows[number(first, q) * 32 + lane()] : uint2{0, 0};
       }
 #pragma unroll
       for (unsigned q = 0; q < kAtOnce; ++q) {
@@ -119,13 +120,18 @@ class ListWarp {
   static constexpr unsigned kAtOnce = policy::Regions::kGroupsAtOnce;
   static __device__ unsigned lane() { return threadIdx.x % 32; }
 
+  /// The parts of a camera take turns.
   template <class F>
-  static __device__ void for_groups(std::uint32_t groups, const F& f) {
-    for (std::uint32_t first = threadIdx.x / 32; first < groups; first += kAtOnce * kListWarps) f(first);
+  __device__ void for_groups(std::uint32_t groups, const F& f) const {
+    const std::uint32_t begin = s_.part.number * kListWarps + threadIdx.x / 32;
+    for (std::uint32_t first = begin; first < groups; first = number(first, kAtOnce)) f(first);
+  }
+  __device__ std::uint32_t number(std::uint32_t first, unsigned q) const {
+    return first + q * kListWarps * s_.part.parts;
   }
   /// Group and mask of rows; no row beyond the last group.
   __device__ uint2 group_at(std::uint32_t first, unsigned q, std::uint32_t groups) const {
-    const std::uint32_t i = first + q * kListWarps;
+    const std::uint32_t i = number(first, q);
     return i < groups ? r_.in_view[s_.view.first_in_view + i] : uint2{0, 0};
   }
 

@@ -148,12 +148,13 @@ void CudaBatchRenderer::State::size_regions() {
   const std::size_t count = std::size_t{args.cameras} * static_cast<std::size_t>(r.columns * r.rows);
   constexpr std::size_t kCounterWords = sizeof(cuda::RegionCounters) / sizeof(std::uint32_t);
   const std::size_t views = (camera_sets.size() + 1) / 2 * 2;
-  regions.zeroed_words = kCounterWords + views + 2 * args.cameras + Policy::kParts;
+  regions.zeroed_words = kCounterWords + views + 3 * args.cameras + Policy::kParts;
   std::uint32_t* const words = with_room(regions.zeroed, regions.zeroed_words);
   r.counters = reinterpret_cast<cuda::RegionCounters*>(words);
   r.view_groups = words + kCounterWords;
   r.depths = reinterpret_cast<uint2*>(r.view_groups + views);
-  r.part_states = r.view_groups + views + 2 * args.cameras;
+  r.parts_done = r.view_groups + views + 2 * args.cameras;
+  r.part_states = r.parts_done + args.cameras;
   r.parts = with_room(regions.parts, Policy::kParts);
   r.least_pairs = least_pairs_of_parts;
   r.least_rows = least_rows_of_parts;
@@ -165,6 +166,13 @@ void CudaBatchRenderer::State::size_regions() {
   r.lists = with_room(regions.lists, count);
   r.bases = with_room(regions.bases, args.cameras);
   r.precise_begins = with_room(regions.precise_begins, args.cameras);
+  r.pair_begins = with_room(regions.pair_begins, args.cameras);
+  const std::size_t parts =
+      args.cameras + static_cast<std::size_t>(multiprocessors) * Policy::kListParts;
+  r.list_parts = with_room(regions.list_parts, parts);
+  r.part_precise = with_room(regions.part_precise, parts);
+  r.list_places =
+      with_room(regions.list_places, parts * static_cast<std::size_t>(r.columns * r.rows) * r.bins);
   r.order = with_room(regions.order, std::size_t{4 * cuda::kItemKinds} * args.tiles);
   regions.pairs.resize_exactly(regions.pair_capacity);
   r.pairs = regions.pairs.data();

@@ -62,6 +62,7 @@ struct RegionCounters {
   alignas(kLine) unsigned long long pairs;
   unsigned long long groups;  ///< Number of groups in view, summed over all cameras.
   alignas(kLine) std::uint32_t precise_rows;
+  std::uint32_t list_parts;                   ///< Parts of all cameras.
   alignas(kLine) std::uint32_t next_item[2];  ///< For all kinds but kInDouble, and for that.
   alignas(kLine) std::uint32_t items[kItemKinds];
   alignas(kLine) std::uint32_t unfinished;    ///< Tiles and parts that are not drawn, but kInDouble.
@@ -69,6 +70,14 @@ struct RegionCounters {
 };
 
 struct TilePart;
+
+/// Part of the groups of a camera: every `parts`-th batch of them.
+struct CameraPart {
+  std::uint32_t camera, number, parts;
+  std::uint32_t first;       ///< The camera's first part.
+  std::uint32_t group_base;  ///< First place of the camera's groups in rows_in_view, or kNoRoom.
+};
+inline constexpr std::uint32_t kNoRoom = 0xffffffffu;
 
 /// Arguments of the kernels of this path besides BatchArgs.
 struct RegionArgs {
@@ -92,6 +101,11 @@ struct RegionArgs {
   uint2* lists;                   ///< Per region: begin and length.
   std::uint32_t* bases;           ///< Per camera: first key of bin 1.
   std::uint32_t* precise_begins;  ///< Per camera.
+  std::uint32_t* pair_begins;     ///< Per camera. kNoRoom if its rows do not fit.
+  std::uint32_t* parts_done;      ///< Per camera: parts that have counted their rows.
+  CameraPart* list_parts;         ///< Parts of all cameras.
+  std::uint32_t* part_precise;    ///< Per part: number of its first row with a precise record.
+  std::uint32_t* list_places;     ///< Per part and bin: place of its next row.
   RegionRow* pairs;
   std::uint32_t* order;  ///< Items by class: tile | part << 28.
   PreciseRow* precise_rows;

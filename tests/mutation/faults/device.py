@@ -7,6 +7,7 @@ FUNCTIONS = "tests/math/test_functions.cpp"
 ONE = "tests/ops/test_batch_of_one.cpp"
 POOL = "tests/ops/test_thread_pool.cpp"
 REGIONS = "tests/ops/test_cuda_batch_regions.cpp"
+LISTED = "cuda batch regions: rows of few cameras*"
 DIVIDED = "cuda batch regions: tiles that warps divide*"
 PIECES = "what pieces throw or return becomes one Status*"
 BYTE = "return static_cast<std::uint8_t>(static_cast<int>(whole) + (scaled - whole >= S(0.5) ? 1 : 0));"
@@ -33,6 +34,10 @@ FAULTS = [
     fault("part_given_while_rows_wait", "TileWarp::draw", "last || divides", "last", REGIONS, DIVIDED, device=True),
     fault("part_without_its_medians", "TileWarp::resume", "median_[k] = part.medians[k][lane_];", "", REGIONS, DIVIDED,
           device=True),
+    fault("parts_of_a_camera_list_the_same_groups", "for_groups", "s_.part.number * kListWarps + ", "", REGIONS, LISTED,
+          device=True),
+    fault("parts_of_a_camera_share_places", "count_rows_kernel", "place += rows;", "", REGIONS, LISTED, device=True),
+    fault("parts_of_a_camera_share_records", "sum_parts", "sum += n;", "", REGIONS, LISTED, device=True),
     fault("set_of_a_frame_listed_once", "place_of", "std::ranges::find(of_camera, at->second) == of_camera.end()",
           "true", ONE, "a set that a frame has twice*"),
     fault("call_without_memory_given_up", "draw_what_fits", "|| count == 1", "|| count != 0", ONE,

@@ -123,6 +123,10 @@ struct Regions {
   static constexpr std::uint32_t kBins = 20480, kMostBins = 1280, kOctaves = 5, kOctavesBelow = 3;
   static constexpr unsigned kRowThreads = 256, kCullThreads = 256, kCullBlocks = 16;
   static constexpr unsigned kListThreads = 1024, kListResident = 1, kGroupsAtOnce = 4;
+  /// A camera is listed in parts if it has more than its share of the groups in view of all: for
+  /// kListParts of them per multiprocessor, but up to kMostListParts.
+  static constexpr std::uint32_t kListParts = 2, kMostListParts = 4;
+  static constexpr unsigned kPlanThreads = 1024;
   static constexpr unsigned kPreciseThreads = 128, kOrderThreads = 256;
   /// A tile is drawn in quarters or halves if its list is longer than this fraction of the rows that a
   /// warp reads on average.
