@@ -127,11 +127,26 @@ class TileReader {
     begin_key_ = end_key_;
     end_key_ = kLastKey;
     held_ = 0;
-    next_ = restart_;
+    next_ = restart_ = begin_of_bin(begin_key_);
   }
 
  private:
   using Policy = policy::Regions;
+
+  /// Place from restart_ on before which all keys are less than `key`, near the begin of its bin.
+  __device__ std::uint32_t begin_of_bin(std::uint32_t key) const {
+    const std::uint32_t low = first_key_of_bin(r_, base_, key);
+    std::uint32_t first = restart_, last = min(next_, list_.length);
+    while (last > first + 32) {
+      const std::uint32_t step = (last - first + 31) / 32, i = first + lane_ * step;
+      const bool earlier = i < last && first_key_of_bin(r_, base_, list_.rows[i].y) < low;
+      const auto n = static_cast<std::uint32_t>(__popc(__ballot_sync(kAll, earlier)));
+      if (n == 0) break;
+      last = min(first + n * step, last);
+      first += (n - 1) * step;
+    }
+    return first / 32 * 32;
+  }
 
   /// Lower bound of the keys from place next_ of the list on.
   __device__ std::uint32_t next_key() const {

@@ -34,6 +34,8 @@ FAULTS = [
     fault("part_given_while_rows_wait", "TileWarp::draw", "last || divides", "last", REGIONS, DIVIDED, device=True),
     fault("part_without_its_medians", "TileWarp::resume", "median_[k] = part.medians[k][lane_];", "", REGIONS, DIVIDED,
           device=True),
+    fault("bin_begins_at_the_key", "begin_of_bin", "first_key_of_bin(r_, base_, key)", "key", REGIONS,
+          "cuda batch regions: thousands of rows of one key*", device=True),
     fault("parts_of_a_camera_list_the_same_groups", "for_groups", "s_.part.number * kListWarps + ", "", REGIONS, LISTED,
           device=True),
     fault("parts_of_a_camera_share_places", "count_rows_kernel", "place += rows;", "", REGIONS, LISTED, device=True),
