@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 #
 # Installs missing packages, makes a virtual environment, builds and installs the Python package there, and runs
-# its tests. Arguments go to pytest:
+# its tests, in up to eight processes. Arguments go to pytest; -n 0 makes it one process, as --pdb needs:
 #   tools/run_python_tests.sh [-k render ...]
 # The exit status is not 0 if types are wrong or a test fails. ccache is used if it is installed.
 #
@@ -14,7 +14,7 @@
 # GSNAV_TEST_WITH=... more packages to install and test with, such as "ray jax torch stable-baselines3"
 # GSNAV_VENV=DIR      folder of the virtual environment (default: build/venv)
 # GSNAV_NO_APT=1      never call apt-get
-# GSNAV_JOBS=N        compile N files at a time; tools/build_jobs.sh has the default
+# GSNAV_JOBS=N        compile N files and run N files of tests (at most 8) together; tools/build_jobs.sh has the default
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -59,7 +59,7 @@ fi
 echo "Installing what the build and the tests need in $venv"
 "$venv/bin/pip" install --quiet --disable-pip-version-check "scikit-build-core>=0.11" "nanobind>=2.8" \
   "numpy>=1.26" "gymnasium>=1.1" "greenlet>=3" "matplotlib>=3.8" "mypy>=1.11" "numpy-quaternion" "pytest>=8" \
-  ${GSNAV_TEST_WITH:-}
+  "pytest-xdist>=3.6" ${GSNAV_TEST_WITH:-}
 echo "Building the package, $CMAKE_BUILD_PARALLEL_LEVEL files at a time"
 # The build folder is kept, so that only changed files are compiled.
 "$venv/bin/pip" install --disable-pip-version-check --no-build-isolation --no-deps --force-reinstall \
@@ -77,4 +77,5 @@ if [[ $stubs == ON ]]; then
   "$venv/bin/python" tools/make_python_page.py --stubs "$build/bindings/python/_gsnav.pyi" --check
 fi
 echo "Testing"
-exec "${run[@]}" "$venv/bin/python" -m pytest "$@"
+workers=$((CMAKE_BUILD_PARALLEL_LEVEL < 8 ? CMAKE_BUILD_PARALLEL_LEVEL : 8))
+exec "${run[@]}" "$venv/bin/python" -m pytest -n "$workers" --dist loadfile "$@"
