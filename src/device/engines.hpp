@@ -76,17 +76,15 @@ struct EngineFactory {
   Result<std::unique_ptr<BatchEngine>> (*batch)(const Device&, BatchParts);
 };
 
+// Declared in every build and defined where the build has the backend: ccache then has the same engines
+// for builds with and without GPUs.
 extern const EngineFactory serial_engines;
-#if defined(GSNAV_DEVICE_OPENMP)
 extern const EngineFactory openmp_engines;
+extern const EngineFactory cuda_engines;
 /// Number of threads of a CPU device that was asked for `threads`, and the name of its instruction set.
 int cpu_threads(int threads);
 std::string cpu_instruction_set();
-#endif
-#if defined(GSNAV_DEVICE_CUDA)
-extern const EngineFactory cuda_engines;
 int cuda_count() noexcept;
 std::string cuda_name(int index);
-#endif
 
 }  // namespace gsnav::detail
