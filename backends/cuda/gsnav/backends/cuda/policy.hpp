@@ -135,7 +135,7 @@ struct Regions {
   static constexpr unsigned kDrawWarps = 4, kDrawResident = 4;
   /// Between two passes, a warp gives half of its open pixels to an idle one, up to kGives times, if at
   /// least this many pairs of pixels are open and this many rows of its list are left.
-  static constexpr std::uint32_t kLeastPairs = 4, kLeastRows = 512;
+  static constexpr std::uint32_t kLeastPairs = 2, kLeastRows = 256;
   static constexpr int kGives = 2;
   static constexpr std::uint32_t kParts = 4096;  ///< Largest number of parts given in a call.
   /// Idle warps look for a part at intervals that double from kLeastSleep to kMostSleep, nanoseconds.
