@@ -32,7 +32,7 @@ if [[ ${GSNAV_ASAN:-0} == 1 ]]; then
   run=(env LD_PRELOAD="$(g++ -print-file-name=libasan.so) $(g++ -print-file-name=libstdc++.so)"
        ASAN_OPTIONS=detect_leaks=0:allocator_may_return_null=1 PYTHONMALLOC=malloc)
 fi
-venv=${GSNAV_VENV:-$venv}
+venv=$(realpath -m "${GSNAV_VENV:-$venv}")
 
 # True if the interpreter can make virtual environments and compile modules.
 complete() {
