@@ -13,9 +13,9 @@ import sys
 import time
 
 import numpy as np
-from pointnav_policy import Policy, load, save
-from pointnav_worlds import (ACTIONS, CHANNELS, HELD_OUT_SEEDS, METRICS, Worlds, device_of, goals, images_of,
-                             sensors_of, world_arguments)
+from pointnav_policy import ACTIONS, Policy, load, save
+from pointnav_worlds import (CHANNELS, HELD_OUT_SEEDS, METRICS, Worlds, device_of, goals, images_of, number,
+                             run_program, sensors_of, world_arguments)
 
 import gsnav
 
@@ -74,18 +74,18 @@ def main() -> None:
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("--weights", type=pathlib.Path, default=WEIGHTS, help="checkpoint.pt, or a file of --save-weights")
     p.add_argument("--save-weights", type=pathlib.Path, metavar="FILE.npz", help="write the agent to a file and end")
-    p.add_argument("--episodes", type=int, default=500, help="number of episodes in flats that no agent was trained in")
-    p.add_argument("--batch", type=int, default=256, help="episodes played at a time")
-    p.add_argument("--seed", type=int, default=1, help="seed of the actions")
+    p.add_argument("--episodes", type=number(int, 1), default=500, help="episodes in flats that no agent has seen")
+    p.add_argument("--batch", type=number(int, 1), default=256, help="episodes played at a time")
+    p.add_argument("--seed", type=number(int, 0), default=1, help="seed of the actions")
     p.add_argument("--policies", nargs="+", default=["agent", "greedy", "random", "follower"],
                    choices=["agent", "greedy", "random", "follower"], help="rows of the table")
     world_arguments(p)
     args = p.parse_args()
-    if min(args.episodes, args.batch) < 1:
-        p.error("--episodes and --batch must be 1 or more")
+    if args.save_weights is not None and args.save_weights.suffix != ".npz":
+        p.error(f"--save-weights {args.save_weights}: the name must end in .npz")
     args.device = device_of(args.device).name
     plays = {"agent", "greedy"} & set(args.policies)
-    policy = load(args.weights) if plays else None
+    policy = load(args.weights) if plays or args.save_weights else None
     if policy is not None and args.save_weights:
         return save(policy, args.save_weights)
     args.size = policy.size if policy is not None else 64
@@ -98,4 +98,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

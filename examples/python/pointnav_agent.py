@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import argparse
 import csv
 import hashlib
 import os
@@ -12,8 +13,10 @@ from typing import Any
 
 import numpy as np
 import torch
+import torch.distributed as dist
 from pointnav_curves import plot
-from pointnav_worlds import ACTIONS, LEFT, RIGHT, device_of
+from pointnav_policy import ACTIONS, read_checkpoint
+from pointnav_worlds import LEFT, RIGHT, device_of
 from torch import Tensor, nn
 
 import gsnav
@@ -143,9 +146,11 @@ def hash_of(digest: bytes, agent: nn.Module, optimizer: torch.optim.Optimizer) -
     return h.hexdigest()[:16]
 
 
-def devices_of(name: str) -> tuple[str, torch.device]:
-    """The device of gsnav and the one of torch."""
+def devices_of(name: str, rank: int = -1) -> tuple[str, torch.device]:
+    """The device of gsnav and the one of torch. With "best" or "cuda", each rank of a host has its own GPU."""
     device = device_of(name)
+    if device.kind == gsnav.DeviceKind.cuda and rank >= 0 and name in ("best", "cuda"):
+        device = device_of(f"cuda:{rank}")
     if device.kind != gsnav.DeviceKind.cuda:
         return device.name, torch.device("cpu")
     if not torch.cuda.is_available():
@@ -163,6 +168,37 @@ def set_determinism(on: bool) -> None:
     torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = True
 
 
+def made_by(device: torch.device) -> str:
+    """Versions and device. The bits of a run depend on them and on its arguments."""
+    name = torch.cuda.get_device_name(device) if device.type == "cuda" else "a CPU"
+    return f"gsnav {gsnav.__version__} and torch {torch.__version__} on {name}"
+
+
+def agreed(decision: bool, device: torch.device) -> bool:
+    """What rank 0 has decided."""
+    if not dist.is_initialized():
+        return decision
+    there = torch.tensor(float(decision), device=device)
+    dist.broadcast(there, 0)
+    return bool(there)
+
+
+def checkpoint_of(path: pathlib.Path, args: argparse.Namespace, option: str, agent: Agent,
+                  names: tuple[str, ...] = ("size", "blind", "sensor")) -> dict[str, Any]:
+    """Reads a checkpoint and gives the agent its weights. Ends the program if an argument of `names` differs."""
+    kept = read_checkpoint(path)
+    for name in names:
+        then = kept["args"].get(name, getattr(args, name))
+        if getattr(args, name) != then:
+            sys.exit(f"--{name.replace('_', '-')} {getattr(args, name)}: {path} was trained with {then}. Use that, or "
+                     f"another {option}.")
+    try:
+        agent.load_state_dict(kept["agent"])
+    except RuntimeError as e:
+        sys.exit(f"{path}: weights of another network: {' '.join(str(e).split())[:300]}")
+    return kept
+
+
 def progress(log: list[dict[str, float]], updates: int, rate: float) -> None:
     """Prints a line: means over the episodes of the last ten updates."""
     recent, row = log[-10:], log[-1]
@@ -174,10 +210,11 @@ def progress(log: list[dict[str, float]], updates: int, rate: float) -> None:
 
 def write_log(out: pathlib.Path, log: list[dict[str, float]]) -> None:
     """Writes log.csv, and its curves as curves.png."""
-    with open(out / "log.csv", "w", newline="") as file:
+    with open(out / "log.tmp", "w", newline="") as file:
         writer = csv.DictWriter(file, log[0].keys())
         writer.writeheader()
         writer.writerows(log)
+    os.replace(out / "log.tmp", out / "log.csv")
     try:
         plot({"": log}, (("success", "spl"), ("reward", "entropy")), out / "curves.png")
     except ImportError:

@@ -6,12 +6,14 @@ from __future__ import annotations
 import os
 import pathlib
 import sys
+import zipfile
 from typing import Any
 
 import numpy as np
 
 Array = np.ndarray[Any, np.dtype[Any]]
 STRIDES = (4, 2, 1)  # of the three convolutions
+ACTIONS = 4  # stop, forward, left, right
 
 
 def sigmoid(x: Array) -> Array:
@@ -68,22 +70,60 @@ class Policy:
 
 
 def load(path: pathlib.Path) -> Policy:
-    """Reads the policy from a file of save(), or from checkpoint.pt of train_pointnav.py, which needs torch."""
+    """Reads the policy from a file of save(), or from checkpoint.pt of train_pointnav.py, which needs torch.
+
+    Ends the program if the file is none of them, if a weight is not finite, or if weights do not fit each other.
+    """
     if not path.exists():
         sys.exit(f"{path}: not found. Train first, or name another file by --weights.")
-    if path.suffix == ".npz":
-        kept = dict(np.load(path))
-        return Policy({name: w for name, w in kept.items() if name != "size"}, int(kept["size"]))
+    try:
+        if path.suffix == ".npz":
+            with np.load(path) as file:
+                weights = {name: file[name] for name in file.files}
+            size = int(weights.pop("size"))
+        else:
+            state = read_checkpoint(path)
+            weights, size = {name: w.numpy() for name, w in state["agent"].items()}, int(state["args"]["size"])
+        bad = [name for name, w in weights.items() if not np.isfinite(w).all()]
+        if bad:
+            raise ValueError(f"{bad[0]} is not finite")
+        if not 36 <= size <= 4096:
+            raise ValueError(f"size {size} is not between 36 and 4096")
+        return checked(Policy(weights, size))
+    except KeyError as e:
+        sys.exit(f"{path}: no weights of an agent: {e} is missing")
+    except (OSError, EOFError, ValueError, TypeError, IndexError, zipfile.BadZipFile) as e:
+        sys.exit(f"{path}: no weights of an agent: {e}")
+
+
+def read_checkpoint(path: pathlib.Path) -> dict[str, Any]:
+    """What train_pointnav.py has saved. Ends the program if the file is no checkpoint."""
     try:
         import torch  # type: ignore[import-not-found,unused-ignore]
     except ImportError:
         sys.exit(f"{path}: reading it needs PyTorch: pip install torch")
-    state = torch.load(path, map_location="cpu", weights_only=True)
-    return Policy({name: w.numpy() for name, w in state["agent"].items()}, state["args"]["size"])
+    try:
+        state: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
+        missing = [name for name in ("agent", "args", "optimizer", "update", "digests", "log") if name not in state]
+    except Exception as e:  # torch documents no type
+        sys.exit(f"{path}: no checkpoint of train_pointnav.py, or damaged: {str(e).splitlines()[0] if str(e) else e!r}")
+    if missing:
+        sys.exit(f"{path}: no checkpoint of train_pointnav.py: {missing[0]!r} is missing")
+    return state
+
+
+def checked(policy: Policy) -> Policy:
+    """The policy, if it can act: otherwise a KeyError, IndexError or ValueError."""
+    images = np.zeros((1, policy.size, policy.size, policy.channels), np.float32) if policy.channels else None
+    start = np.ones(1, np.bool_)
+    log_p, _ = policy.act(images, np.zeros((1, 3)), np.zeros(1, np.int64), start, np.zeros((1, 256), np.float32))
+    if log_p.shape != (1, ACTIONS) or len(policy.weights["last.weight"]) != ACTIONS + 1:
+        raise ValueError(f"the agent has {log_p.shape[-1]} actions, not {ACTIONS}")
+    return policy
 
 
 def save(policy: Policy, path: pathlib.Path) -> None:
-    """Writes the weights, as numbers of 16 bits and without those of the value."""
+    """Writes the weights as numbers of 16 bits, without those of the value, to a file .npz."""
     kept: dict[str, Any] = {name: w.astype(np.float16) for name, w in policy.weights.items() if name[:5] != "value"}
     aside = path.with_name(path.name + ".tmp")
     with open(aside, "wb") as file:

@@ -7,16 +7,17 @@ import argparse
 import collections
 import concurrent.futures
 import hashlib
+import math
 import os
 import sys
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from pointnav_policy import ACTIONS
 
 import gsnav
 
-ACTIONS = 4  # stop, forward, left, right
 LEFT, RIGHT = int(gsnav.Action.turn_left), int(gsnav.Action.turn_right)
 SENSORS = {"depth": ("depth",), "rgb": ("rgb",), "rgbd": ("rgb", "depth")}  # images of an agent's sensor, in order
 CHANNELS = {"depth": 1, "rgb": 3, "rgbd": 4}  # numbers per pixel
@@ -108,13 +109,33 @@ def goals(seen: gsnav.BatchStep) -> np.ndarray:
     return np.stack([distance, np.cos(angle), np.sin(angle)], 1)
 
 
+def number(kind: type, least: float, most: float = math.inf) -> Callable[[str], Any]:
+    """A type for argparse: a number in [least, most]."""
+    def parse(text: str) -> Any:
+        value = kind(text)
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(f"{text} is not {least:g} or more" if most == math.inf else
+                                             f"{text} is not between {least:g} and {most:g}")
+        return value
+    parse.__name__ = kind.__name__
+    return parse
+
+
+def run_program(main: Callable[[], None]) -> None:
+    """Runs main(). Errors of gsnav and of files end the program with a line."""
+    try:
+        main()
+    except (gsnav.Error, OSError) as e:
+        sys.exit(f"{os.path.basename(sys.argv[0])}: {e}")
+
+
 def world_arguments(p: argparse.ArgumentParser) -> None:
     """Adds the arguments for the worlds and the quality of images."""
     p.add_argument("--device", default="best", help="device of gsnav and torch: best, cuda, cuda:1, cpu, ...")
-    p.add_argument("--people", type=int, default=0, help="people in each flat")
-    p.add_argument("--density", type=float, default=0.3, help="factor on the number of Gaussians. Flats of "
-                   "triangles take 0.05 at most, because it only changes how fine their colours are")
-    p.add_argument("--rooms", type=int, default=4, help="rooms of a flat")
+    p.add_argument("--people", type=number(int, 0, 1000), default=0, help="people in each flat")
+    p.add_argument("--density", type=number(float, 0.05, 20), default=0.3, help="factor on the number of Gaussians. "
+                   "Flats of triangles take 0.05 at most, because it only changes how fine their colours are")
+    p.add_argument("--rooms", type=number(int, 1, 1000), default=4, help="rooms of a flat")
     p.add_argument("--worlds", default="gaussians", choices=["gaussians", "meshes", "both"],
                    help="what flats are made of; both: every other flat is a mesh")
     p.add_argument("--quality", default="exact", choices=["exact", "fast", "lod"],
@@ -125,7 +146,7 @@ def sensor_arguments(p: argparse.ArgumentParser) -> None:
     """Adds the arguments for the sensor of an agent."""
     p.add_argument("--blind", action="store_true", help="the agent sees no images")
     p.add_argument("--sensor", default="depth", choices=list(CHANNELS), help="what the agent sees")
-    p.add_argument("--size", type=int, default=64, help="edge of the images, pixels, 36 or more")
+    p.add_argument("--size", type=number(int, 36, 4096), default=64, help="edge of the images, pixels, 36 or more")
 
 
 def device_of(name: str) -> gsnav.Device:

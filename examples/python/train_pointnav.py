@@ -25,10 +25,11 @@ except ImportError:
     sys.exit("train_pointnav.py needs PyTorch: pip install torch")
 import numpy as np
 import torch.distributed as dist
-from pointnav_agent import (Agent, Mirror, Reorder, Rows, clear, devices_of, hash_of, pieces, progress,
-                            set_determinism, write_log)
-from pointnav_worlds import (ACTIONS, CHANNELS, METRICS, TRAIN_SEEDS, Draw, Worlds, goals, mixed, sensor_arguments,
-                             sensors_of, world_arguments)
+from pointnav_agent import (Agent, Mirror, Reorder, Rows, agreed, checkpoint_of, clear, devices_of, hash_of, made_by,
+                            pieces, progress, set_determinism, write_log)
+from pointnav_policy import ACTIONS
+from pointnav_worlds import (CHANNELS, METRICS, TRAIN_SEEDS, Draw, Worlds, goals, mixed, number, run_program,
+                             sensor_arguments, sensors_of, world_arguments)
 from torch import Tensor, nn
 from torch.nn.utils.rnn import PackedSequence
 
@@ -272,7 +273,8 @@ def save(learner: Learner, log: list[dict[str, float]], out: pathlib.Path) -> No
         return
     kept = {name: getattr(learner.args, name) for name in KEPT}
     torch.save({"agent": learner.agent.state_dict(), "optimizer": learner.optimizer.state_dict(), "log": log,
-                "update": learner.update_count, "digests": digests, "args": kept}, out / "checkpoint.tmp")
+                "update": learner.update_count, "digests": digests, "args": kept, "made_by": made_by(learner.device)},
+               out / "checkpoint.tmp")
     os.replace(out / "checkpoint.tmp", out / "checkpoint.pt")
     write_log(out, log)
 
@@ -282,17 +284,16 @@ def resume(learner: Learner, out: pathlib.Path) -> list[dict[str, float]]:
     path = out / "checkpoint.pt"
     if not path.exists():
         if learner.args.begin_with is not None:
-            learner.agent.load_state_dict(torch.load(learner.args.begin_with, map_location="cpu")["agent"])
+            checkpoint_of(learner.args.begin_with, learner.args, "--begin-with", learner.agent)
         return []
-    kept = torch.load(path, map_location="cpu", weights_only=True)
-    for name, then in kept["args"].items():
-        if getattr(learner.args, name) != then:
-            option = name.replace("_", "-")
-            sys.exit(f"--{option} {getattr(learner.args, name)}: {path} was trained with {then}. Use that, or another "
-                     "folder for --out.")
-    learner.agent.load_state_dict(kept["agent"])
+    kept = checkpoint_of(path, learner.args, "folder for --out", learner.agent, KEPT)
+    now, then = made_by(learner.device), kept.get("made_by")
+    if then not in (None, now) and learner.rank == 0:
+        print(f"{path}: made by {then}, goes on by {now}. Bits may differ from those of one run.", file=sys.stderr)
     learner.optimizer.load_state_dict(kept["optimizer"])
     learner.update_count, learner.digest = kept["update"], kept["digests"][learner.rank]
+    if learner.rank == 0:
+        write_log(out, list(kept["log"]))
     return list(kept["log"])
 
 
@@ -334,12 +335,13 @@ def train(args: argparse.Namespace, agent: Agent) -> None:
             learner.times = dict.fromkeys(learner.times, 0.0)
         if learner.update_count % args.every == 0:
             save(learner, log, args.out)
-            if time.perf_counter() - began > 60 * args.minutes:
+            if agreed(time.perf_counter() - began > 60 * args.minutes, learner.device):
                 break
     if learner.rank == 0 and steady:
         steps = max(1.0, log[-1]["frames"] - first) / args.environments / args.ranks
         print("\n| part | ms per step of all environments |\n|---|---|")
         print("\n".join(f"| {name} | {1e3 * t / steps:.3f} |" for name, t in learner.times.items()))
+    if learner.rank == 0:
         print(f"hash {hash_of(learner.digest, agent, learner.optimizer)}")
 
 
@@ -347,25 +349,25 @@ def arguments() -> argparse.Namespace:
     """Reads the command line."""
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("--out", type=pathlib.Path, default="pointnav", help="folder of checkpoint, log and curves")
-    p.add_argument("--steps", type=float, default=1e8, help="environment steps, rounded up to a checkpoint")
+    p.add_argument("--steps", type=number(float, 0, 1e15), default=1e8, help="environment steps, up to a checkpoint")
     p.add_argument("--begin-with", type=pathlib.Path, help="checkpoint whose weights a new run begins with")
-    p.add_argument("--minutes", type=float, default=math.inf, help="stop at the first checkpoint after this time")
-    p.add_argument("--seed", type=int, default=1, help="seed of weights, episodes and actions")
+    p.add_argument("--minutes", type=number(float, 0), default=math.inf, help="end at the first checkpoint after that")
+    p.add_argument("--seed", type=number(int, 0, 2**32 - 1), default=1, help="seed of weights, episodes and actions")
     p.add_argument("--flats", type=int, default=64, choices=range(1, 65), metavar="1..64", help="flats to train in")
-    p.add_argument("--episodes-per-flat", type=int, default=1000, help="number of episodes to draw from")
-    p.add_argument("--environments", type=int, default=256, help="environments per rank")
-    p.add_argument("--rollout", type=int, default=128, help="steps per update")
-    p.add_argument("--chunks", type=int, default=4, help="minibatches: parts of a rollout, one after the other")
-    p.add_argument("--epochs", type=int, default=3, help="passes over a rollout")
-    p.add_argument("--lr", type=float, default=1e-3, help="learning rate of Adam at the beginning")
-    p.add_argument("--critic-updates", type=int, default=0, help="first updates, in which only values are learned")
-    p.add_argument("--horizon", type=float, default=1e8, help="steps after which the learning rate is a tenth of that")
-    p.add_argument("--every", type=int, default=50, help="updates from one checkpoint to the next")
-    p.add_argument("--cut-off", type=float, default=1.0, help="fraction of ranks whose end ends the rollouts of the "
-                   "others. DD-PPO has 0.6; below 1, runs on several ranks are not reproducible")
+    p.add_argument("--episodes-per-flat", type=number(int, 1), default=1000, help="number of episodes to draw from")
+    p.add_argument("--environments", type=number(int, 1), default=256, help="environments per rank")
+    p.add_argument("--rollout", type=number(int, 1), default=128, help="steps per update")
+    p.add_argument("--chunks", type=number(int, 1), default=4, help="minibatches: parts of a rollout in turn")
+    p.add_argument("--epochs", type=number(int, 1), default=3, help="passes over a rollout")
+    p.add_argument("--lr", type=number(float, 0, 1), default=1e-3, help="learning rate of Adam at the beginning")
+    p.add_argument("--critic-updates", type=number(int, 0), default=0, help="first updates, which learn values alone")
+    p.add_argument("--horizon", type=number(float, 1, 1e15), default=1e8, help="steps until the rate is --lr / 10")
+    p.add_argument("--every", type=number(int, 1), default=50, help="updates from one checkpoint to the next")
+    p.add_argument("--cut-off", type=number(float, 0, 1), default=1.0, help="fraction of ranks whose end ends the "
+                   "rollouts of the others. DD-PPO has 0.6; below 1, runs on several ranks are not reproducible")
     p.add_argument("--mirror", action="store_true", help="swap left and right in every other environment")
     p.add_argument("--not-deterministic", action="store_true", help="let PyTorch choose algorithms by speed alone")
-    p.add_argument("--success", type=float, default=2.5, help="reward for a success")
+    p.add_argument("--success", type=number(float, 0, 1e6), default=2.5, help="reward for a success")
     world_arguments(p)
     sensor_arguments(p)
     a = p.parse_args()
@@ -380,9 +382,7 @@ def main() -> None:
     """Trains or evaluates."""
     args = arguments()
     local = int(os.environ.get("LOCAL_RANK", -1))
-    if local >= 0 and args.device == "cuda":
-        args.device = f"cuda:{local}"
-    args.device, args.torch_device = devices_of(args.device)
+    args.device, args.torch_device = devices_of(args.device, local)
     cuda = args.torch_device.type == "cuda"
     set_determinism(not args.not_deterministic)
     if local >= 0:
@@ -397,4 +397,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)
