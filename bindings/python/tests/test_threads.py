@@ -83,6 +83,7 @@ simulator = gsnav.Simulator("serial", scene, gsnav.SimulatorConfig(sensors=[]))
 episode = gsnav.generate_episodes(scene.navmesh, 1, 1)[0]
 start = episode.start_position
 names, places = ("a" * 40, "b" * 4000), (start, start + (0, 50, 0))
+episode.id = names[0]  # the thread may begin late
 options = gsnav.SnapOptions()
 extents = ((2.0, 4.0, 2.0), (1e-9, 1e-9, 1e-9))
 camera = gsnav.Camera.look_at((5, 1.5, 4), (5, 1, 3), (0, 1, 0), 64, 64, 90)
