@@ -79,12 +79,25 @@ def test_two_ranks_make_the_update_of_one_with_twice_the_environments(tmp_path):
 
 
 def test_ranks_end_together(tmp_path):
-    # Rank 0 alone decides that the time is up.
     trained(tmp_path, "--minutes", "0", "--cut-off", "0.5", ranks=2, updates=50, every=1)
     assert len(rows(tmp_path)) == 2
 
 
-def test_a_rank_of_two_that_is_killed_goes_on_with_the_same_bits(tmp_path):
+def test_rank_0_decides_for_all(tmp_path):
+    program = tmp_path / "decide.py"
+    program.write_text("import sys, torch, torch.distributed as dist\n"
+                       f"sys.path.insert(0, {str(FOLDER)!r})\n"
+                       "from pointnav_agent import agreed\n"
+                       "dist.init_process_group('gloo')\n"
+                       "rank, device = dist.get_rank(), torch.device('cpu')\n"
+                       "assert [agreed(rank == 0, device), agreed(rank == 1, device)] == [True, False]\n"
+                       "dist.destroy_process_group()\n")
+    launch = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2", program]
+    run = subprocess.run(launch, env=ONE_THREAD, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+
+
+def test_two_ranks_that_were_stopped_go_on_with_the_same_bits(tmp_path):
     whole = trained(tmp_path / "whole", ranks=2, updates=4, every=2)
     trained(tmp_path / "parts", "--minutes", "0", ranks=2, updates=4, every=2)
     (tmp_path / "parts" / "log.csv").unlink()  # as if killed between checkpoint and log
