@@ -18,7 +18,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from play_pointnav import WEIGHTS, sensor_of
 from pointnav_policy import Policy, load
-from pointnav_worlds import HELD_OUT_SEEDS, Worlds, device_of, goals, images_of, sensors_of, world_arguments
+from pointnav_worlds import (HELD_OUT_SEEDS, Worlds, device_of, goals, images_of, number, run_program, sensors_of,
+                             world_arguments)
 
 import gsnav
 
@@ -169,16 +170,14 @@ def main() -> None:
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("--out", type=pathlib.Path, default="replay.webp", help="file to write, an animated WebP")
     p.add_argument("--weights", type=pathlib.Path, default=WEIGHTS, help="checkpoint.pt, or a file of --save-weights")
-    p.add_argument("--episodes", type=int, nargs="+", default=[0], help="numbers of held-out episodes, from 0")
-    p.add_argument("--steps", type=int, default=500, help="steps after which an episode is left")
-    p.add_argument("--every", type=int, default=1, help="steps from one picture to the next")
-    p.add_argument("--milliseconds", type=int, default=100, help="how long a picture is shown")
+    p.add_argument("--episodes", type=number(int, 0), nargs="+", default=[0], help="held-out episodes, from 0")
+    p.add_argument("--steps", type=number(int, 1), default=500, help="steps after which an episode is left")
+    p.add_argument("--every", type=number(int, 1), default=1, help="steps from one picture to the next")
+    p.add_argument("--milliseconds", type=number(int, 1), default=100, help="how long a picture is shown")
     p.add_argument("--compression", type=int, default=60, choices=range(101), metavar="0..100",
                    help="quality of the compressed pictures")
     world_arguments(p)
     args = p.parse_args()
-    if min(args.episodes) < 0 or min(args.steps, args.every, args.milliseconds) < 1:
-        p.error("--episodes must be 0 or more; --steps, --every and --milliseconds 1 or more")
     if args.out.suffix != ".webp":
         p.error(f"--out {args.out}: the name must end in .webp")
     if not args.out.absolute().parent.is_dir():
@@ -195,4 +194,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

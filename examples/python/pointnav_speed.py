@@ -14,7 +14,8 @@ import time
 import numpy as np
 
 import gsnav
-from pointnav_worlds import TRAIN_SEEDS, Draw, Worlds, device_of, sensor_arguments, sensors_of, world_arguments
+from pointnav_worlds import (TRAIN_SEEDS, Draw, Worlds, device_of, number, run_program, sensor_arguments, sensors_of,
+                             world_arguments)
 
 
 def main() -> None:
@@ -22,13 +23,11 @@ def main() -> None:
     world_arguments(p)
     sensor_arguments(p)
     p.add_argument("--flats", type=int, default=64, choices=range(1, 65), metavar="1..64", help="number of flats")
-    p.add_argument("--environments", type=int, default=256, help="number of environments")
-    p.add_argument("--steps", type=int, default=200, help="steps of all environments per run")
-    p.add_argument("--runs", type=int, default=5, help="number of runs; the first one is not counted")
-    p.add_argument("--seed", type=int, default=1, help="seed of episodes and actions")
+    p.add_argument("--environments", type=number(int, 1), default=256, help="number of environments")
+    p.add_argument("--steps", type=number(int, 1), default=200, help="steps of all environments per run")
+    p.add_argument("--runs", type=number(int, 2), default=5, help="number of runs; the first one is not counted")
+    p.add_argument("--seed", type=number(int, 0), default=1, help="seed of episodes and actions")
     args = p.parse_args()
-    if min(args.environments, args.steps) < 1 or args.runs < 2:
-        p.error("--environments and --steps must be 1 or more, --runs 2 or more")
     args.device = device_of(args.device).name
 
     print(f"{args.flats} flats ...", flush=True)
@@ -52,4 +51,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)
