@@ -83,7 +83,7 @@ inline Batch draw_batch(CudaBackend& cuda, CudaBatchRenderer& renderer,
   return out;
 }
 
-/// The same cameras one at a time, by the stages of draw_frame.
+/// Images of the cameras, each drawn alone by the stages of draw_frame.
 inline Frames<float> singly(CudaBackend& cuda, const std::vector<GaussianSet>& sets,
                             const std::vector<Camera>& cameras, const Lists& lists, RenderConfig config,
                             unsigned outputs, const std::vector<MeshFrame>& meshes = {}) {

@@ -179,8 +179,8 @@ struct Skin {
 /// Stages of a single-camera frame outside a batch (core/stages.hpp).
 struct Stages {
   static constexpr unsigned kEachThreads = 128;
-  /// Fewer than kFewItems work items are long ones, such as chunks. They go to as many multiprocessors
-  /// as possible.
+  /// Work items that take long, such as chunks, are few. Launches of less than kFewItems have small
+  /// blocks, which reach more multiprocessors.
   static constexpr unsigned kFewThreads = 32;
   static constexpr std::size_t kFewItems = 32768;
 };
