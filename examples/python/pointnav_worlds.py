@@ -27,11 +27,17 @@ METRICS = ("success", "spl", "soft_spl", "collision_rate", "psi", "steps")
 
 
 class Worlds:
-    """Flats and their episodes. The same arguments give the same ones."""
+    """Flats and their episodes. The same arguments give the same ones.
 
-    def __init__(self, seeds: range, args: argparse.Namespace, episodes: int, success: float = 2.5) -> None:
+    success: reward for a success. penalties: factor on the penalties of collisions with people and nearness to them.
+    """
+
+    def __init__(self, seeds: range, args: argparse.Namespace, episodes: int, success: float = 2.5,
+                 penalties: float = 1.0) -> None:
         self.task = gsnav.TaskConfig.avatar_pointnav() if args.people else gsnav.TaskConfig()
         self.task.reward.success = success
+        self.task.reward.proximity *= penalties
+        self.task.reward.collision *= penalties
         self.lod = gsnav.LodChoice() if args.quality == "lod" else None
         self.quality = gsnav.Quality.exact() if args.quality == "exact" else gsnav.Quality.fast()
 

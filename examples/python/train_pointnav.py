@@ -39,7 +39,7 @@ GAMMA, LAMBDA, CLIP, VALUE_COEF, ENTROPY_COEF, MAX_NORM = 0.99, 0.95, 0.2, 0.5, 
 # Arguments that a checkpoint keeps: with others, training would not go on as it began.
 KEPT = ("seed", "flats", "episodes_per_flat", "people", "blind", "size", "density", "rooms", "environments",
         "rollout", "chunks", "epochs", "lr", "horizon", "every", "cut_off", "ranks", "quality", "success",
-        "critic_updates", "sensor", "mirror", "worlds", "not_deterministic")
+        "critic_updates", "sensor", "mirror", "worlds", "not_deterministic", "penalties")
 
 
 class Learner:
@@ -315,7 +315,8 @@ def log_row(learner: Learner, frames: float, seconds: float) -> dict[str, float]
 def train(args: argparse.Namespace, agent: Agent) -> None:
     """Trains until all environments together have taken `args.steps` steps."""
     began = time.perf_counter()
-    learner = Learner(args, agent, Worlds(TRAIN_SEEDS[:args.flats], args, args.episodes_per_flat, args.success))
+    worlds = Worlds(TRAIN_SEEDS[:args.flats], args, args.episodes_per_flat, args.success, args.penalties)
+    learner = Learner(args, agent, worlds)
     log = resume(learner, args.out)
     if learner.rank == 0:
         print(f"{args.flats} flats made in {time.perf_counter() - began:.0f} s; {learner.update_count} updates done")
@@ -368,6 +369,7 @@ def arguments() -> argparse.Namespace:
     p.add_argument("--mirror", action="store_true", help="swap left and right in every other environment")
     p.add_argument("--not-deterministic", action="store_true", help="let PyTorch choose algorithms by speed alone")
     p.add_argument("--success", type=number(float, 0, 1e6), default=2.5, help="reward for a success")
+    p.add_argument("--penalties", type=number(float, 0, 1e3), default=1.0, help="factor on the penalties near people")
     world_arguments(p)
     sensor_arguments(p)
     a = p.parse_args()
@@ -383,15 +385,13 @@ def main() -> None:
     args = arguments()
     local = int(os.environ.get("LOCAL_RANK", -1))
     args.device, args.torch_device = devices_of(args.device, local)
-    cuda = args.torch_device.type == "cuda"
     set_determinism(not args.not_deterministic)
     if local >= 0:
-        dist.init_process_group("nccl" if cuda else "gloo")
+        dist.init_process_group("nccl" if args.torch_device.type == "cuda" else "gloo")
     args.ranks = dist.get_world_size() if local >= 0 else 1
     args.out.mkdir(parents=True, exist_ok=True)
     torch.manual_seed(args.seed)
-    agent = Agent(args.size, 0 if args.blind else CHANNELS[args.sensor]).to(args.torch_device)
-    train(args, agent)
+    train(args, Agent(args.size, 0 if args.blind else CHANNELS[args.sensor]).to(args.torch_device))
     if local >= 0:
         dist.destroy_process_group()
 

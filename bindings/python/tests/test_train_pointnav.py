@@ -279,3 +279,26 @@ def test_turns_of_a_mirrored_environment_are_seen_mirrored(monkeypatch):
         error = [np.median(np.abs(was[:, 16:-16] - now[:, 16 + s:48 + s])) for s in range(-16, 17)]
         assert np.argmin(error) > 16, error
     assert np.array_equal(Mirror(False, 0, 4, torch.device("cpu")).actions(np.arange(4)), np.arange(4))
+
+
+def test_penalties_are_a_factor_on_what_people_cost(monkeypatch):
+    monkeypatch.syspath_prepend(FOLDER)
+    import argparse
+
+    from pointnav_worlds import Draw, Worlds
+
+    args = argparse.Namespace(device="cpu:1", people=5, quality="fast", worlds="gaussians", rooms=2, density=0.05)
+    actions = np.random.default_rng(1).choice([1, 1, 2, 3], (60, 8))
+
+    def rewards(penalties):
+        worlds = Worlds(range(1), args, 8, penalties=penalties)
+        simulator = worlds.simulator(args, 8, [], Draw(worlds, 1, 0))
+        simulator.reset()
+        return np.array([simulator.step(row).rewards.copy() for row in actions])
+
+    none, tenth, all_of_them = rewards(0.0), rewards(0.1), rewards(1.0)
+    cost = none - all_of_them
+    assert np.allclose(none - tenth, 0.1 * cost, atol=1e-6)
+    # A collision costs 0.5 and up to 0.25 for being near: nothing lies between 0.25 and 0.5.
+    assert cost.min() > -1e-6 and cost.max() < 0.75 + 1e-6 and not ((cost > 0.251) & (cost < 0.499)).any()
+    assert ((cost > 0.001) & (cost < 0.251)).sum() > 20 and (cost > 0.499).sum() > 5
