@@ -232,9 +232,12 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
       if ((words[l] & TileWord::kMask) == 0 && !out.spans.empty())
         detail::copy_record<4>(out.spans[at], bounds + 8 * l + 4);
       if (depth) {
+        // Not one copy of 5 floats: g++ joins it with the one before, by way of memory that it reads
+        // back before it is written, which takes longer than the rest of the record.
         char* const to = reinterpret_cast<char*>(&out.depths[at]);
         std::memcpy(to, depths[0] + 8 * l, 8 * sizeof(float));
-        std::memcpy(to + 8 * sizeof(float), depths[1] + 8 * l, 5 * sizeof(float));
+        std::memcpy(to + 8 * sizeof(float), depths[1] + 8 * l, 4 * sizeof(float));
+        std::memcpy(to + 12 * sizeof(float), depths[1] + 8 * l + 4, sizeof(float));
       }
     }
     kept |= 1u << l;
