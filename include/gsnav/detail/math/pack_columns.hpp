@@ -10,26 +10,29 @@ namespace gsnav {
 
 namespace detail {
 #if defined(__AVX512F__)
-/// Transposes two 8 x 8 matrices: the one in the lower halves of 8 registers, and the one in the upper
-/// halves.
-GSNAV_HD void transpose_halves(PackTypes<16>::f* r) noexcept {
+/// Transposes the 4 x 4 matrices in the four quarters of 4 registers.
+GSNAV_HD void transpose_quarters(PackTypes<16>::f* r) noexcept {
   using V = PackTypes<16>::f;
-  V t[8];
-  for (int i = 0; i < 8; i += 2) {
+  V t[4];
+  for (int i = 0; i < 4; i += 2) {
     t[i] = __builtin_shufflevector(r[i], r[i + 1], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13,
                                    29);
     t[i + 1] = __builtin_shufflevector(r[i], r[i + 1], 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14,
                                        30, 15, 31);
   }
-  for (int i = 0; i < 8; i += 4) {
-    for (int h = 0; h < 2; ++h) {
-      const V a = t[i + h], b = t[i + 2 + h];
-      r[i + 2 * h] =
-          __builtin_shufflevector(a, b, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
-      r[i + 2 * h + 1] =
-          __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31);
-    }
+  for (int h = 0; h < 2; ++h) {
+    const V a = t[h], b = t[h + 2];
+    r[2 * h] = __builtin_shufflevector(a, b, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
+    r[2 * h + 1] =
+        __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31);
   }
+}
+/// Transposes two 8 x 8 matrices: the one in the lower halves of 8 registers, and the one in the upper
+/// halves.
+GSNAV_HD void transpose_halves(PackTypes<16>::f* r) noexcept {
+  using V = PackTypes<16>::f;
+  transpose_quarters(r);
+  transpose_quarters(r + 4);
   for (int i = 0; i < 4; ++i) {
     const V a = r[i], b = r[i + 4];
     r[i] = __builtin_shufflevector(a, b, 0, 1, 2, 3, 16, 17, 18, 19, 8, 9, 10, 11, 24, 25, 26, 27);
@@ -83,8 +86,7 @@ GSNAV_HD void load_columns(const float* const (&rows)[N], Pack<float, N>* column
 #if defined(__AVX512VL__)
   if constexpr (N == 16 && K == 3) {
     // Rows i, i + 4, i + 8 and i + 12 share a register.
-    using V = typename Pack<float, 16>::vector;
-    V r[4];
+    typename Pack<float, 16>::vector r[4];
     const auto row = [&rows](int i) GSNAV_INLINED {
       return reinterpret_cast<typename Pack<float, 4>::vector>(_mm_maskz_loadu_ps(0x7, rows[i]));
     };
@@ -93,20 +95,8 @@ GSNAV_HD void load_columns(const float* const (&rows)[N], Pack<float, N>* column
       const auto high = __builtin_shufflevector(row(i + 8), row(i + 12), 0, 1, 2, 3, 4, 5, 6, 7);
       r[i] = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     }
-    const V t0 =
-        __builtin_shufflevector(r[0], r[1], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    const V t1 =
-        __builtin_shufflevector(r[0], r[1], 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-    const V t2 =
-        __builtin_shufflevector(r[2], r[3], 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    const V t3 =
-        __builtin_shufflevector(r[2], r[3], 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-    columns[0].v =
-        __builtin_shufflevector(t0, t2, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
-    columns[1].v =
-        __builtin_shufflevector(t0, t2, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31);
-    columns[2].v =
-        __builtin_shufflevector(t1, t3, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
+    detail::transpose_quarters(r);
+    for (int k = 0; k < 3; ++k) columns[k].v = r[k];
     return;
   }
 #endif
@@ -164,22 +154,10 @@ GSNAV_HD void store_columns(const Pack<float, N>* columns, float* matrix) noexce
 #endif
 #if defined(__AVX512F__)
   if constexpr (N == 16 && K == 4) {
-    using V = typename Pack<float, 16>::vector;
-    const V a = columns[0].v, b = columns[1].v, c = columns[2].v, d = columns[3].v;
-    const V ab0 =
-        __builtin_shufflevector(a, b, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    const V ab1 =
-        __builtin_shufflevector(a, b, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-    const V cd0 =
-        __builtin_shufflevector(c, d, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
-    const V cd1 =
-        __builtin_shufflevector(c, d, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
-    // r[i] holds rows i, i + 4, i + 8 and i + 12, four floats each.
-    const V r[4] = {
-        __builtin_shufflevector(ab0, cd0, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29),
-        __builtin_shufflevector(ab0, cd0, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31),
-        __builtin_shufflevector(ab1, cd1, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29),
-        __builtin_shufflevector(ab1, cd1, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31)};
+    // r[i] gets rows i, i + 4, i + 8 and i + 12, four floats each.
+    typename Pack<float, 16>::vector r[4];
+    for (int k = 0; k < 4; ++k) r[k] = columns[k].v;
+    detail::transpose_quarters(r);
     for (int i = 0; i < 4; ++i) {
       Pack<float, 4>(__builtin_shufflevector(r[i], r[i], 0, 1, 2, 3)).store(matrix + 4 * i);
       Pack<float, 4>(__builtin_shufflevector(r[i], r[i], 4, 5, 6, 7)).store(matrix + 4 * (i + 4));
