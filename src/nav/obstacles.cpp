@@ -6,6 +6,8 @@
 #include <cmath>
 #include <string>
 
+#include "gsnav/detail/core/list_by_group.hpp"
+
 namespace gsnav {
 namespace {
 
@@ -93,18 +95,13 @@ void CapsuleSet::make_grid() {
   }
   cells_.clear();
   for (const Group& g : groups_) cells_.push_back(cells_of(g.swept));
-  first_.assign(std::size_t{columns_} * rows_ + 1, 0);
-  const auto each = [&](const Cells& q, const auto& f) {
+  const std::size_t cells = std::size_t{columns_} * rows_;
+  detail::list_by_group(cells_.size(), cells, first_, in_cell_, [&](std::size_t i, const auto& f) {
+    const Cells& q = cells_[i];
     for (std::uint32_t r = q.r0; r <= q.r1; ++r) {
       for (std::uint32_t c = q.c0; c <= q.c1; ++c) f(std::size_t{r} * columns_ + c);
     }
-  };
-  for (const Cells& q : cells_) each(q, [&](std::size_t cell) { ++first_[cell + 1]; });
-  for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
-  in_cell_.assign(first_.back(), 0);
-  std::vector<std::uint32_t> at(first_.begin(), first_.end() - 1);
-  for (std::uint32_t g = 0; g < cells_.size(); ++g)
-    each(cells_[g], [&](std::size_t cell) { in_cell_[at[cell]++] = g; });
+  });
 }
 
 Result<CapsuleSet> CapsuleSet::standing(std::span<const Capsule<double>> capsules,

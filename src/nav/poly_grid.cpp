@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "gsnav/detail/core/list_by_group.hpp"
 #include "poly_mesh.hpp"
 
 namespace gsnav::detail {
@@ -67,21 +68,14 @@ void PolyGrid::build(const PolyMesh& mesh) {
     }
     if (columns_ * rows_ == 1 || entries <= kMostEntries * (count + 4)) break;
   }
-  first_.assign(static_cast<std::size_t>(columns_ * rows_) + 1, 0);
-  // Count, then fill.
-  const auto each_cell = [&](PolyId id, const auto& f) {
+  const auto cells = static_cast<std::size_t>(columns_ * rows_);
+  list_by_group(mesh.polys.size(), cells, first_, polys_, [&](std::size_t i, const auto& f) {
+    const PolyId id = static_cast<PolyId>(i);
     const Cells x = columns_of(id), z = rows_of(id);
     for (std::int64_t r = z.low; r <= z.high; ++r) {
       for (std::int64_t c = x.low; c <= x.high; ++c) f(static_cast<std::size_t>(columns_ * r + c));
     }
-  };
-  for (PolyId id = 0; id < mesh.polys.size(); ++id)
-    each_cell(id, [&](std::size_t cell) { ++first_[cell + 1]; });
-  for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
-  polys_.assign(first_.back(), 0);
-  std::vector<std::uint32_t> at(first_.begin(), first_.end() - 1);
-  for (PolyId id = 0; id < mesh.polys.size(); ++id)
-    each_cell(id, [&](std::size_t cell) { polys_[at[cell]++] = id; });
+  });
 }
 
 NavPoint PolyGrid::nearest(const PolyMesh& mesh, const Vec3d& q, const Vec3d& half, double climb,

@@ -6,6 +6,7 @@
 #include <limits>
 #include <mutex>
 
+#include "gsnav/detail/core/list_by_group.hpp"
 #include "gsnav/detail/core/run_guarded.hpp"
 #include "solid_gaussians.hpp"
 
@@ -159,7 +160,7 @@ struct TileLists {
 
   TileLists(const VoxelGrid& g, std::span<const GaussianSet> sets, const GaussianNavOptions& o,
             GaussianNavReport& report)
-      : nx((g.nx + kTile - 1) / kTile), nz((g.nz + kTile - 1) / kTile), first(nx * nz + 1, 0) {
+      : nx((g.nx + kTile - 1) / kTile), nz((g.nz + kTile - 1) / kTile) {
     std::vector<Reach> reach;
     Solid s;
     Splat splat;
@@ -179,19 +180,13 @@ struct TileLists {
         }
       }
     }
-    const auto each = [&](const Reach& r, const auto& f) {
+    list_by_group(reach.size(), nx * nz, first, rows, [&](std::size_t i, const auto& f) {
+      const Reach& r = reach[i];
       if (r.x0 > r.x1) return;
       for (std::size_t z = r.z0; z <= r.z1; ++z) {
         for (std::size_t x = r.x0; x <= r.x1; ++x) f(x + nx * z);
       }
-    };
-    for (const Reach& r : reach) each(r, [&](std::size_t t) { ++first[t + 1]; });
-    for (std::size_t t = 1; t < first.size(); ++t) first[t] += first[t - 1];
-    rows.resize(first.back());
-    std::vector<std::size_t> at(first.begin(), first.end() - 1);
-    for (std::size_t i = 0; i < reach.size(); ++i) {
-      each(reach[i], [&](std::size_t t) { rows[at[t]++] = static_cast<std::uint32_t>(i); });
-    }
+    });
   }
 };
 

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "gsnav/detail/core/guarded.hpp"
+#include "gsnav/detail/core/list_by_group.hpp"
 #include "gsnav/detail/core/thread_pool.hpp"
 #include "navmesh_stages.hpp"
 #include "tile_islands.hpp"
@@ -82,8 +83,7 @@ struct TriangleLists {
   std::vector<std::uint32_t> triangles;
 
   TriangleLists(const TileGrid& grid, std::span<const Vec3d> vertices,
-                std::span<const NavMesh::Triangle> triangles_in, const Vec3d& origin, ThreadPool& pool)
-      : first(grid.count() + 1, 0) {
+                std::span<const NavMesh::Triangle> triangles_in, const Vec3d& origin, ThreadPool& pool) {
     const double rim = (grid.border + 1) * grid.settings.cell_size;
     const auto index = [&](double v, int n) {
       return static_cast<std::uint32_t>(clamp(v / grid.side(), 0.0, static_cast<double>(n - 1)));
@@ -105,19 +105,13 @@ struct TriangleLists {
                              index(max(a.z, max(b.z, c.z)) - z + rim, grid.nz)};
                }
              });
-    const auto each_tile = [&](const Reach& r, const auto& f) {
+    list_by_group(reach.size(), grid.count(), first, triangles, [&](std::size_t i, const auto& f) {
+      const Reach& r = reach[i];
       for (std::uint32_t row = r.z0; row <= r.z1; ++row) {
         for (std::uint32_t column = r.x0; column <= r.x1; ++column)
           f(column + static_cast<std::size_t>(grid.nx) * row);
       }
-    };
-    for (const Reach& r : reach) each_tile(r, [&](std::size_t tile) { ++first[tile + 1]; });
-    for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
-    triangles.resize(first.back());
-    std::vector<std::size_t> at(first.begin(), first.end() - 1);
-    for (std::uint32_t i = 0; i < reach.size(); ++i) {
-      each_tile(reach[i], [&](std::size_t tile) { triangles[at[tile]++] = i; });
-    }
+    });
   }
 };
 

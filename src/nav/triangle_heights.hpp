@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "gsnav/detail/core/list_by_group.hpp"
 #include "gsnav/math/aabb.hpp"
 #include "gsnav/nav/navmesh.hpp"
 
@@ -23,7 +24,6 @@ class TriangleHeights {
     side_ = max(max(size.x, size.z) / 128.0, 0.25);
     nx_ = static_cast<std::size_t>(size.x / side_) + 1;
     nz_ = static_cast<std::size_t>(size.z / side_) + 1;
-    first_.assign(nx_ * nz_ + 1, 0);
     for (const NavMesh::Triangle& t : triangles) {
       const std::array<Vec3d, 3> p{vertices[t[0]] - origin, vertices[t[1]] - origin,
                                    vertices[t[2]] - origin};
@@ -31,14 +31,9 @@ class TriangleHeights {
       if (!(n.y > 0.1 * norm(n))) continue;
       faces_.push_back({p[0], n});
       corners_.push_back(p);
-      each_cell(p, [&](std::size_t cell) { ++first_[cell + 1]; });
     }
-    for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
-    in_cells_.resize(first_.back());
-    std::vector<std::uint32_t> at(first_.begin(), first_.end() - 1);
-    for (std::uint32_t i = 0; i < corners_.size(); ++i) {
-      each_cell(corners_[i], [&](std::size_t cell) { in_cells_[at[cell]++] = i; });
-    }
+    list_by_group(corners_.size(), nx_ * nz_, first_, in_cells_,
+                  [&](std::size_t i, const auto& f) { each_cell(corners_[i], f); });
   }
 
   /// Highest surface at (x, z) of p within [p.y - below, p.y + above].

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "../avatar/nearest_points.hpp"
+#include "gsnav/detail/core/list_by_group.hpp"
 #include "gsnav/math/aabb.hpp"
 #include "gsnav/math/functions.hpp"
 
@@ -60,14 +61,10 @@ CellBox cells_around(const std::vector<Vec3d>& surface, const std::vector<Capsul
 struct PointsOfCells {
   std::vector<std::uint32_t> first, order;
 
-  PointsOfCells(const CellBox& cells, const std::vector<Vec3d>& points)
-      : first(cells.count() + 1, 0), order(points.size()) {
-    for (const Vec3d& p : points) ++first[cells.number(cells.place(p)) + 1];
-    for (std::size_t i = 0; i < cells.count(); ++i) first[i + 1] += first[i];
-    std::vector<std::uint32_t> next = first;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      order[next[cells.number(cells.place(points[i]))]++] = static_cast<std::uint32_t>(i);
-    }
+  PointsOfCells(const CellBox& cells, const std::vector<Vec3d>& points) {
+    detail::list_by_group(
+        points.size(), cells.count(), first, order,
+        [&](std::size_t i, const auto& f) { f(cells.number(cells.place(points[i]))); });
   }
   std::uint32_t count(std::size_t cell) const noexcept { return first[cell + 1] - first[cell]; }
 };
