@@ -30,11 +30,10 @@ void simplify(const std::vector<PathPoint>& p, std::size_t first, std::size_t la
               std::vector<Vec3d>& out) {
   std::size_t worst = first;
   double error = kHeightError;
-  const Vec3d a = p[first].position, along = p[last].position - a;
-  const double len2 = dot(along, along);
+  const Vec3d a = p[first].position, b = p[last].position;
   for (std::size_t i = first + 1; i < last; ++i) {
-    const double t = len2 > 0 ? clamp(dot(p[i].position - a, along) / len2, 0.0, 1.0) : 0.0;
-    const double off = norm(p[i].position - (a + along * t));
+    const double t = segment_fraction(a, b, p[i].position);
+    const double off = norm(p[i].position - (a + (b - a) * t));
     if (off <= error) continue;
     error = off;
     worst = i;

@@ -15,12 +15,27 @@ inline double area_xz(const Vec3d& a, const Vec3d& b, const Vec3d& c) noexcept {
   return (b.x - a.x) * (c.z - a.z) - (c.x - a.x) * (b.z - a.z);
 }
 
-/// Position of the point of edge a b nearest to p on the ground plane, as a fraction of the edge, and
-/// its distance from p in metres.
-inline std::pair<double, double> along_xz(const Vec3d& a, const Vec3d& b, const Vec3d& p) noexcept {
+/// Position of the point of edge a b nearest to p on the ground plane, as a fraction of the edge. 0 for
+/// an edge without length there.
+inline double fraction_xz(const Vec3d& a, const Vec3d& b, const Vec3d& p) noexcept {
   const double ex = b.x - a.x, ez = b.z - a.z, len2 = ex * ex + ez * ez;
-  const double t = len2 > 0 ? clamp(((p.x - a.x) * ex + (p.z - a.z) * ez) / len2, 0.0, 1.0) : 0.0;
-  return {t, std::hypot(a.x + t * ex - p.x, a.z + t * ez - p.z)};
+  return len2 > 0 ? clamp(((p.x - a.x) * ex + (p.z - a.z) * ez) / len2, 0.0, 1.0) : 0.0;
+}
+
+/// That point, on the edge in space.
+inline Vec3d nearest_xz(const Vec3d& a, const Vec3d& b, const Vec3d& p) noexcept {
+  return a + (b - a) * fraction_xz(a, b, p);
+}
+
+/// fraction_xz(), and the distance of p from that point on the ground plane, metres.
+inline std::pair<double, double> along_xz(const Vec3d& a, const Vec3d& b, const Vec3d& p) noexcept {
+  const double t = fraction_xz(a, b, p);
+  return {t, std::hypot(a.x + t * (b.x - a.x) - p.x, a.z + t * (b.z - a.z) - p.z)};
+}
+
+/// Squared distance on the ground plane.
+inline double distance2_xz(const Vec3d& a, const Vec3d& b) noexcept {
+  return (a.x - b.x) * (a.x - b.x) + (a.z - b.z) * (a.z - b.z);
 }
 
 }  // namespace gsnav::detail

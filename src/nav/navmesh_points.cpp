@@ -3,11 +3,15 @@
 #include <cmath>
 #include <limits>
 
+#include "ground_plane.hpp"
 #include "navmesh_impl.hpp"
 
 namespace gsnav {
 namespace {
 
+using detail::distance2_xz;
+using detail::fraction_xz;
+using detail::nearest_xz;
 using detail::PolyMesh;
 
 constexpr int kMaxTries = 10000;
@@ -63,16 +67,14 @@ void each_wall(const PolyMesh& m, PolyId start, const Vec3d& c, double& radius, 
     const PolyMesh::Poly& poly = m.polys[reached.queue[i]];
     for (std::uint32_t k = 0; k < poly.count; ++k) {
       const Vec3d &a = m.corner(poly, k), &b = m.corner(poly, k + 1);
-      const double ex = b.x - a.x, ez = b.z - a.z, len2 = ex * ex + ez * ez;
-      if (!(len2 > 0)) continue;
-      const double t = clamp(((c.x - a.x) * ex + (c.z - a.z) * ez) / len2, 0.0, 1.0);
-      const double dx = a.x + t * ex - c.x, dz = a.z + t * ez - c.z, d = std::sqrt(dx * dx + dz * dz);
+      if (!(distance2_xz(a, b) > 0)) continue;
+      const double d = std::sqrt(distance2_xz(nearest_xz(a, b, c), c));
       if (d > radius) continue;
       const PolyId next = m.neighbours[poly.first + k];
       if (next != kNoPoly) {
         reached.add(next);
       } else {
-        f(d, a, b, lerp(a, b, t));
+        f(d, a, b, lerp(a, b, fraction_xz(a, b, c)));
       }
     }
   }

@@ -4,6 +4,7 @@
 #include <compare>
 #include <functional>
 
+#include "ground_plane.hpp"
 #include "height_mending.hpp"
 #include "navmesh_impl.hpp"
 #include "tile_seams.hpp"
@@ -159,7 +160,7 @@ class Extractor {
     const dtPoly& p = tile.polys[i];
     const dtPolyRef self = mesh_.getPolyRefBase(&tile) | static_cast<dtPolyRef>(i);
     const Vec3d a = corner_of(tile, p, k), b = corner_of(tile, p, k + 1);
-    const double ex = b.x - a.x, ez = b.z - a.z, len2 = ex * ex + ez * ez;
+    const double len2 = distance2_xz(a, b);
     if (!(len2 > 0)) return out;
     std::size_t links = 0;
     for (unsigned l = p.firstLink; l != DT_NULL_LINK; l = tile.links[l].next) {
@@ -170,12 +171,9 @@ class Extractor {
       mesh_.getTileAndPolyByRefUnsafe(tile.links[l].ref, &other, &q);
       for (unsigned m = q->firstLink; m != DT_NULL_LINK; m = other->links[m].next) {
         if (other->links[m].ref != self || !leads_out(other->links[m])) continue;
-        const auto along = [&](const Vec3d& c) {
-          return clamp(((c.x - a.x) * ex + (c.z - a.z) * ez) / len2, 0.0, 1.0);
-        };
         const Vec3d c = corner_of(*other, *q, other->links[m].edge),
                     d = corner_of(*other, *q, other->links[m].edge + 1u);
-        const double s = along(c), e = along(d);
+        const double s = fraction_xz(a, b, c), e = fraction_xz(a, b, d);
         if (std::abs(e - s) * std::sqrt(len2) > kNarrow &&
             within_climb(a, b, c, d, min(s, e), max(s, e))) {
           out.push_back({min(s, e), max(s, e), impl_.id_of(tile.links[l].ref)});
@@ -197,12 +195,9 @@ class Extractor {
                     double to) const {
     const NavMeshSettings& s = impl_.settings;
     const double most = (std::floor(s.agent_max_climb / s.cell_height + 1e-6) + 0.5) * s.cell_height;
-    const double ex = b.x - a.x, ez = b.z - a.z,
-                 cd2 = (d.x - c.x) * (d.x - c.x) + (d.z - c.z) * (d.z - c.z);
     const auto rise = [&](double t) {
-      const double x = a.x + t * ex - c.x, z = a.z + t * ez - c.z;
-      const double u = cd2 > 0 ? clamp((x * (d.x - c.x) + z * (d.z - c.z)) / cd2, 0.0, 1.0) : 0.0;
-      return c.y + u * (d.y - c.y) - (a.y + t * (b.y - a.y));
+      const Vec3d at = a + (b - a) * t;
+      return nearest_xz(c, d, at).y - at.y;
     };
     const double r0 = rise(from), r1 = rise(to);
     return r0 * r1 < 0 || min(std::abs(r0), std::abs(r1)) <= most;

@@ -10,16 +10,6 @@
 namespace gsnav::detail {
 namespace {
 
-Vec3d nearest_on_edge_xz(const Vec3d& a, const Vec3d& b, const Vec3d& q) noexcept {
-  const double ex = b.x - a.x, ez = b.z - a.z, len2 = ex * ex + ez * ez;
-  const double s = len2 > 0 ? clamp(((q.x - a.x) * ex + (q.z - a.z) * ez) / len2, 0.0, 1.0) : 0.0;
-  return {a.x + s * ex, a.y + s * (b.y - a.y), a.z + s * ez};
-}
-
-double distance2_xz(const Vec3d& a, const Vec3d& b) noexcept {
-  return (a.x - b.x) * (a.x - b.x) + (a.z - b.z) * (a.z - b.z);
-}
-
 std::uint32_t find_root(std::vector<std::uint32_t>& parent, std::uint32_t i) noexcept {
   while (parent[i] != i) i = parent[i] = parent[parent[i]];
   return i;
@@ -41,7 +31,7 @@ Vec3d PolyMesh::clamped(PolyId id, const Vec3d& q) const noexcept {
   double best = std::numeric_limits<double>::max();
   Vec3d nearest = q;
   for (std::uint32_t k = 0; k < p.count; ++k) {
-    const Vec3d n = nearest_on_edge_xz(corner(p, k), corner(p, k + 1), q);
+    const Vec3d n = nearest_xz(corner(p, k), corner(p, k + 1), q);
     const double d2 = distance2_xz(n, q);
     if (d2 < best) {
       best = d2;

@@ -71,8 +71,8 @@ bool PolySheets::add(PolyId id) {
     for (std::size_t e = 0; e < s.sides.size(); ++e) {
       if (s.sides[e] == Sheet::kInside) continue;
       const Vec3d &a = mesh_.corner(p, s.sides[e]), &b = mesh_.corner(p, s.sides[e] + 1);
-      const double t0 = along_xz(a, b, s.corners[e]).first;
-      const double t1 = along_xz(a, b, s.corners[(e + 1) % s.corners.size()]).first;
+      const double t0 = fraction_xz(a, b, s.corners[e]);
+      const double t1 = fraction_xz(a, b, s.corners[(e + 1) % s.corners.size()]);
       parts_[p.first + s.sides[e]].push_back({all_.size(), e, t0, t1});
     }
     all_.push_back(std::move(s));
@@ -120,7 +120,7 @@ bool PolySheets::from_heights(PolyId id, std::vector<Sheet>& own) const {
       }
       if (s.sides[e] == Sheet::kInside) return false;
       const Vec3d &u = mesh_.corner(p, s.sides[e]), &v = mesh_.corner(p, s.sides[e] + 1);
-      covered[s.sides[e]] += along_xz(u, v, b).first - along_xz(u, v, a).first;
+      covered[s.sides[e]] += fraction_xz(u, v, b) - fraction_xz(u, v, a);
     }
   }
   return std::all_of(covered.begin(), covered.end(), [](double c) { return std::abs(c - 1) < 1e-3; });

@@ -3,6 +3,7 @@
 #include <array>
 #include <limits>
 
+#include "ground_plane.hpp"
 #include "poly_mesh.hpp"
 
 // A straight walk crosses convex polygons one after the other. Only at a corner or a wall, where it
@@ -45,10 +46,7 @@ Exit exit_of(const PolyMesh& m, PolyId id, const Vec3d& p, const Direction& d) n
 }
 
 bool touches(const Vec3d& a, const Vec3d& b, const Vec3d& p) noexcept {
-  const double ex = b.x - a.x, ez = b.z - a.z, len2 = ex * ex + ez * ez;
-  const double s = len2 > 0 ? clamp(((p.x - a.x) * ex + (p.z - a.z) * ez) / len2, 0.0, 1.0) : 0.0;
-  const double x = a.x + s * ex - p.x, z = a.z + s * ez - p.z;
-  return x * x + z * z <= kTouch * kTouch;
+  return distance2_xz(nearest_xz(a, b, p), p) <= kTouch * kTouch;
 }
 
 struct Fan {

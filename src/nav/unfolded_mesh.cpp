@@ -153,7 +153,7 @@ class FaceMaker {
   void add_stretches(const PolyMesh::Poly& poly, std::uint32_t side, const Vec3d& a, const Vec3d& b) {
     const std::vector<Cut>& cut = cuts_[poly.first + side];
     const Vec3d &p = mesh_.corner(poly, side), &q = mesh_.corner(poly, side + 1);
-    const double t0 = along_xz(p, q, a).first, t1 = along_xz(p, q, b).first;
+    const double t0 = fraction_xz(p, q, a), t1 = fraction_xz(p, q, b);
     const auto nearest = [&](double t) {
       std::size_t best = 0;
       for (std::size_t i = 1; i < cut.size(); ++i) {

@@ -99,9 +99,7 @@ std::vector<CellKind> kinds_of(const CellBox& cells, const PointsOfCells& points
 }
 
 bool contains(const Capsule<double>& c, const Vec3d& p) {
-  const Vec3d axis = c.p1 - c.p0, d = p - c.p0;
-  const double length2 = dot(axis, axis);
-  const Vec3d off = d - axis * (length2 > 0 ? clamp(dot(d, axis) / length2, 0.0, 1.0) : 0.0);
+  const Vec3d off = p - c.p0 - (c.p1 - c.p0) * segment_fraction(c.p0, c.p1, p);
   return dot(off, off) <= c.radius * c.radius;
 }
 

@@ -20,11 +20,6 @@ namespace {
 
 /// Barycentric coordinates of the point of triangle a b c nearest to p.
 Vec3d nearest_in_triangle(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& p) {
-  const auto on_edge = [&](const Vec3d& u, const Vec3d& v) {
-    const Vec3d d = v - u;
-    const double n = dot(d, d);
-    return n > 0 ? clamp(dot(p - u, d) / n, 0.0, 1.0) : 0.0;
-  };
   const Vec3d n = cross(b - a, c - a);
   const double area2 = dot(n, n);
   if (area2 > 0) {
@@ -32,7 +27,8 @@ Vec3d nearest_in_triangle(const Vec3d& a, const Vec3d& b, const Vec3d& c, const 
                   dot(cross(b - a, p - a), n) / area2};
     if (w.x >= 0 && w.y >= 0 && w.z >= 0) return w;
   }
-  const double s = on_edge(a, b), t = on_edge(b, c), u = on_edge(c, a);
+  const double s = segment_fraction(a, b, p), t = segment_fraction(b, c, p),
+               u = segment_fraction(c, a, p);
   const Vec3d candidates[3] = {{1 - s, s, 0}, {0, 1 - t, t}, {u, 0, 1 - u}};
   Vec3d best{1, 0, 0};
   double least = std::numeric_limits<double>::max();

@@ -124,6 +124,15 @@ GSNAV_HD Vec3<L> lerp(const Vec3<L>& a, const Vec3<L>& b, L t) noexcept {
   return {fma(t, b.x, s * a.x), fma(t, b.y, s * a.y), fma(t, b.z, s * a.z)};
 }
 
+/// Position of the point of the segment from a to b that is nearest to p, as a fraction of the segment.
+/// 0 if a equals b.
+inline double segment_fraction(const Vec3<double>& a, const Vec3<double>& b,
+                               const Vec3<double>& p) noexcept {
+  const Vec3<double> along = b - a;
+  const double length2 = dot(along, along);
+  return length2 > 0 ? clamp(dot(p - a, along) / length2, 0.0, 1.0) : 0.0;
+}
+
 /// Conversion of the components to type T.
 template <class T, class U>
 GSNAV_HD constexpr Vec3<T> vec_cast(const Vec3<U>& a) noexcept {

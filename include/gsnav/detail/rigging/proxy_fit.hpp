@@ -10,10 +10,7 @@ namespace gsnav {
 
 /// Squared distance from p to the segment a b.
 inline double segment_distance2(const Vec3d& a, const Vec3d& b, const Vec3d& p) noexcept {
-  const Vec3d ab = b - a;
-  const double length2 = dot(ab, ab);
-  const double t = length2 > 0 ? clamp(dot(p - a, ab) / length2, 0.0, 1.0) : 0.0;
-  const Vec3d d = p - (a + ab * t);
+  const Vec3d d = p - (a + (b - a) * segment_fraction(a, b, p));
   return dot(d, d);
 }
 
