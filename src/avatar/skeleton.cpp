@@ -14,12 +14,8 @@ namespace gsnav {
 namespace {
 
 bool rigid(const Affine3<double>& m) noexcept {
-  const Mat3d gram = m.linear * transpose(m.linear);
-  bool ok = is_finite(m.translation) && determinant(m.linear) > 0;
-  for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 3; ++k) ok = ok && abs(gram(i, k) - (i == k ? 1.0 : 0.0)) < 1e-3;
-  }
-  return ok;
+  return is_finite(m.translation) && determinant(m.linear) > 0 &&
+         distance_from_orthogonal(m.linear) < 1e-3;
 }
 
 }  // namespace

@@ -176,12 +176,7 @@ bool as_similarity(const Affine3<double>& a, Similarity& out) {
   const double scale = std::cbrt(determinant(a.linear));
   if (!(scale > 0) || !std::isfinite(scale)) return false;
   const Mat3<double> rotation = a.linear * (1 / scale);
-  const Mat3<double> square = rotation * transpose(rotation);
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      if (!(std::fabs(square(i, j) - (i == j ? 1 : 0)) < 1e-4)) return false;
-    }
-  }
+  if (!(distance_from_orthogonal(rotation) < 1e-4)) return false;
   out.rotation = quat_from_matrix(rotation);
   out.scale = scale;
   out.translation = a.translation;

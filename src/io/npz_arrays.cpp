@@ -57,13 +57,8 @@ Result<double> NpzArrays::number(const std::string& name) const {
 }
 
 bool is_rigid(const Affine3<double>& m) {
-  const Mat3d gram = m.linear * transpose(m.linear);
-  bool ok = determinant(m.linear) > 0 && is_finite(m.translation);
-  for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 3; ++k)
-      ok = ok && std::fabs(gram(i, k) - (i == k ? 1.0 : 0.0)) < kRigidTolerance;
-  }
-  return ok;
+  return determinant(m.linear) > 0 && is_finite(m.translation) &&
+         distance_from_orthogonal(m.linear) < kRigidTolerance;
 }
 
 bool rigid_transform(const double* m, Affine3<double>& out) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
+
 #include "gsnav/math/vec.hpp"
 
 namespace gsnav {
@@ -71,6 +73,19 @@ GSNAV_HD L determinant(const Mat3<L>& m) noexcept {
 template <class T, class U>
 GSNAV_HD constexpr Mat3<T> mat_cast(const Mat3<U>& m) noexcept {
   return {{vec_cast<T>(m.row[0]), vec_cast<T>(m.row[1]), vec_cast<T>(m.row[2])}};
+}
+
+/// Largest element of m m^T - 1, which is 0 for a rotation or a reflection. Infinite unless m is finite.
+inline double distance_from_orthogonal(const Mat3<double>& m) noexcept {
+  const Mat3<double> gram = m * transpose(m);
+  double worst = 0;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      const double off = abs(gram(i, j) - (i == j ? 1.0 : 0.0));
+      if (!(off <= worst)) worst = is_finite(off) ? off : std::numeric_limits<double>::infinity();
+    }
+  }
+  return worst;
 }
 
 /// Affine map x -> linear * x + translation: the upper three rows of a 4x4 matrix.

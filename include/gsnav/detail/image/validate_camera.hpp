@@ -36,13 +36,8 @@ inline Status validate(const Camera& c) {
   if (!is_finite(c.viewmat.translation)) {
     return bad("viewmat", "a translation that is not finite", "must be finite");
   }
-  const Mat3d gram = c.viewmat.linear * transpose(c.viewmat.linear);
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      if (!(abs(gram(i, j) - (i == j ? 1.0 : 0.0)) < 1e-3)) {
-        return bad("viewmat", "a linear part that is no rotation", "must be rigid (within 1e-3)");
-      }
-    }
+  if (!(distance_from_orthogonal(c.viewmat.linear) < 1e-3)) {
+    return bad("viewmat", "a linear part that is no rotation", "must be rigid (within 1e-3)");
   }
   const auto& m = c.viewmat.linear;
   if (dot(m.row[0], cross(m.row[1], m.row[2])) < 0) {

@@ -50,13 +50,7 @@ inline Result<Similarity> similarity_from(const Affine3<double>& a, double toler
   if (!(volume > 0)) return bad("mirrors or flattens");
   const double scale = std::cbrt(volume);
   const Mat3d rotation = a.linear * (1.0 / scale);
-  const Mat3d gram = rotation * transpose(rotation);
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      if (!(abs(gram(i, j) - (i == j ? 1.0 : 0.0)) <= tolerance))
-        return bad("shears or scales unevenly");
-    }
-  }
+  if (!(distance_from_orthogonal(rotation) <= tolerance)) return bad("shears or scales unevenly");
   return Similarity{quat_from_matrix(rotation), a.translation, scale};
 }
 
