@@ -139,8 +139,7 @@ Result<BoundCloud> bind_cloud(const GaussianCloud& cloud, const SkinnedMesh& mes
       ++out.left_out;
       continue;
     }
-    g.quat =
-        to.rotation * Quatd{cloud.quats[0][i], cloud.quats[1][i], cloud.quats[2][i], cloud.quats[3][i]};
+    g.quat = to.rotation * cloud.quat(i);
     for (std::size_t k = 0; k < 3; ++k) {
       g.log_scales[static_cast<int>(k)] = std::log(to.scale * static_cast<double>(cloud.scales[k][i]));
       g.sh0[k] = cloud.sh0[3 * i + k];

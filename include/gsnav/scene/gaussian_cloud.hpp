@@ -69,6 +69,15 @@ struct GaussianCloud {
     return origin_of(view_of(origin_ids), view_of(origins), i) +
            Vec3d{means[0][i], means[1][i], means[2][i]};
   }
+  /// Rotation of Gaussian i as it is stored, in double.
+  Quatd quat(std::size_t i) const noexcept {
+    return {quats[0][i], quats[1][i], quats[2][i], quats[3][i]};
+  }
+  /// Sets the rotation of Gaussian i, rounded to float32. `q` must be a unit quaternion.
+  void set_quat(std::size_t i, const Quatd& q) noexcept {
+    const double parts[] = {q.w, q.x, q.y, q.z};
+    for (std::size_t k = 0; k < 4; ++k) quats[k][i] = static_cast<float>(parts[k]);
+  }
 
   /// Bytes of the arrays.
   std::size_t bytes() const noexcept {

@@ -78,8 +78,7 @@ inline void pack_shapes(const GaussianCloud& cloud, PackedCloud& out) {
         const double root = std::sqrt(static_cast<double>(cloud.scales[k][i]));
         plane(ShapeRows::kScales + k)[i] = code_of(steps(root, chunk.scale_step), 65535);
       }
-      const auto part = [&](std::size_t k) { return static_cast<double>(cloud.quats[k][i]); };
-      const auto quat = pack_quat({part(0), part(1), part(2), part(3)});
+      const auto quat = pack_quat(cloud.quat(i));
       for (std::size_t k = 0; k < 3; ++k) plane(ShapeRows::kQuats + k)[i] = quat[k];
       plane(ShapeRows::kOpacity)[i] = code_of(65535.0 * static_cast<double>(cloud.opacities[i]), 65535);
     }

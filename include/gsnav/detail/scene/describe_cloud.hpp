@@ -160,10 +160,8 @@ inline UpGuess guess_up(const GaussianCloud& cloud, const Vec3d& usual = {0, -1,
     std::nth_element(scale.begin(), scale.begin() + 1, scale.end());
     Vec3d axis{};
     axis[thin] = 1;
-    const Quatd q{static_cast<double>(cloud.quats[0][i]), static_cast<double>(cloud.quats[1][i]),
-                  static_cast<double>(cloud.quats[2][i]), static_cast<double>(cloud.quats[3][i])};
     facing.push_back(static_cast<double>(scale[0]) < kFlat * static_cast<double>(scale[1])
-                         ? rotate(q, axis)
+                         ? rotate(cloud.quat(i), axis)
                          : Vec3d{});
   }
   Vec3d low, high;

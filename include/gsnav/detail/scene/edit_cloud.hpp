@@ -56,11 +56,9 @@ inline void transform(GaussianCloud& cloud, const Similarity& by) {
   const ShRotation bands(by.rotation);
   const std::size_t rest = cloud.size() == 0 ? 0 : cloud.shN.size() / cloud.size();
   for (std::size_t i = 0; i < cloud.size(); ++i) {
-    const auto part = [&](std::size_t k) { return static_cast<double>(cloud.quats[k][i]); };
-    Quatd q = by.rotation * Quatd{part(0), part(1), part(2), part(3)};
+    Quatd q = by.rotation * cloud.quat(i);
     normalize(q);
-    const double parts[] = {q.w, q.x, q.y, q.z};
-    for (std::size_t k = 0; k < 4; ++k) cloud.quats[k][i] = static_cast<float>(parts[k]);
+    cloud.set_quat(i, q);
     for (auto& plane : cloud.scales)
       plane[i] = static_cast<float>(static_cast<double>(plane[i]) * by.scale);
     if (rest != 0) bands.apply(cloud.sh_degree, cloud.shN.data() + i * rest);
@@ -160,8 +158,7 @@ inline Status transform(GaussianCloud& cloud, const Affine3<double>& by) {
   detail::replace_means(cloud, [&](std::size_t i) { return (stretch * cloud.mean(i)) * sign; });
   const std::size_t rest = cloud.size() == 0 ? 0 : cloud.shN.size() / cloud.size();
   for (std::size_t i = 0; i < cloud.size(); ++i) {
-    const auto part = [&](std::size_t k) { return static_cast<double>(cloud.quats[k][i]); };
-    Mat3d shape = stretch * rotation_matrix(Quatd{part(0), part(1), part(2), part(3)}), rotation;
+    Mat3d shape = stretch * rotation_matrix(cloud.quat(i)), rotation;
     for (int k = 0; k < 3; ++k) {
       for (int j = 0; j < 3; ++j)
         shape(j, k) *= static_cast<double>(cloud.scales[static_cast<std::size_t>(k)][i]);
@@ -170,8 +167,7 @@ inline Status transform(GaussianCloud& cloud, const Affine3<double>& by) {
     detail::orthogonal_columns(shape, rotation, scales);
     Quatd q = quat_from_matrix(rotation);
     normalize(q);
-    const double parts[] = {q.w, q.x, q.y, q.z};
-    for (std::size_t k = 0; k < 4; ++k) cloud.quats[k][i] = static_cast<float>(parts[k]);
+    cloud.set_quat(i, q);
     for (int k = 0; k < 3; ++k)
       cloud.scales[static_cast<std::size_t>(k)][i] = static_cast<float>(scales[k]);
     // In shN, coefficients 0 to 2 are degree 1 and 8 to 14 degree 3.

@@ -19,7 +19,7 @@ namespace gsnav::detail {
 inline LodGaussian lod_gaussian(const GaussianCloud& cloud, std::size_t i, double spread) noexcept {
   LodGaussian g;
   g.mean = cloud.mean(i);
-  Quatd q{cloud.quats[0][i], cloud.quats[1][i], cloud.quats[2][i], cloud.quats[3][i]};
+  Quatd q = cloud.quat(i);
   normalize(q);
   const Mat3d r = rotation_matrix(q);
   const double s[3] = {cloud.scales[0][i], cloud.scales[1][i], cloud.scales[2][i]};
@@ -56,11 +56,7 @@ inline void set_lod_gaussian(GaussianCloud& cloud, std::size_t i, const LodGauss
   const Mat3d r{{{axes.left[0].x, axes.left[1].x, axes.left[2].x},
                  {axes.left[0].y, axes.left[1].y, axes.left[2].y},
                  {axes.left[0].z, axes.left[1].z, axes.left[2].z}}};
-  const Quatd q = quat_from_matrix(r);
-  cloud.quats[0][i] = static_cast<float>(q.w);
-  cloud.quats[1][i] = static_cast<float>(q.x);
-  cloud.quats[2][i] = static_cast<float>(q.y);
-  cloud.quats[3][i] = static_cast<float>(q.z);
+  cloud.set_quat(i, quat_from_matrix(r));
   cloud.opacities[i] = static_cast<float>(opacity);
 }
 

@@ -84,16 +84,9 @@ std::vector<BoxRows> sort_boxes(B& backend, LodLevel& level, std::size_t boxes) 
     box.add(in.mean(i));
     largest[i] = std::max({in.scales[0][i], in.scales[1][i], in.scales[2][i]});
   }
-  const Vec3d size = n == 0 ? Vec3d{} : box.high - box.low;
-  const double cell = std::max({size.x, size.y, size.z, 1e-9}) / 2097151.0;
-  const float large = n == 0 ? 0 : value_of_rank(largest, n - 1 - (n - 1) / 64);
+  const SpatialCodes code(in, largest, box);
   std::vector<std::uint64_t> codes(n);
-  backend.parallel_for(n, [&](std::size_t i) {
-    const Vec3d p = (in.mean(i) - box.low) * (1.0 / cell);
-    codes[i] = hilbert_code({static_cast<std::uint32_t>(p.x), static_cast<std::uint32_t>(p.y),
-                             static_cast<std::uint32_t>(p.z)}) |
-               (largest[i] > large ? std::uint64_t{1} << 63 : 0);
-  });
+  backend.parallel_for(n, [&](std::size_t i) { codes[i] = code(i); });
   std::vector<std::uint32_t> from(std::size_t{chunks} * kProjectChunk);
   backend.parallel_for(boxes, [&](std::size_t b) {
     const auto begin = order.begin() + static_cast<std::ptrdiff_t>(out[b].first),

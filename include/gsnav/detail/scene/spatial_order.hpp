@@ -79,6 +79,31 @@ inline std::uint64_t hilbert_code(std::array<std::uint32_t, 3> x) noexcept {
   return spread_bits(x[0]) << 2 | spread_bits(x[1]) << 1 | spread_bits(x[2]);
 }
 
+/// Codes that order the rows of a cloud in space: positions of their means on Hilbert's curve. One in 64
+/// is large; these go to the end.
+struct SpatialCodes {
+  const GaussianCloud& cloud;
+  const std::vector<float>& largest;  ///< each row's largest standard deviation
+  Vec3d low;
+  double cells_per_metre;
+  float large;
+
+  /// `box` contains all means.
+  SpatialCodes(const GaussianCloud& of, const std::vector<float>& scales, const Aabb<double>& box)
+      : cloud(of), largest(scales), low(box.low) {
+    const Vec3d size = box.high - box.low;
+    cells_per_metre = 1.0 / (std::max({size.x, size.y, size.z, 1e-9}) / 2097151.0);
+    const std::size_t n = scales.size();
+    large = n == 0 ? 0 : value_of_rank(scales, n - 1 - (n - 1) / 64);
+  }
+  std::uint64_t operator()(std::size_t i) const noexcept {
+    const Vec3d p = (cloud.mean(i) - low) * cells_per_metre;
+    return hilbert_code({static_cast<std::uint32_t>(p.x), static_cast<std::uint32_t>(p.y),
+                         static_cast<std::uint32_t>(p.z)}) |
+           (largest[i] > large ? std::uint64_t{1} << 63 : 0);
+  }
+};
+
 /// Indices of n rows, sorted by `code(i)` (63 bits) and then by index.
 template <Backend B, class Code>
 std::vector<std::uint32_t> rows_by_code(B& backend, std::size_t n, const Code& code) {
@@ -171,16 +196,8 @@ void sort_spatially(B& backend, GaussianCloud& cloud) {
   backend.synchronize().throw_if_error();
   Aabb<double> box;
   for (const Aabb<double>& b : boxes) box.add(b);
-  const Vec3d size = box.high - box.low;
-  const double cell = std::max({size.x, size.y, size.z, 1e-9}) / 2097151.0;
-  const float large = detail::value_of_rank(largest, n - 1 - (n - 1) / 64);
-  std::vector<std::uint32_t> order = detail::rows_by_code(backend, n, [&](std::size_t i) {
-    const Vec3d p = (cloud.mean(i) - box.low) * (1.0 / cell);
-    const std::uint64_t code =
-        detail::hilbert_code({static_cast<std::uint32_t>(p.x), static_cast<std::uint32_t>(p.y),
-                              static_cast<std::uint32_t>(p.z)});
-    return code | (largest[i] > large ? std::uint64_t{1} << 63 : 0);
-  });
+  std::vector<std::uint32_t> order =
+      detail::rows_by_code(backend, n, detail::SpatialCodes(cloud, largest, box));
   std::vector<float> scratch = std::move(largest);
   const auto move = [&](std::vector<float>& plane, std::size_t stride) {
     permute_rows(backend, order, stride, plane, scratch);
