@@ -13,17 +13,26 @@ namespace gsnav {
 
 /// Size of a huge page, 2 MiB.
 inline constexpr std::size_t kHugePage = std::size_t{2} << 20;
+/// Size of a page, at least.
+inline constexpr std::size_t kPage = 4096;
+
+#if defined(__linux__)
+namespace detail {
+/// Gives the system advice on the whole pages in a memory range.
+inline void advise_pages(void* p, std::size_t bytes, std::size_t page, int advice) noexcept {
+  const std::uintptr_t at = reinterpret_cast<std::uintptr_t>(p), begin = (at + page - 1) / page * page,
+                       end = (at + bytes) / page * page;
+  if (end > begin) static_cast<void>(::madvise(reinterpret_cast<void*>(begin), end - begin, advice));
+}
+}  // namespace detail
+#endif
 
 /// Requests huge pages for memory that has not been written yet. A frame reads tens of megabytes; with 4
 /// KiB pages, address translation halves the bandwidth, and worse in virtual machines. Has no effect if
 /// the system has no huge pages.
 inline void advise_huge_pages([[maybe_unused]] void* p, [[maybe_unused]] std::size_t bytes) noexcept {
 #if defined(__linux__) && defined(MADV_HUGEPAGE)
-  const std::uintptr_t begin =
-      (reinterpret_cast<std::uintptr_t>(p) + kHugePage - 1) / kHugePage * kHugePage;
-  const std::uintptr_t end = (reinterpret_cast<std::uintptr_t>(p) + bytes) / kHugePage * kHugePage;
-  if (end > begin)
-    static_cast<void>(::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE));
+  detail::advise_pages(p, bytes, kHugePage, MADV_HUGEPAGE);
 #endif
 }
 
@@ -31,11 +40,7 @@ inline void advise_huge_pages([[maybe_unused]] void* p, [[maybe_unused]] std::si
 /// again.
 inline void discard_pages([[maybe_unused]] void* p, [[maybe_unused]] std::size_t bytes) noexcept {
 #if defined(__linux__)
-  constexpr std::uintptr_t kPage = 4096;
-  const std::uintptr_t begin = (reinterpret_cast<std::uintptr_t>(p) + kPage - 1) / kPage * kPage;
-  const std::uintptr_t end = (reinterpret_cast<std::uintptr_t>(p) + bytes) / kPage * kPage;
-  if (end > begin)
-    static_cast<void>(::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_DONTNEED));
+  detail::advise_pages(p, bytes, kPage, MADV_DONTNEED);
 #endif
 }
 
