@@ -29,14 +29,7 @@ Result<Mat3<double>> rotation_of(const Json& object, const std::string& where) {
     if (!values) return values.status();
     for (int j = 0; j < 3; ++j) m(i, j) = (*values)[static_cast<std::size_t>(j)];
   }
-  const Mat3<double> product = m * transpose(m);
-  bool is_rotation = dot(m.row[0], cross(m.row[1], m.row[2])) > 0;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      is_rotation = is_rotation && std::fabs(product(i, j) - (i == j ? 1.0 : 0.0)) <= kRotationTolerance;
-    }
-  }
-  if (!is_rotation) {
+  if (!(determinant(m) > 0 && distance_from_orthogonal(m) <= kRotationTolerance)) {
     return {Errc::invalid_file, where +
                                     ": 'rotation' is no rotation (its rows must be orthonormal within "
                                     "1e-3 and right-handed)"};
@@ -61,16 +54,15 @@ Result<Camera> camera_of(const Json& object, const std::string& where) {
     }
     focal[k] = *value;
   }
-  const auto position = detail::get_numbers(object, "position", 3, where);
-  if (!position) return position.status();
+  Vec3d position;
+  if (Status s = detail::get_vector(object, "position", where, position); !s) return s;
   const auto rotation = rotation_of(object, where);
   if (!rotation) return rotation.status();
   Camera c{.fx = focal[0],
            .fy = focal[1],
            .width = static_cast<int>(*width),
            .height = static_cast<int>(*height)};
-  c.viewmat =
-      rigid_inverse(Affine3<double>{*rotation, {(*position)[0], (*position)[1], (*position)[2]}});
+  c.viewmat = rigid_inverse(Affine3<double>{*rotation, position});
   return c;
 }
 

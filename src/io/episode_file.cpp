@@ -101,13 +101,6 @@ class EpisodeReader {
     return {};
   }
 
-  static Status vec3(const Json& object, const char* key, const std::string& at, Vec3d& out) {
-    const auto v = detail::get_numbers(object, key, 3, at);
-    if (!v) return v.status();
-    out = {(*v)[0], (*v)[1], (*v)[2]};
-    return {};
-  }
-
   static Status text(const Json& object, const char* key, const std::string& at, std::string& out) {
     const Json* v = member(object, key);
     if (v == nullptr) return {};
@@ -128,7 +121,8 @@ class EpisodeReader {
     }
     more_goals_ = more_goals_ || goals->size() > 1;
     const Json& first = (*goals)[0];
-    if (Status s = vec3(first, "position", at + ": goals[0]", out.goal_position); !s) return s;
+    if (Status s = detail::get_vector(first, "position", at + ": goals[0]", out.goal_position); !s)
+      return s;
     const Json* radius = member(first, "radius");
     if (radius == nullptr || radius->is_null()) return {};
     const auto r = detail::get_number(first, "radius", at + ": goals[0]");
@@ -156,7 +150,7 @@ class EpisodeReader {
     out.id = std::to_string(out_.episodes.size());
     if (Status s = text(e, "episode_id", at, out.id); !s) return s;
     if (Status s = text(e, "scene_id", at, out.scene_id); !s) return s;
-    if (Status s = vec3(e, "start_position", at, out.start_position); !s) return s;
+    if (Status s = detail::get_vector(e, "start_position", at, out.start_position); !s) return s;
     const auto q = detail::get_numbers(e, "start_rotation", 4, at);
     if (!q) return q.status();
     out.start_rotation = {(*q)[3], (*q)[0], (*q)[1], (*q)[2]};

@@ -31,14 +31,6 @@ Result<std::string> text(const Json& object, const char* key, const std::string&
 
 namespace {
 
-Status vec3(const Json& object, const char* key, const std::string& at, Vec3d& out) {
-  if (member(object, key) == nullptr) return {};
-  const auto v = detail::get_numbers(object, key, 3, at);
-  if (!v) return v.status();
-  out = {(*v)[0], (*v)[1], (*v)[2]};
-  return {};
-}
-
 Status read_scale(const Json& object, const std::string& at, double& out) {
   const Json* v = member(object, "scale");
   if (v == nullptr) return {};
@@ -68,7 +60,8 @@ Status read_stage(const Json& object, const fs::path& folder, const std::string&
   }
   for (const auto& [key, to] :
        {std::pair{"up", &out.up}, std::pair{"front", &out.front}, std::pair{"origin", &out.origin}}) {
-    if (Status s = vec3(object, key, at, *to); !s) return s;
+    if (member(object, key) == nullptr) continue;
+    if (Status s = detail::get_vector(object, key, at, *to); !s) return s;
   }
   for (const auto& [key, v] : {std::pair{"up", out.up}, std::pair{"front", out.front}}) {
     if (!(norm(v) > 0)) return {Errc::invalid_file, at + ": '" + key + "' is zero"};

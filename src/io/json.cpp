@@ -138,4 +138,11 @@ Result<std::vector<double>> get_numbers(const Json& object, const char* key, std
   return out;
 }
 
+Status get_vector(const Json& object, const char* key, const std::string& where, Vec3d& out) {
+  const auto v = get_numbers(object, key, 3, where);
+  if (!v) return v.status();
+  out = {(*v)[0], (*v)[1], (*v)[2]};
+  return {};
+}
+
 }  // namespace gsnav::io::detail

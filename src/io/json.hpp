@@ -11,6 +11,7 @@
 
 #include "gsnav/core/status.hpp"
 #include "gsnav/detail/io/read_limits.hpp"
+#include "gsnav/math/vec.hpp"
 
 namespace gsnav::io::detail {
 
@@ -47,5 +48,7 @@ Result<std::int64_t> get_integer(const Json& object, const char* key, std::int64
 /// Reads an array of exactly `size` finite numbers.
 Result<std::vector<double>> get_numbers(const Json& object, const char* key, std::size_t size,
                                         const std::string& where);
+/// Reads an array of three finite numbers into `out`.
+Status get_vector(const Json& object, const char* key, const std::string& where, Vec3d& out);
 
 }  // namespace gsnav::io::detail

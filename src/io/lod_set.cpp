@@ -275,23 +275,22 @@ class LodReader {
                                         ///< requested one
 };
 
+/// The description of a set that is named by it or by its folder.
+std::filesystem::path file_of(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::is_directory(path, ignored) ? path / "lod-meta.json" : path;
+}
+
 }  // namespace
 
 Result<LoadedCloud> load_lod_set(const std::filesystem::path& path, const LoadLodOptions& options) {
-  return detail::guarded(path.string(), [&] {
-    std::error_code ignored;
-    const bool folder = std::filesystem::is_directory(path, ignored);
-    return detail::described(LodReader(folder ? path / "lod-meta.json" : path, options).run());
-  });
+  return detail::guarded(path.string(),
+                         [&] { return detail::described(LodReader(file_of(path), options).run()); });
 }
 
 Result<std::optional<LoadedLodSet>> load_lod_levels(const std::filesystem::path& path,
                                                     const LoadLodOptions& options) {
-  return detail::guarded(path.string(), [&] {
-    std::error_code ignored;
-    const bool folder = std::filesystem::is_directory(path, ignored);
-    return LodReader(folder ? path / "lod-meta.json" : path, options).run_levels();
-  });
+  return detail::guarded(path.string(), [&] { return LodReader(file_of(path), options).run_levels(); });
 }
 
 }  // namespace gsnav::io
