@@ -33,14 +33,6 @@ Status check(const DynamicCapsule& c) {
   return {};
 }
 
-void add_swept(Aabb<double>& box, const Capsule<double>& c) noexcept {
-  const Vec3d r{c.radius, c.radius, c.radius};
-  for (const Vec3d& p : {c.p0, c.p1}) {
-    box.add(p - r);
-    box.add(p + r);
-  }
-}
-
 }  // namespace
 
 Result<CapsuleSet> CapsuleSet::create(std::vector<DynamicCapsule> capsules, double t0, double t1) {
@@ -69,8 +61,8 @@ Result<CapsuleSet> CapsuleSet::create(std::vector<DynamicCapsule> capsules, doub
     Group& g = set.groups_.back();
     ++g.count;
     // Linear motion stays within the convex hull of both ends.
-    add_swept(g.swept, c.motion.begin);
-    add_swept(g.swept, c.motion.end);
+    add_capsule(g.swept, c.motion.begin);
+    add_capsule(g.swept, c.motion.end);
   }
   set.make_grid();
   return set;

@@ -261,10 +261,8 @@ Clearance clearance(const AgentState& agent, const CapsuleSet& bodies, double t)
   if (!valid(agent) || !is_finite(t)) return best;
   const double u = bodies.fraction_at(t);
   const Capsule<double> solid = agent_capsule(agent.position, agent.radius, agent.height);
-  const Vec3d r{solid.radius, solid.radius, solid.radius};
   Aabb<double> box;
-  box.add(solid.p0 - r);
-  box.add(solid.p1 + r);
+  add_capsule(box, solid);
   // Begin with the avatar whose box is nearest. Most others are then too far away to matter.
   const std::span<const CapsuleSet::Group> groups = bodies.groups();
   std::size_t first = 0;

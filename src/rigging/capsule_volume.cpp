@@ -39,13 +39,7 @@ struct CellBox {
 CellBox cells_around(const std::vector<Vec3d>& surface, const std::vector<Capsule<double>>& capsules) {
   Aabb<double> box;
   for (const Vec3d& p : surface) box.add(p);
-  for (const auto& c : capsules) {
-    const Vec3d r{c.radius, c.radius, c.radius};
-    for (const Vec3d& p : {c.p0, c.p1}) {
-      box.add(p - r);
-      box.add(p + r);
-    }
-  }
+  for (const auto& c : capsules) add_capsule(box, c);
   CellBox out;
   // At most 400 cells along the diagonal, also for scattered points.
   out.side = max(max(0.01, 3 * detail::typical_spacing(surface)), norm(box.high - box.low) / 400);
@@ -62,9 +56,9 @@ struct PointsOfCells {
   std::vector<std::uint32_t> first, order;
 
   PointsOfCells(const CellBox& cells, const std::vector<Vec3d>& points) {
-    detail::list_by_group(
-        points.size(), cells.count(), first, order,
-        [&](std::size_t i, const auto& f) { f(cells.number(cells.place(points[i]))); });
+    detail::list_by_group(points.size(), cells.count(), first, order, [&](std::size_t i, const auto& f) {
+      f(cells.number(cells.place(points[i])));
+    });
   }
   std::uint32_t count(std::size_t cell) const noexcept { return first[cell + 1] - first[cell]; }
 };

@@ -24,13 +24,6 @@ Vec3d position_at(std::span<const WalkPoint> path, double u) {
 
 constexpr double kRounding = 1e-9;
 
-void add_capsule(Aabb<double>& box, const Capsule<double>& c) {
-  for (const Vec3d& p : {c.p0, c.p1}) {
-    box.add(p - Vec3d{c.radius, c.radius, c.radius});
-    box.add(p + Vec3d{c.radius, c.radius, c.radius});
-  }
-}
-
 /// Lower bound of the distance between objects in two boxes. If the boxes overlap, -infinity.
 double least_distance(const Aabb<double>& a, const Aabb<double>& b) {
   double square = 0.0;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "gsnav/math/aabb.hpp"
 #include "gsnav/math/vec.hpp"
 
 namespace gsnav {
@@ -15,6 +16,14 @@ struct Capsule {
       p1{};      ///< second end of the segment, metres
   L radius{};    ///< metres, >= 0
 };
+
+/// Extends a box to contain a capsule.
+inline void add_capsule(Aabb<double>& box, const Capsule<double>& c) noexcept {
+  for (const Vec3<double>& p : {c.p0, c.p1}) {
+    box.add(p - Vec3<double>{c.radius, c.radius, c.radius});
+    box.add(p + Vec3<double>{c.radius, c.radius, c.radius});
+  }
+}
 
 /// A capsule whose endpoints and radius move linearly from `begin` to `end` during one tick.
 template <class L>
