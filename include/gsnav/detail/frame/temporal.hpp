@@ -13,18 +13,24 @@ namespace gsnav {
 /// Number of planes of motion: velocity, acceleration and jerk, three components each.
 inline constexpr std::size_t kMotionPlanes = 9;
 
-/// N Gaussians that move and fade over time (4D Gaussians, as in Habitat-GS). It owns nothing.
+/// How N Gaussians move and fade over time (4D Gaussians, as in Habitat-GS). It owns nothing.
 ///
 /// At time t, with dt = t - times[i], the mean is base + v dt + a dt^2 / 2 + j dt^3 / 6. The opacity is
 /// base * exp(-dt^2 / (2 (sigma^2 + 1e-8))). Shapes, orientations and colours do not change.
-struct TemporalView {
-  GaussianRows base;         ///< each Gaussian at its own time
+struct TemporalRows {
   View<const float> times;   ///< [N], seconds
   View<const float> sigmas;  ///< [N], seconds, >= 0; infinity: never fades
   /// x, y, z of velocity (m/s), acceleration (m/s^2) and jerk (m/s^3), [N] each. Empty planes are zero.
   /// The three planes of one quantity are either all present or all empty.
   View<const float> motion[kMotionPlanes];
 };
+static_assert(sizeof(void*) != 8 || sizeof(TemporalRows) <= 256);
+
+/// The same with all arrays of the Gaussians, each at its own time.
+struct TemporalView : TemporalRows {
+  GaussianRows base;
+};
+static_assert(sizeof(void*) != 8 || sizeof(TemporalView) <= 656);
 
 /// Factor of the opacity `dt` seconds from the Gaussian's own time.
 template <class S>
@@ -47,9 +53,10 @@ GSNAV_HD Vec3<S> temporal_offset(const Vec3<S>& velocity, const Vec3<S>& acceler
 /// State of Gaussian i at time t: returns its offset from the base in metres, and its opacity. An
 /// opacity below 1/255 becomes 0, and the offset is then 0 as well.
 template <class S>
-GSNAV_HD Vec3<S> temporal_state(const TemporalView& in, std::size_t i, double t, S& opacity) noexcept {
+GSNAV_HD Vec3<S> temporal_state(const ShapeRows& base, const TemporalRows& in, std::size_t i, double t,
+                                S& opacity) noexcept {
   const S dt = static_cast<S>(t - static_cast<double>(in.times[i]));
-  opacity = S(opacity_of(in.base.shape, i)) * temporal_weight(dt, S(in.sigmas[i]));
+  opacity = S(opacity_of(base, i)) * temporal_weight(dt, S(in.sigmas[i]));
   if (!(opacity >= S(1.0 / 255))) {
     opacity = S(0);
     return {};
@@ -65,15 +72,16 @@ GSNAV_HD Vec3<S> temporal_state(const TemporalView& in, std::size_t i, double t,
 /// Kernel that writes the mean (offset from its origin) and the opacity of Gaussian i at time t.
 template <class S>
 struct GaussianAt {
-  TemporalView in;
+  ShapeRows base;
+  TemporalRows in;
   double t = 0;
   View<float> means[3];
   View<float> opacities;
 
   GSNAV_HD void operator()(std::size_t i) const noexcept {
     S opacity;
-    const Vec3<S> offset = temporal_state<S>(in, i, t, opacity);
-    const Vec3<S> mean = vec_cast<S>(mean_of(in.base.shape, i)) + offset;
+    const Vec3<S> offset = temporal_state<S>(base, in, i, t, opacity);
+    const Vec3<S> mean = vec_cast<S>(mean_of(base, i)) + offset;
     for (int k = 0; k < 3; ++k) means[k][i] = static_cast<float>(mean[k]);
     opacities[i] = static_cast<float>(opacity);
   }
@@ -82,11 +90,11 @@ struct GaussianAt {
 /// Kernel that computes the bounds of chunk c from the results of GaussianAt. Gaussians with opacity 0
 /// are ignored.
 struct BoundChunkAt {
-  GaussianRows moment;
+  ShapeRows rows;
+  View<const Vec3d> origins;
   View<ChunkBounds> bounds;
 
   GSNAV_HD void operator()(std::size_t c) const noexcept {
-    const ShapeRows& rows = moment.shape;
     const std::size_t begin = c * kProjectChunk;
     const std::size_t end = begin + kProjectChunk < rows.size ? begin + kProjectChunk : rows.size;
     ChunkBounds b;
@@ -94,7 +102,8 @@ struct BoundChunkAt {
     for (std::size_t i = begin; i < end; ++i) {
       const float opacity = opacity_of(rows, i);
       if (!(opacity > 0)) continue;
-      const Vec3d origin = moment.origin_of(i), mean = vec_cast<double>(mean_of(rows, i));
+      const Vec3d origin = origin_of(rows.origin_ids, origins, i),
+                  mean = vec_cast<double>(mean_of(rows, i));
       const Vec3<float> scales = scales_of(rows, i);
       for (int k = 0; k < 3; ++k) {
         const double x = origin[k] + mean[k];

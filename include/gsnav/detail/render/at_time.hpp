@@ -59,7 +59,7 @@ Status gaussians_at(B& backend, const TemporalView& in, double t, Moment<B>& out
   if (Status s = validate(in); !s) return s;
   if (!is_finite(t)) return {Errc::invalid_argument, "gaussians_at: the time is " + std::to_string(t)};
   const std::size_t n = in.base.size();
-  GaussianAt<S> at{in, t, {}, {}};
+  GaussianAt<S> at{in.base.shape, in, t, {}, {}};
   out.gaussians = in.base;
   for (std::size_t k = 0; k < 3; ++k) {
     out.means[k].resize_discard(n);
@@ -75,7 +75,8 @@ Status gaussians_at(B& backend, const TemporalView& in, double t, Moment<B>& out
     if (!in.base.chunk_bounds.empty()) {
       const std::size_t chunks = in.base.chunk_count();
       out.bounds.resize_discard(chunks);
-      backend.parallel_for(chunks, BoundChunkAt{out.gaussians, out.bounds.view()});
+      backend.parallel_for(chunks,
+                           BoundChunkAt{out.gaussians.shape, in.base.origins, out.bounds.view()});
       out.gaussians.chunk_bounds = {out.bounds.data(), chunks};
     }
   }

@@ -38,7 +38,8 @@ inline GaussianCloud cloud_at(const TemporalCloud& scene, double t) {
   GaussianCloud out = scene.cloud;
   detail::replace_means(out, [&](std::size_t i) {
     double opacity = 0;
-    const Vec3d moved = scene.cloud.mean(i) + temporal_state<double>(view, i, t, opacity);
+    const Vec3d moved =
+        scene.cloud.mean(i) + temporal_state<double>(view.base.shape, view, i, t, opacity);
     out.opacities[i] = static_cast<float>(opacity);
     return moved;
   });
