@@ -82,7 +82,7 @@ void Floors::mark(std::int32_t id) {
   raise_pits(id, x0, z0, nx, tops);
   close_mask(mask, nx, nz, static_cast<int>(o_.max_hole / g_.cell + 1e-6));
   const std::vector<std::uint16_t> around = tops;
-  const std::size_t near = max<std::size_t>(1, static_cast<std::size_t>(0.1 / g_.cell + 0.5));
+  const std::size_t near = g_.cells_in(0.1);
   for (std::size_t i = 0; i < tops.size(); ++i) {
     if (tops[i] != kNoLevel || mask[i] == 0) continue;
     const std::size_t level = at(id, x0 + i % nx, z0 + i / nx);
@@ -118,8 +118,7 @@ void Floors::mark(std::int32_t id) {
 void Floors::raise_pits(std::int32_t id, std::size_t x0, std::size_t z0, std::size_t nx,
                         std::vector<std::uint16_t>& tops) {
   const std::vector<std::uint16_t> raw = tops;
-  const std::size_t nz = tops.size() / nx,
-                    near = max<std::size_t>(1, static_cast<std::size_t>(0.1 / g_.cell + 0.5));
+  const std::size_t nz = tops.size() / nx, near = g_.cells_in(0.1);
   pool_.run(static_cast<std::uint32_t>(nz), [&](std::uint32_t row) noexcept {
     std::vector<std::uint16_t> around;
     for (std::size_t x = 0; x < nx; ++x) {

@@ -78,7 +78,7 @@ class Floors {
         s_(s),
         o_(o),
         pool_(pool),
-        side_(max<std::size_t>(1, static_cast<std::size_t>(kPatch / g.cell + 0.5))),
+        side_(g.cells_in(kPatch)),
         px_((g.nx + side_ - 1) / side_),
         pz_((g.nz + side_ - 1) / side_),
         patches_(px_ * pz_),

@@ -7,6 +7,7 @@
 
 #include "gsnav/detail/core/thread_pool.hpp"
 #include "gsnav/detail/nav/gaussian_navmesh.hpp"
+#include "gsnav/math/functions.hpp"
 
 namespace gsnav::detail {
 
@@ -29,6 +30,10 @@ struct VoxelGrid {
 
   std::span<const SolidRun> runs_of(std::size_t column) const noexcept {
     return {runs.data() + first[column], first[column + 1] - first[column]};
+  }
+  /// Number of columns nearest to a length in metres, at least 1.
+  std::size_t cells_in(double length) const noexcept {
+    return max<std::size_t>(1, static_cast<std::size_t>(length / cell + 0.5));
   }
 };
 

@@ -15,7 +15,7 @@ constexpr double kRampRadius = 0.15;  // Radius for averaging heights of stairs,
 }  // namespace
 
 bool Floors::goes_on(std::size_t c, std::size_t top) const noexcept {
-  const auto far = max<std::size_t>(1, static_cast<std::size_t>(0.4 / g_.cell + 0.5));
+  const auto far = g_.cells_in(0.4);
   const double rise =
       s_.max_slope * static_cast<double>(far) * g_.cell / g_.level + static_cast<double>(s_.climb);
   const std::size_t x = c % g_.nx, z = c / g_.nx;
@@ -103,7 +103,7 @@ std::vector<Mark> Floors::find_stairs(GaussianNavReport& report) {
 
 void Floors::find_heights() {
   height_.assign(g_.runs.size(), 0);
-  const std::size_t near = max<std::size_t>(1, static_cast<std::size_t>(0.1 / g_.cell + 0.5));
+  const std::size_t near = g_.cells_in(0.1);
   pool_.run(static_cast<std::uint32_t>(g_.nz), [&](std::uint32_t z) noexcept {
     std::vector<std::uint16_t> tops;
     for (std::size_t x = 0; x < g_.nx; ++x) {
@@ -160,7 +160,7 @@ void Floors::level_ramps(std::span<const Piece> pieces, std::vector<Mark>& out) 
       each_neighbour(c, run, add);
     }
   }
-  const auto far = max<std::size_t>(1, static_cast<std::size_t>(kRampRadius / g_.cell + 0.5));
+  const auto far = g_.cells_in(kRampRadius);
   std::vector<std::uint16_t> tops(ground.size());
   pool_.run(static_cast<std::uint32_t>(tops.size()), [&](std::uint32_t i) noexcept {
     const auto [c, run] = ground[i];
@@ -190,7 +190,7 @@ void Floors::level_ramps(std::span<const Piece> pieces, std::vector<Mark>& out) 
 }
 
 void Floors::fill_stairs(const Piece& p, std::vector<Mark>& out, GaussianNavReport& report) {
-  const auto far = max<std::size_t>(1, static_cast<std::size_t>(kRampRadius / g_.cell + 0.5));
+  const auto far = g_.cells_in(kRampRadius);
   std::size_t x0 = g_.nx, x1 = 0, z0 = g_.nz, z1 = 0;
   for (const auto& [c, run] : p.runs) {
     x0 = min(x0, c % g_.nx);

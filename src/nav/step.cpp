@@ -20,16 +20,6 @@ bool valid(const AgentState& a) noexcept {
          std::abs(a.position.y) <= kMaxCoordinate && std::abs(a.position.z) <= kMaxCoordinate;
 }
 
-/// Distance between two boxes.
-double distance(const Aabb<double>& a, const Aabb<double>& b) noexcept {
-  double d2 = 0;
-  for (int k = 0; k < 3; ++k) {
-    const double d = max(max(a.low[k] - b.high[k], b.low[k] - a.high[k]), 0.0);
-    d2 += d * d;
-  }
-  return std::sqrt(d2);
-}
-
 double length_xz(const Vec3d& v) noexcept { return std::sqrt(v.x * v.x + v.z * v.z); }
 
 struct Stepper {
@@ -268,14 +258,14 @@ Clearance clearance(const AgentState& agent, const CapsuleSet& bodies, double t)
   std::size_t first = 0;
   double nearest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < groups.size(); ++i) {
-    const double d = distance(box, groups[i].swept);
+    const double d = std::sqrt(distance2(box, groups[i].swept));
     if (d >= nearest) continue;
     nearest = d;
     first = i;
   }
   for (std::size_t i = 0; i < groups.size(); ++i) {
     const CapsuleSet::Group& g = groups[i == 0 ? first : (i <= first ? i - 1 : i)];
-    if (distance(box, g.swept) > max(best.distance, 0.0) + kRounding)
+    if (std::sqrt(distance2(box, g.swept)) > max(best.distance, 0.0) + kRounding)
       continue;  // Boxes do not give the
                  // depth of an overlap.
     nearest_body<double>(solid, bodies.capsules_of(g), u, best);

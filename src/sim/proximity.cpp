@@ -26,11 +26,7 @@ constexpr double kRounding = 1e-9;
 
 /// Lower bound of the distance between objects in two boxes. If the boxes overlap, -infinity.
 double least_distance(const Aabb<double>& a, const Aabb<double>& b) {
-  double square = 0.0;
-  for (int k = 0; k < 3; ++k) {
-    const double gap = max(max(b.low[k] - a.high[k], a.low[k] - b.high[k]), 0.0);
-    square += gap * gap;
-  }
+  const double square = distance2(a, b);
   return square > 0 ? sqrt(square) - kRounding : -std::numeric_limits<double>::infinity();
 }
 

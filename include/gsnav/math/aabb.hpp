@@ -33,4 +33,14 @@ struct Aabb {
   }
 };
 
+/// Squared distance between two boxes; 0 where they touch or overlap.
+inline double distance2(const Aabb<double>& a, const Aabb<double>& b) noexcept {
+  double sum = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double gap = max(max(a.low[k] - b.high[k], b.low[k] - a.high[k]), 0.0);
+    sum += gap * gap;
+  }
+  return sum;
+}
+
 }  // namespace gsnav

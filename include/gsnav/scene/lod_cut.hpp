@@ -69,12 +69,7 @@ struct SeenFromBox {
   double nearest_depth;  ///< Least depth of a Gaussian that is drawn.
   static bool shows(const ChunkBounds&) noexcept { return true; }
   double nearest(const ChunkBounds& reach) const noexcept {
-    double squared = 0;
-    for (int k = 0; k < 3; ++k) {
-      const double gap = max(0.0, max(static_cast<double>(reach.low[k]) - box.high[k],
-                                      box.low[k] - static_cast<double>(reach.high[k])));
-      squared += gap * gap;
-    }
+    const double squared = distance2({reach.low, reach.high}, box);
     return max(sqrt(squared) * cosine * (1 - 1e-6), nearest_depth);
   }
 };
