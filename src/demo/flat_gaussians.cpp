@@ -48,9 +48,7 @@ void Painter::emit_gaussians(const Patch& patch, const Cut& cut, std::size_t fir
   const std::vector<Box> covers = covers_of(patch);
   const double length_t = column_length(patch.position, 0.5, patch.flat);
   const int rows = count_for(length_t, patch.spacing.v * cut.stretch);
-  const double widest = std::max({row_length(patch.position, 0.5, patch.flat),
-                                  row_length(patch.position, 0.02, patch.flat),
-                                  row_length(patch.position, 0.98, patch.flat)});
+  const double widest = widest_row(patch.position, patch.flat);
   std::optional<PatchLight> light;
   if (!patch.glows) light.emplace(*this, patch, widest, length_t);
 

@@ -23,9 +23,7 @@ Vec3d Painter::shown(const Patch& patch, const PatchLight* light, double s, doub
 
 void Painter::emit_painted(const Patch& patch, double stretch, TexturedPart& out) const {
   const double length_t = column_length(patch.position, 0.5, patch.flat);
-  const double widest = std::max({row_length(patch.position, 0.5, patch.flat),
-                                  row_length(patch.position, 0.02, patch.flat),
-                                  row_length(patch.position, 0.98, patch.flat)});
+  const double widest = widest_row(patch.position, patch.flat);
   const int rows = std::max(count_for(length_t, patch.spacing.v * stretch), patch.cells_t);
   const int columns = std::max(count_for(widest, patch.spacing.u * stretch), patch.cells_s);
   std::optional<PatchLight> light;

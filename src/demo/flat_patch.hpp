@@ -47,6 +47,12 @@ inline double column_length(const Field& position, double s, bool flat) {
   return row_length([&](double a, double) { return position(s, a); }, 0, flat);
 }
 
+/// Length of the longest of three rows.
+inline double widest_row(const Field& position, bool flat) {
+  return std::max({row_length(position, 0.5, flat), row_length(position, 0.02, flat),
+                   row_length(position, 0.98, flat)});
+}
+
 inline int count_for(double length, double spacing) {
   return std::max(1, static_cast<int>(std::lround(length / spacing)));
 }
