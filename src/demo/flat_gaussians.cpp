@@ -75,7 +75,7 @@ void Painter::emit_gaussians(const Patch& patch, const Cut& cut, std::size_t fir
                         std::log(kSigmaPerSpacing * norm(f.dt) / rows), std::log(kThickness)};
       const Vec3d color = shown(patch, light ? &*light : nullptr, s, t, f.normal);
       for (int k = 0; k < 3; ++k) {
-        raw.sh0[static_cast<std::size_t>(k)] = static_cast<float>((color[k] - 0.5) / kSh0);
+        raw.sh0[static_cast<std::size_t>(k)] = static_cast<float>(sh0_of_color(color[k]));
       }
       out.rows.push_back(raw);
       if (bands == 0) continue;

@@ -276,7 +276,7 @@ Status cover_with_gaussians(const HumanoidOptions& o, const BodyShape& shape, Av
     g.opacity_logit = 4.6;  // 0.99
     const Vec3d c = painter.color(p, rng);
     for (int k = 0; k < 3; ++k)
-      g.sh0[static_cast<std::size_t>(k)] = static_cast<float>((c[k] - 0.5) / kSh0);
+      g.sh0[static_cast<std::size_t>(k)] = static_cast<float>(sh0_of_color(c[k]));
     g.shN = rest.empty() ? nullptr : rest.data();
     if (!builder.add(g)) continue;
     weigher.weigh(p, row);

@@ -108,7 +108,7 @@ class AvatarArrayReader {
       if (!std::all_of(values.begin(), values.end(), in_range)) return {};
       warnings.push_back("shs: all values lie in [0, 1] and were taken as RGB");
     }
-    for (double& v : values) v = (v - 0.5) / kSh0;
+    for (double& v : values) v = sh0_of_color(v);
     return {};
   }
 

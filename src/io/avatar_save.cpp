@@ -64,7 +64,7 @@ Status save_avatar(const std::filesystem::path& path, const AvatarAsset& asset) 
         cloud.sh_degree == 0 &&
         std::all_of(cloud.sh0.begin(), cloud.sh0.end(), [](float v) { return v >= 0 && v <= 1; });
     if (looks_like_rgb) {
-      for (const float v : cloud.sh0) rgb.push_back(0.5 + kSh0 * static_cast<double>(v));
+      for (const float v : cloud.sh0) rgb.push_back(color_of_sh0(static_cast<double>(v)));
       entries.push_back({"shs", {n, 3}, rgb});
     } else {
       const std::size_t rest = 3 * (coefficients - 1);

@@ -217,7 +217,7 @@ class KsplatReader {
     const std::byte* colour = record + 10 * level_.number;
     for (std::size_t k = 0; k < 3; ++k) {
       raw.log_scales[static_cast<int>(k)] = std::log(number(record, 3 + k));
-      raw.sh0[k] = detail::sh0_of_colour(std::to_integer<int>(colour[k]) / 255.0);
+      raw.sh0[k] = static_cast<float>(sh0_of_color(std::to_integer<int>(colour[k]) / 255.0));
     }
     raw.quat = {number(record, 6), number(record, 7), number(record, 8), number(record, 9)};
     raw.opacity_logit = detail::opacity_logit(std::to_integer<unsigned>(colour[3]));

@@ -41,7 +41,7 @@ void add_block(detail::CloudSink& sink, detail::TemporalRows* moving, const PlyC
     raw.mean = {at(0), at(1), at(2)};
     for (std::size_t k = 0; k < 3; ++k) {
       raw.sh0[k] = columns.greatest_colour > 0
-                       ? detail::sh0_of_colour(at(3 + k) / columns.greatest_colour)
+                       ? static_cast<float>(sh0_of_color(at(3 + k) / columns.greatest_colour))
                        : static_cast<float>(at(3 + k));
     }
     raw.opacity_logit = at(6);

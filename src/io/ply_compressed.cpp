@@ -193,8 +193,9 @@ class CompressedPlyReader {
       const int axis = static_cast<int>(k);
       raw.mean[axis] = between(chunks, chunk, k, position, kShift[k], kBits[k]);
       raw.log_scales[axis] = between(chunks, chunk, 3 + k, scale, kShift[k], kBits[k]);
-      raw.sh0[k] = sh0_of_colour(has_colours_ ? between(chunks, chunk, 6 + k, colour, 24 - 8 * axis, 8)
-                                              : fraction(colour, 24 - 8 * axis, 8));
+      raw.sh0[k] = static_cast<float>(
+          sh0_of_color(has_colours_ ? between(chunks, chunk, 6 + k, colour, 24 - 8 * axis, 8)
+                                    : fraction(colour, 24 - 8 * axis, 8)));
       others[k] = (fraction(rotation, 20 - 10 * axis, 10) - 0.5) * std::sqrt(2.0);
     }
     raw.quat = quat_without(rotation >> 30, others);

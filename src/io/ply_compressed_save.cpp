@@ -28,7 +28,7 @@ Values values_of(const GaussianCloud& cloud, std::size_t i) {
     const double log_scale = std::log(static_cast<double>(cloud.scales[k][i]));
     v[3 + k] = std::clamp(log_scale, -detail::kCompressedMostLogScale,
                           detail::kCompressedMostLogScale);  // also for minus infinity
-    v[6 + k] = 0.5 + kSh0 * static_cast<double>(cloud.sh0[3 * i + k]);
+    v[6 + k] = color_of_sh0(static_cast<double>(cloud.sh0[3 * i + k]));
   }
   return v;
 }

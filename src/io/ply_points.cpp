@@ -72,7 +72,7 @@ Result<LoadedCloud> parse_ply_points(std::span<const std::byte> bytes, const Ply
       points.push_back({block[i], block[kPlyBlock + i], block[2 * kPlyBlock + i]});
       std::array<float, 3>& colour = colours.emplace_back();
       for (std::size_t k = 0; k < 3; ++k) {
-        colour[k] = sh0_of_colour(block[(3 + k) * kPlyBlock + i] / greatest[k]);
+        colour[k] = static_cast<float>(sh0_of_color(block[(3 + k) * kPlyBlock + i] / greatest[k]));
       }
     }
   }

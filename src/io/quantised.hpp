@@ -17,9 +17,6 @@ inline double opacity_logit(unsigned byte) noexcept {
   return std::log(value / (255.0 - value));
 }
 
-/// The SH coefficient of degree 0 for a drawn colour in [0, 1].
-inline float sh0_of_colour(double colour) noexcept { return static_cast<float>((colour - 0.5) / kSh0); }
-
 /// Rounds t to one of the `bits`-bit steps over [0, 1]. Values outside are clamped.
 inline std::uint32_t nearest_step(double t, int bits) noexcept {
   const double most = static_cast<double>((std::uint32_t{1} << bits) - 1);

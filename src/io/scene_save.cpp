@@ -94,7 +94,7 @@ ClampedValues count_clamped(const std::filesystem::path& path, const GaussianClo
   const detail::FormatRange& r = writer->range;
   const auto outside = [](double v, double low, double high) { return v < low || v > high ? 1u : 0u; };
   for (const float c : cloud.sh0)
-    count.colours += outside(0.5 + kSh0 * double{c}, r.colour_low, r.colour_high);
+    count.colours += outside(color_of_sh0(double{c}), r.colour_low, r.colour_high);
   for (const auto& axis : cloud.scales) {
     for (const float s : axis)
       count.scales += outside(std::log(double{s}), r.log_scale_low, r.log_scale_high);

@@ -24,7 +24,7 @@ RawGaussian gaussian(const std::byte* p) {
     const int axis = static_cast<int>(k);
     raw.mean[axis] = number(4 * k);
     raw.log_scales[axis] = std::log(number(kScales + 4 * k));
-    raw.sh0[k] = detail::sh0_of_colour(std::to_integer<unsigned>(p[kColour + k]) / 255.0);
+    raw.sh0[k] = static_cast<float>(sh0_of_color(std::to_integer<unsigned>(p[kColour + k]) / 255.0));
   }
   raw.opacity_logit = detail::opacity_logit(std::to_integer<unsigned>(p[kColour + 3]));
   double q[4];

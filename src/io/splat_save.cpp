@@ -26,7 +26,7 @@ Status save_splat(const std::filesystem::path& path, const GaussianCloud& cloud)
       for (std::size_t k = 0; k < 3; ++k) {
         numbers[k] = static_cast<float>(mean[static_cast<int>(k)]);
         numbers[3 + k] = cloud.scales[k][i];
-        const double colour = 0.5 + kSh0 * static_cast<double>(cloud.sh0[3 * i + k]);
+        const double colour = color_of_sh0(static_cast<double>(cloud.sh0[3 * i + k]));
         bytes[k] = static_cast<std::uint8_t>(detail::nearest_step(colour, 8));
       }
       bytes[3] =

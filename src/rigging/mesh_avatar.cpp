@@ -147,7 +147,7 @@ Result<MeshAvatar> make_mesh_avatar(const SkinnedMesh& mesh, const MeshAvatarOpt
     for (int k = 0; k < 3; ++k) {
       const double light = 1 - options.shade * (0.5 - 0.5 * p.normal.y);
       const double c = srgb_from_linear(clamp(color.rgb[k] * light, 0.0, 1.0));
-      g.sh0[static_cast<std::size_t>(k)] = static_cast<float>((c - 0.5) / kSh0);
+      g.sh0[static_cast<std::size_t>(k)] = static_cast<float>(sh0_of_color(c));
     }
     if (!builder.add(g)) continue;
     detail::blend_weights(mesh, p, rows.emplace_back());

@@ -7,6 +7,10 @@ namespace gsnav {
 
 /// SH basis function of degree 0: 1 / (2 sqrt(pi)).
 inline constexpr double kSh0 = 0.28209479177387814;
+/// Colour, in [0, 1] if it can be shown, of a coefficient of degree 0, without other bands.
+GSNAV_HD constexpr double color_of_sh0(double coefficient) noexcept { return 0.5 + kSh0 * coefficient; }
+/// Coefficient of degree 0 that gives a colour.
+GSNAV_HD constexpr double sh0_of_color(double color) noexcept { return (color - 0.5) / kSh0; }
 
 /// Sum of real spherical harmonics up to `degree` (0 to 3) at the unit direction d, without offset or
 /// clamp. Signs include the Condon-Shortley phase; coefficients are in the order of INRIA files.

@@ -10,6 +10,7 @@
 
 #include "gsnav/detail/math/svd.hpp"
 #include "gsnav/detail/scene/lod_merge.hpp"
+#include "gsnav/frame/sh.hpp"
 #include "gsnav/math/quat.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
@@ -30,9 +31,8 @@ inline LodGaussian lod_gaussian(const GaussianCloud& cloud, std::size_t i, doubl
   g.flatness = middle > 0 ? 1 - s[least] / middle : 0;
   g.mass = static_cast<double>(cloud.opacities[i]) * lod_area(g.covariance);
   g.spread = spread;
-  constexpr double kC0 = 0.28209479177387814;
   for (int k = 0; k < 3; ++k) {
-    g.color[k] = 0.5 + kC0 * static_cast<double>(cloud.sh0[3 * i + static_cast<std::size_t>(k)]);
+    g.color[k] = color_of_sh0(static_cast<double>(cloud.sh0[3 * i + static_cast<std::size_t>(k)]));
   }
   return g;
 }

@@ -10,6 +10,7 @@
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/detail/mesh/mesh.hpp"
 #include "gsnav/frame/gaussians.hpp"
+#include "gsnav/frame/sh.hpp"
 
 namespace gsnav {
 
@@ -72,8 +73,8 @@ class SemanticPasses {
 
  private:
   using Floats = Buffer<float, B>;
-  static constexpr float kWhite =
-      0.5f / 0.28209479177387814f;            // SH coefficient of colour 1. Its negative gives 0.
+  // SH coefficient of colour 1. Its negative gives 0.
+  static constexpr float kWhite = 0.5f / static_cast<float>(kSh0);
   std::array<Floats, kChannels + 1> shades_;  // Red, green, blue, black.
   std::size_t size_ = 0;
 };
