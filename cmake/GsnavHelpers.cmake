@@ -61,6 +61,20 @@ function(gsnav_test name)
                                         doctest::doctest)
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
   target_compile_definitions(test_${name} PRIVATE GSNAV_DATA_DIR="${GSNAV_DATA_DIR}")
-  add_test(NAME ${name} COMMAND test_${name})
+  set(_parts $<TARGET_PROPERTY:test_${name},GSNAV_PARTS>)
+  add_test(NAME ${name} COMMAND test_${name} "$<$<BOOL:${_parts}>:-sfe=$<JOIN:${_parts},$<COMMA>>>"
+           COMMAND_EXPAND_LISTS)
   set_tests_properties(${name} PROPERTIES TIMEOUT 900)
+endfunction()
+
+# gsnav_test_part(name test SOURCES ...): more files of an executable of gsnav_test, whose cases ctest runs as a test of
+# their own. What files share is compiled once per executable.
+function(gsnav_test_part name test)
+  cmake_parse_arguments(ARG "" "" "SOURCES" ${ARGN})
+  target_sources(test_${test} PRIVATE ${ARG_SOURCES})
+  list(TRANSFORM ARG_SOURCES PREPEND "*/" OUTPUT_VARIABLE _files)
+  set_property(TARGET test_${test} APPEND PROPERTY GSNAV_PARTS ${_files})
+  list(JOIN _files "," _files)
+  add_test(NAME ${name} COMMAND test_${test} -sf=${_files})
+  set_tests_properties(${name} PROPERTIES TIMEOUT 900 FAIL_REGULAR_EXPRESSION "test cases: +0 ")
 endfunction()

@@ -19,7 +19,7 @@ namespace {
 
 using Batching = BasicRenderer<float, BatchingBackend>;
 
-void check_same(const Frames<float>& a, const Frames<float>& b) {
+void check_equal(const Frames<float>& a, const Frames<float>& b) {
   for_each_image(a, b, [](const auto& x, const auto& y) { CHECK(x == y); });
 }
 
@@ -56,22 +56,22 @@ TEST_CASE("one camera is a batch of one; what no batch supports is drawn by the 
   Batching renderer(s.backend);
   const std::vector<GaussianSet> sets{s.arrays.set()};
   const Frames<float> plain = renderer.render(sets, s.cameras).value();
-  check_same(plain, s.serial({s.cloud.set()}));
+  check_equal(plain, s.serial({s.cloud.set()}));
   CHECK(batch_calls == 1);
   CHECK(plain.stats[0].gaussians == s.cloud.size());
   CHECK(plain.stats[0].visible == 0);
 
   renderer.set_meshes(s.there);
   const Frames<float> among = renderer.render(sets, s.cameras).value();
-  check_same(among, s.serial({s.cloud.set()}, true));
+  check_equal(among, s.serial({s.cloud.set()}, true));
   CHECK(batch_calls == 1);
   CHECK(among.stats[0].visible > 0);
   CHECK(among.stats[0].meshes.drawn > 0);
 
   Batching moved = std::move(renderer);
   renderer.set_meshes({});
-  check_same(renderer.render(sets, s.cameras).value(), plain);
-  check_same(moved.render(sets, s.cameras).value(), among);
+  check_equal(renderer.render(sets, s.cameras).value(), plain);
+  check_equal(moved.render(sets, s.cameras).value(), among);
   CHECK(batch_calls == 2);
 }
 
@@ -80,7 +80,7 @@ TEST_CASE("a set that a frame has twice is drawn twice in a batch") {
   Batching renderer(s.backend);
   const GaussianSet set = s.arrays.set(), here = s.cloud.set();
   const Frames<float> twice = renderer.render(std::vector{set, set}, s.cameras).value();
-  check_same(twice, s.serial({here, here}));
+  check_equal(twice, s.serial({here, here}));
   CHECK(twice.alpha != renderer.render(std::vector{set}, s.cameras).value().alpha);
   CHECK(most_sets >= 2);
 }
@@ -133,7 +133,7 @@ TEST_CASE("a call whose cameras memory does not suffice for is drawn in parts") 
     memory_for = room;
     most_drawn = 0;
     Batching renderer(s.backend);
-    check_same(renderer.render(sets, s.cameras).value(), want);
+    check_equal(renderer.render(sets, s.cameras).value(), want);
     CHECK(batch_renderers == 1);
   }
   memory_for = 0;
@@ -144,7 +144,7 @@ TEST_CASE("a call whose cameras memory does not suffice for is drawn in parts") 
     CHECK(refused.message().find("7 frames of 41 x 29 with " + std::to_string(s.cloud.size())) !=
           std::string::npos);
     memory_for = ~std::size_t{0};
-    check_same(renderer.render(sets, s.cameras).value(), want);
+    check_equal(renderer.render(sets, s.cameras).value(), want);
   }
   CHECK(batch_renderers == 0);
 }

@@ -15,7 +15,7 @@ using namespace gsnav_test;
 
 namespace {
 
-GaussianCloud scene_of(int degree, int count = 1500) {
+GaussianCloud sorted_scene(int degree, int count = 1500) {
   CloudOptions options;
   options.count = count;
   options.sh_degree = degree;
@@ -24,7 +24,7 @@ GaussianCloud scene_of(int degree, int count = 1500) {
   return cloud;
 }
 
-const Camera kCamera = Camera::look_at({0, 0, 0}, {0, 0, 4}, {0, -1, 0}, 160, 120, 60);
+const Camera kView = Camera::look_at({0, 0, 0}, {0, 0, 4}, {0, -1, 0}, 160, 120, 60);
 constexpr PackLimits kAnything{1e9, 1e9, 1e9};
 
 /// f(backend) for each that tests have.
@@ -56,7 +56,7 @@ long double most_in_chunk(std::size_t i, std::size_t n, const Value& value) {
 TEST_CASE("packed clouds: each field within its steps, which the errors report") {
   for (const int degree : {0, 1, 2, 3}) {
     CAPTURE(degree);
-    const GaussianCloud full = scene_of(degree);
+    const GaussianCloud full = sorted_scene(degree);
     PackErrors errors;
     const PackedCloud packed = pack_cloud(full, kAnything, &errors);
     const GaussianCloud got = unpack_cloud(packed);
@@ -137,7 +137,7 @@ TEST_CASE("packed clouds: each field within its steps, which the errors report")
 TEST_CASE("packed clouds: images of what the codes stand for, bit for bit") {
   for (const int degree : {0, 1, 2, 3}) {
     CAPTURE(degree);
-    const GaussianCloud full = scene_of(degree);
+    const GaussianCloud full = sorted_scene(degree);
     const PackLimits limits[] = {
         kAnything, {1e9, 0, 1e9}, {0, 0, 0}};  // 8, 16 and 32 bits of SH; means as floats
     for (const PackLimits& limit : limits) {
@@ -153,29 +153,29 @@ TEST_CASE("packed clouds: images of what the codes stand for, bit for bit") {
       on_backends([&](auto& backend) {
         using B = std::decay_t<decltype(backend)>;
         const GaussianArrays<B> a(backend, packed), b(backend, floats);
-        const auto got = render<float>(backend, {a.set()}, kCamera),
-                   want = render<float>(backend, {b.set()}, kCamera);
+        const auto got = render<float>(backend, {a.set()}, kView),
+                   want = render<float>(backend, {b.set()}, kView);
         CHECK(got.stats[0].visible > 100);
         CHECK(got.rgb == want.rgb);
         CHECK(got.median_depth == want.median_depth);
       });
       SerialBackend serial;
-      const auto got = render<double>(serial, {packed.set()}, kCamera),
-                 want = render<double>(serial, {floats.set()}, kCamera);
+      const auto got = render<double>(serial, {packed.set()}, kView),
+                 want = render<double>(serial, {floats.set()}, kView);
       CHECK(got.rgb == want.rgb);
     }
   }
 }
 
 TEST_CASE("packed clouds: chunks by a list are those of the floats, whatever its order") {
-  const GaussianCloud full = scene_of(1, 3000);
+  const GaussianCloud full = sorted_scene(1, 3000);
   const PackedCloud packed = pack_cloud(full, kAnything);
   const GaussianCloud floats = unpack_cloud(packed);
   const std::vector<std::uint32_t> list{7, 2, 11, 0};
   on_backends([&](auto& backend) {
     const auto drawn = [&](GaussianSet set) {
       set.selection.drawn_chunks = {list.data(), list.size()};
-      return render<float>(backend, {set}, kCamera);
+      return render<float>(backend, {set}, kView);
     };
     const auto got = drawn(packed.set()), want = drawn(floats.set());
     CHECK(got.stats[0].visible > 50);
@@ -225,20 +225,20 @@ TEST_CASE("packed clouds: far places, large and needle-like Gaussians, a last ch
   on_backends([&](auto& backend) {
     using B = std::decay_t<decltype(backend)>;
     const GaussianArrays<B> packed_arrays(backend, packed), float_arrays(backend, floats);
-    const auto got = render<float>(backend, {packed_arrays.set()}, kCamera);
-    const auto want = render<float>(backend, {float_arrays.set()}, kCamera);
+    const auto got = render<float>(backend, {packed_arrays.set()}, kView);
+    const auto want = render<float>(backend, {float_arrays.set()}, kView);
     CHECK(got.stats[0].visible > 20);
     CHECK(got.rgb == want.rgb);
   });
 }
 
 TEST_CASE("packed clouds: the image stays within a bound of the cloud's own") {
-  const GaussianCloud full = scene_of(3, 4000);
+  const GaussianCloud full = sorted_scene(3, 4000);
   PackErrors errors;
   const PackedCloud packed = pack_cloud(full, {}, &errors);
   SerialBackend serial;
-  const auto got = render<double>(serial, {packed.set()}, kCamera),
-             want = render<double>(serial, {full.set()}, kCamera);
+  const auto got = render<double>(serial, {packed.set()}, kView),
+             want = render<double>(serial, {full.set()}, kView);
   double squares = 0;
   for (std::size_t i = 0; i < got.rgb.size(); ++i) squares += std::pow(got.rgb[i] - want.rgb[i], 2);
   const double psnr = -10 * std::log10(squares / static_cast<double>(got.rgb.size()));
@@ -247,7 +247,7 @@ TEST_CASE("packed clouds: the image stays within a bound of the cloud's own") {
 }
 
 TEST_CASE("packed clouds: planes that do not fit are named") {
-  const PackedCloud packed = pack_cloud(scene_of(1), kAnything);
+  const PackedCloud packed = pack_cloud(sorted_scene(1), kAnything);
   const auto refused = [&](auto change, const char* part) {
     GaussianSet set = packed.set();
     change(set.gaussians);

@@ -32,7 +32,7 @@ BatchConfig small_batch(int height = 16, int width = 24) {
   return c;
 }
 
-std::vector<std::shared_ptr<const SimulatorScene>> two_scenes() {
+std::vector<std::shared_ptr<const SimulatorScene>> scene_pair() {
   return {std::make_shared<const SimulatorScene>(peopled_scene(2000)),
           std::make_shared<const SimulatorScene>(flat_scene())};
 }
@@ -47,7 +47,7 @@ bool same_info(const StepInfo& a, const StepInfo& b) {
 }  // namespace
 
 TEST_CASE("a batch has the bits of single simulators over 1,000 random steps among people") {
-  const auto scenes = two_scenes();
+  const auto scenes = scene_pair();
   constexpr std::size_t kEnvironments = 4;
   BatchConfig config = small_batch();
   config.sensors[0].noise.kind = NoiseKind::gaussian;
@@ -154,7 +154,7 @@ struct Modes {
   explicit Modes(AutoReset mode) : config(small_batch(8, 12)) {
     config.auto_reset = mode;
     config.task.max_steps = 3;
-    sim.emplace(make_batch_simulator(backend, two_scenes(), config, 3, wandering).value());
+    sim.emplace(make_batch_simulator(backend, scene_pair(), config, 3, wandering).value());
     sim->reset().value();
   }
   Result<BatchStep> step(Action first = Action::turn_left) {
@@ -319,10 +319,10 @@ TEST_CASE("a batch draws its own bits into memory of the caller, in each mode of
     config.task.max_steps = 3;
     config.auto_reset = mode;
     OpenMPBackend backend(2);
-    auto own = make_batch_simulator(backend, two_scenes(), config, 3, wandering).value();
+    auto own = make_batch_simulator(backend, scene_pair(), config, 3, wandering).value();
     Memory memory;
     config.image_source = memory.source();
-    auto given = make_batch_simulator(backend, two_scenes(), config, 3, wandering).value();
+    auto given = make_batch_simulator(backend, scene_pair(), config, 3, wandering).value();
     std::size_t wrong = 0, ended = 0;
     const auto compare = [&](const Result<BatchStep>& a, const Result<BatchStep>& b) {
       const BatchStep x = a.value(), y = b.value();
@@ -362,7 +362,7 @@ TEST_CASE("memory of the caller: what is wrong with it is named before any envir
   Result<std::span<float>> next = std::span<float>(block);
   std::size_t calls = 0;
   config.image_source = [&](std::size_t, std::size_t) { return ++calls, next; };
-  auto sim = make_batch_simulator(backend, two_scenes(), config, 2, wandering).value();
+  auto sim = make_batch_simulator(backend, scene_pair(), config, 2, wandering).value();
   sim.reset().value();
   CHECK(calls == 2);
   const std::vector<Action> turn(2, Action::turn_left);
@@ -395,14 +395,14 @@ TEST_CASE("what is wrong with a batch is named") {
   };
   CHECK(has(message(make_batch_simulator(backend, {}, small_batch(), 2, wandering)), "no scene"));
   CHECK(has(message(make_batch_simulator(backend, {nullptr}, small_batch(), 2, wandering)), "null"));
-  CHECK(has(message(make_batch_simulator(backend, two_scenes(), small_batch(), 0, wandering)),
+  CHECK(has(message(make_batch_simulator(backend, scene_pair(), small_batch(), 0, wandering)),
             "environments = 0"));
-  CHECK(has(message(make_batch_simulator(backend, two_scenes(), small_batch(), 2, {})), "source"));
+  CHECK(has(message(make_batch_simulator(backend, scene_pair(), small_batch(), 2, {})), "source"));
   BatchConfig config = small_batch();
   config.pose_slots = 0;
-  CHECK(has(message(make_batch_simulator(backend, two_scenes(), config, 2, wandering)), "pose_slots"));
+  CHECK(has(message(make_batch_simulator(backend, scene_pair(), config, 2, wandering)), "pose_slots"));
 
-  auto sim = make_batch_simulator(backend, two_scenes(), small_batch(), 2, wandering).value();
+  auto sim = make_batch_simulator(backend, scene_pair(), small_batch(), 2, wandering).value();
   CHECK(has(message(sim.step(std::vector<Action>(2, Action::turn_left))), "before reset"));
   sim.reset().value();
   CHECK(has(message(sim.step(std::vector<Action>(3, Action::turn_left))), "3 actions for 2"));
@@ -414,7 +414,7 @@ TEST_CASE("what is wrong with a batch is named") {
   const auto elsewhere = [](std::size_t, std::size_t) -> Result<BatchEpisode> {
     return BatchEpisode{5, to_kitchen()};
   };
-  auto lost = make_batch_simulator(backend, two_scenes(), small_batch(), 1, elsewhere).value();
+  auto lost = make_batch_simulator(backend, scene_pair(), small_batch(), 1, elsewhere).value();
   CHECK(has(message(lost.reset()), "scene 5 of 2"));
 }
 
@@ -452,7 +452,7 @@ TEST_CASE("rendering switched on again: a reset of some environments has the ima
   const auto make = [&](bool rendering) {
     BatchConfig c = small_batch();
     c.rendering = rendering;
-    return make_batch_simulator(backend, two_scenes(), c, 3, wandering).value();
+    return make_batch_simulator(backend, scene_pair(), c, 3, wandering).value();
   };
   auto batch = make(true), always = make(true), never = make(false);
   for (auto* b : {&batch, &always, &never}) b->reset().value();
