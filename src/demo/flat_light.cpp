@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "flat_painter.hpp"
 
 namespace gsnav::flat {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 const Vec3d kToSun = normalized(Vec3d{-0.42, 0.78, -0.85});
 
 Vec3d inverse_of(const Vec3d& d) noexcept {
@@ -100,7 +100,7 @@ Vec3d Painter::light_at(const Room& room, const Vec3d& point, const Vec3d& n) co
       if (c0 <= 0 || c1 <= 0 || boxes.between(q + facing * (kClear / area) - p)) continue;
       direct += c0 * c1 / (r2 * (r2 + 0.05));
     }
-    sum += Vec3d{0.93, 0.98, 1.06} * (5.2 * direct * area / (kPi * kAcross * kUp));
+    sum += Vec3d{0.93, 0.98, 1.06} * (5.2 * direct * area / (std::numbers::pi * kAcross * kUp));
   }
   for (const Lamp& l : room.lamps) {
     double direct = 0;

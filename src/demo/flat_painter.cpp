@@ -3,17 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "gsnav/detail/math/curves.hpp"
 
 namespace gsnav::flat {
-namespace {
-
-constexpr double kPi = 3.14159265358979323846;
-
-}  // namespace
-
 Vec3d srgb(unsigned hex) noexcept {
   const auto channel = [hex](int shift) {
     return linear_from_srgb(static_cast<double>((hex >> shift) & 255u) / 255.0);
@@ -46,7 +41,7 @@ Painter::Painter() {
   constexpr int kRays = 56;
   for (int i = 0; i < kRays; ++i) {
     const double r2 = (i + 0.5) / kRays, r = std::sqrt(r2);
-    const double a = i * kPi * (3.0 - std::sqrt(5.0));
+    const double a = i * std::numbers::pi * (3.0 - std::sqrt(5.0));
     hemisphere_.push_back({r * std::cos(a), r * std::sin(a), std::sqrt(1.0 - r2)});
   }
 }
@@ -140,7 +135,7 @@ void Painter::cone(const Vec3d& base, double radius0, double radius1, double hei
                    Spacing spacing, bool cap, bool glows) {
   patch(
       [=](double s, double t) {
-        const double a = -2 * kPi * s, r = radius0 + (radius1 - radius0) * t;
+        const double a = -2 * std::numbers::pi * s, r = radius0 + (radius1 - radius0) * t;
         return base + Vec3d{r * std::cos(a), height * t, r * std::sin(a)};
       },
       color, spacing, 12, 1 + (height > 0.5 ? 1 : 0), glows);
@@ -150,7 +145,7 @@ void Painter::cone(const Vec3d& base, double radius0, double radius1, double hei
 void Painter::disc(const Vec3d& center, double radius, const Field& color, Spacing spacing) {
   patch(
       [=](double s, double t) {
-        const double a = -2 * kPi * s, r = radius * (1 - t);
+        const double a = -2 * std::numbers::pi * s, r = radius * (1 - t);
         return center + Vec3d{r * std::cos(a), 0, r * std::sin(a)};
       },
       color, spacing, 16, 1);
@@ -160,7 +155,7 @@ void Painter::ellipsoid(const Vec3d& center, const Vec3d& radii, const Field& co
                         bool glows) {
   patch(
       [=](double s, double t) {
-        const double a = -2 * kPi * s, b = kPi * (t - 0.5);
+        const double a = -2 * std::numbers::pi * s, b = std::numbers::pi * (t - 0.5);
         return center + Vec3d{radii.x * std::cos(b) * std::cos(a), radii.y * std::sin(b),
                               radii.z * std::cos(b) * std::sin(a)};
       },

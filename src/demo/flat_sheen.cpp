@@ -2,6 +2,7 @@
 // What of the flat's colours depends on where they are seen from.
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "flat_painter.hpp"
 #include "gsnav/frame/sh.hpp"
@@ -9,7 +10,6 @@
 namespace gsnav::flat {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kSheen = 0.12;  // display value that is added where the mirror image of the light is
 const Vec3d kTint{1.0, 0.97, 0.90};
 /// Shares of the added value in bands 1, 2 and 3. They add up to 1.
@@ -52,7 +52,7 @@ void Painter::write_sheen(const Room& room, const Vec3d& p, const Vec3d& normal,
   // add P_l of the angle's cosine, and nothing on average over all directions.
   const auto basis = basis_at(-normalized(mirrored));
   for (int l = 1; l <= sh_degree; ++l) {
-    const double share = kSheen * kBandShare[l - 1] * 4 * kPi / (2 * l + 1);
+    const double share = kSheen * kBandShare[l - 1] * 4 * std::numbers::pi / (2 * l + 1);
     for (int k = l * l; k < (l + 1) * (l + 1); ++k) {
       for (int c = 0; c < 3; ++c)
         shN[3 * (k - 1) + c] = static_cast<float>(share * kTint[c] * basis[static_cast<std::size_t>(k)]);

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <optional>
 #include <string>
 
@@ -14,7 +15,6 @@
 namespace gsnav {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kClear = 0.4;       // free distance around a camera, metres
 constexpr double kLeastSight = 1.5;  // metres
 constexpr double kDown = 0.12;       // slope of a view
@@ -76,7 +76,7 @@ class Surfaces {
 std::optional<Vec3d> longest_sight(const Surfaces& surfaces, const Vec3d& eye, double turn) {
   constexpr int kDirections = 18;
   const auto direction = [&](int i) {
-    const double yaw = turn + 2 * kPi * i / kDirections;
+    const double yaw = turn + 2 * std::numbers::pi * i / kDirections;
     return normalized(Vec3d{std::cos(yaw), -kDown, std::sin(yaw)});
   };
   std::array<double, kDirections> sight{};
@@ -107,7 +107,7 @@ std::optional<Sight> random_view(const Surfaces& surfaces, double height, Rng& r
   constexpr int kTries = 1000;
   for (int i = 0; i < kTries && !all.empty(); ++i) {
     const Vec3d eye{rng.uniform(all.low.x, all.high.x), height, rng.uniform(all.low.z, all.high.z)};
-    const double turn = rng.uniform(0, 2 * kPi);
+    const double turn = rng.uniform(0, 2 * std::numbers::pi);
     constexpr double kAboveRugs = 0.1;
     if (!surfaces.free({{eye.x - kClear, kAboveRugs, eye.z - kClear},
                         {eye.x + kClear, eye.y + kClear, eye.z + kClear}}))

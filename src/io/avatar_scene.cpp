@@ -16,9 +16,9 @@ using detail::member;
 using detail::must_be;
 using detail::shown;
 
-class SceneReader {
+class AvatarSceneReader {
  public:
-  SceneReader(const fs::path& path, const Json& json)
+  AvatarSceneReader(const fs::path& path, const Json& json)
       : folder_(path.parent_path()), source_(path.string()), json_(json) {}
 
   Result<AvatarScene> run() {
@@ -158,7 +158,7 @@ class SceneReader {
 Result<AvatarScene> load_avatar_scene(const fs::path& path) {
   return detail::guarded(path.string(), [&]() -> Result<AvatarScene> {
     const auto json = detail::load_json(path);
-    return json ? SceneReader(path, *json).run() : json.status();
+    return json ? AvatarSceneReader(path, *json).run() : json.status();
   });
 }
 

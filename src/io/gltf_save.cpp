@@ -16,7 +16,7 @@ namespace {
 
 using detail::Json;
 
-constexpr const char* kExtension = "KHR_gaussian_splatting";
+constexpr const char* kSplatsExtension = "KHR_gaussian_splatting";
 constexpr std::size_t kMostBytes = 0xfffffff0;  // lengths have 32 bits
 
 /// An attribute: `get(i, k)` is component k of Gaussian i.
@@ -29,7 +29,7 @@ struct Attribute {
 /// The attributes of a cloud. If `turned`, they are rotated by half a turn about z: x and y change sign,
 /// and so does every basis function of odd order.
 std::vector<Attribute> attributes_of(const GaussianCloud& cloud, const Vec3d& origin, bool turned) {
-  const std::string prefix = std::string(kExtension) + ":";
+  const std::string prefix = std::string(kSplatsExtension) + ":";
   std::vector<Attribute> out;
   out.push_back({"POSITION", 3, [&cloud, origin, turned](std::size_t i, std::size_t k) {
                    const double v = (cloud.mean(i) - origin)[static_cast<int>(k)];
@@ -98,11 +98,12 @@ Json header_of(const std::vector<Attribute>& attributes, std::size_t n, const Ve
       {"colorSpace", space == ColorSpace::linear ? "lin_rec709_display" : "srgb_rec709_display"},
       {"sortingMethod", "cameraDistance"},
       {"projection", "perspective"}};
-  const Json primitive = {{"mode", 0}, {"attributes", names}, {"extensions", {{kExtension, splats}}}};
+  const Json primitive = {
+      {"mode", 0}, {"attributes", names}, {"extensions", {{kSplatsExtension, splats}}}};
   Json node = {{"mesh", 0}};
   if (t != Vec3d{}) node["translation"] = {t.x, t.y, t.z};
   return {{"asset", {{"version", "2.0"}, {"generator", "gsnav"}}},
-          {"extensionsUsed", {kExtension}},
+          {"extensionsUsed", {kSplatsExtension}},
           {"scene", 0},
           {"scenes", {{{"nodes", {0}}}}},
           {"nodes", Json::array({node})},

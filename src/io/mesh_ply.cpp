@@ -15,10 +15,10 @@ using detail::PlyBody;
 using detail::PlyElement;
 using detail::PlyProperty;
 
-class MeshReader {
+class PlyMeshReader {
  public:
-  MeshReader(std::span<const std::byte> bytes, const detail::PlyHeader& header,
-             const std::string& source)
+  PlyMeshReader(std::span<const std::byte> bytes, const detail::PlyHeader& header,
+                const std::string& source)
       : header_(header), source_(source), body_(bytes, header) {}
 
   Result<TriangleMesh> run() {
@@ -115,7 +115,7 @@ Result<TriangleMesh> load_ply_mesh(const std::filesystem::path& path) {
   const std::string source = path.string();
   return detail::with_file(path, [&](const auto& file) -> Result<TriangleMesh> {
     const auto header = detail::parse_ply_header(file.span(), source);
-    return header ? MeshReader(file.span(), *header, source).run() : header.status();
+    return header ? PlyMeshReader(file.span(), *header, source).run() : header.status();
   });
 }
 

@@ -96,11 +96,11 @@ class BvhReader {
   }
 
   Status open_joint(std::int32_t parent) {
-    constexpr std::size_t kMostJoints = 4096;
+    constexpr std::size_t kMostBvhJoints = 4096;
     Skeleton& skeleton = out_.skeleton;
     const std::string name(next());
-    if (skeleton.size() >= kMostJoints)
-      return bad("more than " + std::to_string(kMostJoints) + " joints");
+    if (skeleton.size() >= kMostBvhJoints)
+      return bad("more than " + std::to_string(kMostBvhJoints) + " joints");
     if (Status s = expect("{"); !s) return s;
     Vec3d place;
     if (Status s = offset(place); !s) return s;

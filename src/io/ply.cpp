@@ -169,8 +169,8 @@ void warn_of_stray_bytes(LoadReport& report, std::uint64_t bytes, std::uint64_t 
                             " rows that the header declares");
 }
 
-Result<LoadedCloud> parse(std::span<const std::byte> bytes, const std::string& source,
-                          TemporalCloud* moving) {
+Result<LoadedCloud> parse_any(std::span<const std::byte> bytes, const std::string& source,
+                              TemporalCloud* moving) {
   auto parsed = detail::parse_ply_header(bytes, source);
   if (!parsed) return parsed.status();
   const PlyHeader& header = *parsed;
@@ -260,7 +260,7 @@ Result<LoadedCloud> load_rows(const detail::RandomFile& file, const PlyHeader& h
 
 Result<LoadedCloud> detail::parse_ply(std::span<const std::byte> bytes, const std::string& source,
                                       TemporalCloud* moving) {
-  return guarded(source, [&] { return described(parse(bytes, source, moving), usual_up(source)); });
+  return guarded(source, [&] { return described(parse_any(bytes, source, moving), usual_up(source)); });
 }
 
 Result<LoadedCloud> detail::load_ply(const std::filesystem::path& path, TemporalCloud* moving,
@@ -283,7 +283,7 @@ Result<LoadedCloud> detail::load_ply(const std::filesystem::path& path, Temporal
     }
     const auto bytes = read_file(path);
     if (!bytes) return bytes.status();
-    return described(parse(bytes->span(), source, moving), usual_up(source));
+    return described(parse_any(bytes->span(), source, moving), usual_up(source));
   });
 }
 

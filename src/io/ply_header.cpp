@@ -12,7 +12,7 @@
 namespace gsnav::io::detail {
 namespace {
 
-std::optional<PlyType> type_of(std::string_view word) {
+std::optional<PlyType> ply_type(std::string_view word) {
   constexpr std::string_view names[][2] = {
       {"char", "int8"}, {"uchar", "uint8"}, {"short", "int16"},   {"ushort", "uint16"},
       {"int", "int32"}, {"uint", "uint32"}, {"float", "float32"}, {"double", "float64"}};
@@ -129,13 +129,13 @@ class HeaderParser {
     if (type == "list") {
       p.is_list = e.has_list = true;
       const std::string_view counts = take_word(rest);
-      const auto known = type_of(counts);
+      const auto known = ply_type(counts);
       if (!known || *known >= PlyType::f32)
         return fail(in_quotes(counts) + " is no type of a list's length");
       p.count_type = *known;
       type = take_word(rest);
     }
-    const auto known = type_of(type);
+    const auto known = ply_type(type);
     if (!known) return fail(in_quotes(type) + " is no type of a property");
     p.type = *known;
     p.name = take_word(rest);

@@ -283,9 +283,9 @@ class PlanesReader {
   static double number(std::byte b) noexcept { return static_cast<double>(std::to_integer<int>(b)); }
 
   static std::string stream(std::size_t k) {
-    static constexpr const char* kNames[] = {"positions", "opacities",   "colours",
-                                             "scales",    "quaternions", "SH bands"};
-    return std::string("the stream of ") + kNames[k];
+    static constexpr const char* kStreams[] = {"positions", "opacities",   "colours",
+                                               "scales",    "quaternions", "SH bands"};
+    return std::string("the stream of ") + kStreams[k];
   }
 
   void warn_of_stray_bytes() { planes_.warnings.push_back("stray bytes follow the " + gaussians()); }

@@ -6,13 +6,9 @@
 #include <numeric>
 #include <queue>
 
+#include "tolerances.hpp"
+
 namespace gsnav::detail {
-namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kRounding = 1e-9;  // Metres or m². Sights that only touch count.
-
-}  // namespace
 
 CornerHubs::CornerHubs(const UnfoldedMesh& mesh) {
   std::vector<std::vector<Link>> links;

@@ -4,14 +4,12 @@
 #include <utility>
 
 #include "corner_hubs.hpp"
+#include "tolerances.hpp"
 
 // Queries of the hubs.
 
 namespace gsnav::detail {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kRounding = 1e-9;  // Metres or m². Sights that only touch count.
 
 /// Tests whether the point (x, y) is inside both sides of each sight: 0 no, 1 perhaps, 2 yes.
 void inside_sides(const float* __restrict sides, std::size_t n, float x, float y, float margin,

@@ -3,14 +3,12 @@
 #include <vector>
 
 #include "landmarks.hpp"
+#include "tolerances.hpp"
 
 // Finds a sequence of faces by landmarks, and the shortest path inside it.
 
 namespace gsnav::detail {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kSame = 1e-9;  // Points closer than this are equal, metres.
 
 /// Transform from the plane of a face to that of the first face.
 struct Placed {

@@ -9,11 +9,11 @@
 namespace gsnav::detail {
 namespace {
 
-constexpr double kRounding = 1e-8;  // m²: a point that only touches a beam is in it.
-constexpr double kShort = 1e-6;     // Metres: closer points define no direction.
-constexpr double kPoint = 1e-9;     // Metres: shorter edges are points.
-constexpr double kSame = 1e-7;      // Radians: directions closer than this are equal.
-constexpr double kSlack = 1e-6;     // Margin on each side of a range, as a fraction of the edge.
+constexpr double kTouching = 1e-8;       // m²: a point that only touches a beam is in it.
+constexpr double kShort = 1e-6;          // Metres: closer points define no direction.
+constexpr double kPoint = 1e-9;          // Metres: shorter edges are points.
+constexpr double kSameDirection = 1e-7;  // Radians: directions closer than this are equal.
+constexpr double kRangeSlack = 1e-6;     // Margin on each side of a range, as a fraction of the edge.
 
 /// A beam: all straight lines that cross a first edge and every edge since, as they enter a face, in its
 /// plane. No line is to the right of the line from the left end of the first edge to `right`, or to the
@@ -44,7 +44,8 @@ bool bound(Beam& b, const Flat& right, const Flat& left) noexcept {
   if (cross(b.rightmost, right) > 0) b.rightmost = right;
   if (cross(left, b.leftmost) > 0) b.leftmost = left;
   const double c = cross(b.rightmost, b.leftmost);
-  return !(c < 0 && c * c > kSame * kSame * dot(b.rightmost, b.rightmost) * dot(b.leftmost, b.leftmost));
+  return !(c < 0 && c * c > kSameDirection * kSameDirection * dot(b.rightmost, b.rightmost) *
+                                dot(b.leftmost, b.leftmost));
 }
 
 /// Limits the directions of a beam to those that leave the face across edge `e`. Returns false if none
@@ -116,8 +117,8 @@ FaceViews::FaceViews(const UnfoldedMesh& mesh) {
 
 bool FaceViews::narrow(Range range, double along, double inside, double& right, double& left) noexcept {
   if (range.low > range.high) return false;
-  if (range.low > 0) right = max(right, along + inside * kCotangents[range.low] - kSlack);
-  if (range.high < kSteps) left = min(left, along + inside * kCotangents[range.high] + kSlack);
+  if (range.low > 0) right = max(right, along + inside * kCotangents[range.low] - kRangeSlack);
+  if (range.high < kSteps) left = min(left, along + inside * kCotangents[range.high] + kRangeSlack);
   return right < left;
 }
 
@@ -148,7 +149,7 @@ bool FaceViews::look_through(const UnfoldedMesh& mesh, std::uint32_t edge, std::
                    right_q = cross(to_right, q - b.first_left);
       const double left_p = cross(to_left, p - b.first_right),
                    left_q = cross(to_left, q - b.first_right);
-      if (max(right_p, right_q) < -kRounding || min(left_p, left_q) > kRounding) continue;
+      if (max(right_p, right_q) < -kTouching || min(left_p, left_q) > kTouching) continue;
       const auto cut = [&](double at_p, double at_q) {
         return p + (q - p) * clamp(at_p / (at_p - at_q), 0.0, 1.0);
       };

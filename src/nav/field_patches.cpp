@@ -10,10 +10,10 @@
 namespace gsnav::detail {
 namespace {
 
-constexpr double kMargin = 1e-9;     // Margin by which a patch and a face extend beyond their sides,
-                                     // metres.
-constexpr double kRounding = 1e-12;  // Rounding error of a length, metres.
-constexpr double kAtBend = 1e-9;     // Metres: closer points define no direction.
+constexpr double kMargin = 1e-9;  // Margin by which a patch and a face extend beyond their sides,
+                                  // metres.
+constexpr double kLengthRounding = 1e-12;  // Rounding error of a length, metres.
+constexpr double kAtBend = 1e-9;           // Metres: closer points define no direction.
 
 /// Clips a convex polygon to the left side of the line through p in direction d.
 void cut(std::vector<Flat>& polygon, std::vector<Flat>& scratch, const Flat& p, const Flat& d) {
@@ -111,8 +111,9 @@ class CellsBuilder {
       candidates_.push_back({sources_[i].length_to(middle_), i});
       nearest = min(nearest, candidates_.back().at_middle);
     }
-    std::erase_if(candidates_,
-                  [&](const Candidate& c) { return c.at_middle > nearest + 2 * radius_ + kRounding; });
+    std::erase_if(candidates_, [&](const Candidate& c) {
+      return c.at_middle > nearest + 2 * radius_ + kLengthRounding;
+    });
     std::sort(candidates_.begin(), candidates_.end(), [](const Candidate& x, const Candidate& y) {
       return std::pair(x.at_middle, x.source) < std::pair(y.at_middle, y.source);
     });
@@ -126,7 +127,7 @@ class CellsBuilder {
     tangents_.clear();
     for (const Flat& p : part_) {
       const double rise = away > kAtBend ? dot(back, p - middle_) / away : -length(p - middle_);
-      tangents_.push_back((c.at_middle + rise) * (1 + relative_error_) + kRounding);
+      tangents_.push_back((c.at_middle + rise) * (1 + relative_error_) + kLengthRounding);
     }
     for (std::size_t k = 0; k < lengths_.size(); k += part_.size()) {
       const auto kept = lengths_.begin() + static_cast<std::ptrdiff_t>(k);

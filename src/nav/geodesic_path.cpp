@@ -2,12 +2,12 @@
 #include <algorithm>
 
 #include "geodesic_search.hpp"
+#include "tolerances.hpp"
 
 namespace gsnav::detail {
 namespace {
 
 constexpr double kHeightError = 0.01;  // Largest distance of a path from the surface, metres.
-constexpr double kSame = 1e-9;         // Points closer than this are equal, metres.
 
 struct PathPoint {
   Vec3d position{};

@@ -6,14 +6,12 @@
 #include <functional>
 
 #include "landmarks.hpp"
+#include "tolerances.hpp"
 
 namespace gsnav::detail {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kRounding = 1e-9;  // Tolerance for rounding: metres, m² or radians.
-constexpr double kPoint = 1e-11;    // Metres. Narrower windows are points.
+constexpr double kNarrowest = 1e-11;  // Metres. Narrower windows are points.
 
 Flat turned(const Flat& d, double angle) noexcept {
   const double c = std::cos(angle), s = std::sin(angle);
@@ -177,7 +175,7 @@ void GeodesicSearch::open(std::uint32_t edge, const Flat& root, const Flat& righ
   const UnfoldedMesh::Edge& here = mesh_->edges[edge];
   if (here.twin == kNone) return;
   const Flat extent = left - right;
-  if (!(dot(extent, extent) > kPoint * kPoint)) return;
+  if (!(dot(extent, extent) > kNarrowest * kNarrowest)) return;
   const UnfoldedMesh::Edge& there = mesh_->edges[here.twin];
   if (straight_ && has_goal_) {
     open_straight(edge, root, right, left, parent);

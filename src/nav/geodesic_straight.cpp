@@ -2,17 +2,11 @@
 #include <cmath>
 
 #include "geodesic_search.hpp"
+#include "tolerances.hpp"
 
 // Paths without bends: from a site to a goal, and from a vertex in all directions.
 
 namespace gsnav::detail {
-namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kRounding = 1e-9;  // Tolerance for rounding, radians.
-
-}  // namespace
 
 double GeodesicSearch::run_straight(const UnfoldedMesh& mesh, const Site& start, const Site& goal,
                                     double bound, const GoalBound* least, const FaceViews* views) {

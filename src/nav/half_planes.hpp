@@ -33,13 +33,13 @@ struct HalfPlane {
 /// on its line.
 inline std::optional<Ground> nearest_in(std::span<const HalfPlane> planes, const Ground& wanted,
                                         double limit, double slack = 0.0) noexcept {
-  constexpr double kRounding = 1e-12;
+  constexpr double kTiny = 1e-12;
   const auto offset = [&](const HalfPlane& h) { return h.offset - (h.soft ? slack : 0.0); };
   const double speed = length(wanted);
   Ground v = speed > limit ? wanted * (limit / speed) : wanted;
   for (std::size_t i = 0; i < planes.size(); ++i) {
     const double at = offset(planes[i]);
-    if (dot(planes[i].normal, v) >= at - kRounding) continue;
+    if (dot(planes[i].normal, v) >= at - kTiny) continue;
     const double room = limit * limit - at * at;
     if (room < 0) return {};
     const Ground foot = planes[i].normal * at, along = left_of(planes[i].normal);
@@ -47,8 +47,8 @@ inline std::optional<Ground> nearest_in(std::span<const HalfPlane> planes, const
     for (std::size_t j = 0; j < i; ++j) {
       const double rate = dot(planes[j].normal, along),
                    missing = offset(planes[j]) - dot(planes[j].normal, foot);
-      if (std::abs(rate) < kRounding) {
-        if (missing > kRounding) return {};
+      if (std::abs(rate) < kTiny) {
+        if (missing > kTiny) return {};
       } else if (rate > 0) {
         low = max(low, missing / rate);
       } else {

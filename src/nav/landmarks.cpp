@@ -5,11 +5,11 @@
 #include <limits>
 #include <numeric>
 
+#include "tolerances.hpp"
+
 namespace gsnav::detail {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kRounding = 1e-9;  // Tolerance for rounding, metres.
 constexpr std::uint32_t kParts = Landmarks::kParts;
 
 float rounded_up(double x) noexcept {

@@ -3,13 +3,14 @@
 #include <limits>
 
 #include "navmesh_impl.hpp"
+#include "tolerances.hpp"
 
 namespace gsnav {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kSame = 1e-9;  // Points closer than this are equal, metres.
-constexpr double kLeg = 1e-6;   // Metres: rounding error of a leg.
+using detail::kInfinity;
+using detail::kSame;
+constexpr double kLeg = 1e-6;  // Metres: rounding error of a leg.
 
 std::string text(const Vec3d& p) {
   char buffer[96];

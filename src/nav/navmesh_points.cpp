@@ -88,7 +88,8 @@ Vec3d inward(const Vec3d& a, const Vec3d& b) noexcept {
 
 std::optional<ObstacleHit> closest_wall(const NavMesh::Impl& impl, const NavPoint& start,
                                         double max_radius) {
-  constexpr double kSame = 1e-9;  // Metres. Edges that meet have the same distance except for rounding.
+  constexpr double kSameDistance =
+      1e-9;  // Metres. Edges that meet have the same distance except for rounding.
   std::optional<ObstacleHit> hit;
   const Vec3d c = start.position - impl.origin;
   double radius = max_radius, faces = 0;
@@ -96,12 +97,12 @@ std::optional<ObstacleHit> closest_wall(const NavMesh::Impl& impl, const NavPoin
             [&](double d, const Vec3d& a, const Vec3d& b, const Vec3d& nearest) {
               const Vec3d normal = inward(a, b);
               const double facing = dot(c - nearest, normal);
-              if (hit && d > hit->distance - kSame) {
+              if (hit && d > hit->distance - kSameDistance) {
                 hit->distance = min(d, hit->distance);
                 if (facing <= faces) return;  // At a corner, choose the edge that faces the point more.
               } else {
                 hit.emplace().distance = d;
-                radius = min(max_radius, d + kSame);
+                radius = min(max_radius, d + kSameDistance);
               }
               hit->position = nearest + impl.origin;
               hit->normal = normal;

@@ -6,11 +6,11 @@
 
 #include "gsnav/detail/core/list_by_group.hpp"
 #include "poly_mesh.hpp"
+#include "tolerances.hpp"
 
 namespace gsnav::detail {
 namespace {
 
-constexpr double kRounding = 1e-9;  // Tolerance for rounding, metres.
 constexpr double kPolygonsPerCell = 1.0;
 constexpr double kLeastSide = 0.25;  // Smallest side of a cell, metres.
 constexpr double kMaxSideCells = 2048.0;

@@ -11,10 +11,10 @@
 namespace gsnav::detail {
 namespace {
 
-constexpr double kLevel = 1e-3;   // Metres. A polygon that deviates less from a plane is one face.
-constexpr double kBeside = 1e-2;  // Largest distance of a height sample from the edge of its polygon,
-                                  // metres.
-constexpr double kSliver = 1e-8;  // Largest area that counts as 0, m².
+constexpr double kLevel = 1e-3;         // Metres. A polygon that deviates less from a plane is one face.
+constexpr double kSampleBeside = 1e-2;  // Largest distance of a height sample from the edge of its
+                                        // polygon, metres.
+constexpr double kNoArea = 1e-8;        // Largest area that counts as 0, m².
 
 /// Cuts a polygon into triangles by ear clipping, the best-shaped ear first.
 std::vector<Sheet> clipped(PolyId id, const std::vector<Vec3d>& c) {
@@ -97,7 +97,7 @@ bool PolySheets::from_heights(PolyId id, std::vector<Sheet>& own) const {
   for (std::uint32_t t = p.tri_first; t < p.tri_first + p.tri_count; ++t) {
     std::array<Vec3d, 3> tri = mesh_.triangle(mesh_.tris[t]);
     if (area_xz(tri[0], tri[1], tri[2]) < 0) std::swap(tri[1], tri[2]);
-    if (!(area_xz(tri[0], tri[1], tri[2]) > kSliver)) return false;
+    if (!(area_xz(tri[0], tri[1], tri[2]) > kNoArea)) return false;
     own.push_back({id, {tri.begin(), tri.end()}, {Sheet::kInside, Sheet::kInside, Sheet::kInside}});
   }
   const auto shared = [&](const Vec3d& a, const Vec3d& b) {
@@ -110,7 +110,7 @@ bool PolySheets::from_heights(PolyId id, std::vector<Sheet>& own) const {
     for (std::size_t e = 0; e < 3; ++e) {
       const Vec3d &a = s.corners[e], &b = s.corners[(e + 1) % 3];
       if (shared(a, b)) continue;
-      double best = kBeside;
+      double best = kSampleBeside;
       for (std::uint32_t k = 0; k < p.count; ++k) {
         const auto [ta, da] = along_xz(mesh_.corner(p, k), mesh_.corner(p, k + 1), a);
         const auto [tb, db] = along_xz(mesh_.corner(p, k), mesh_.corner(p, k + 1), b);

@@ -6,18 +6,19 @@
 
 #include "poly_mesh.hpp"
 #include "step_compat.hpp"
+#include "tolerances.hpp"
 
 namespace gsnav {
 namespace {
 
-constexpr double kMaxCoordinate = 1e9;
-constexpr double kRounding = 1e-9;  // Tolerance for rounding, metres or relative.
+using detail::kRounding;
+constexpr double kFarthest = 1e9;
 constexpr double kShortest = 1e-6;  // Metres. Shorter remainders of a step do not slide.
 
 bool valid(const AgentState& a) noexcept {
   return is_finite(a.position) && is_finite(a.radius) && is_finite(a.height) && a.radius >= 0 &&
-         a.height >= 0 && std::abs(a.position.x) <= kMaxCoordinate &&
-         std::abs(a.position.y) <= kMaxCoordinate && std::abs(a.position.z) <= kMaxCoordinate;
+         a.height >= 0 && std::abs(a.position.x) <= kFarthest && std::abs(a.position.y) <= kFarthest &&
+         std::abs(a.position.z) <= kFarthest;
 }
 
 double length_xz(const Vec3d& v) noexcept { return std::sqrt(v.x * v.x + v.z * v.z); }

@@ -88,10 +88,10 @@ struct TriangleLists {
     const auto index = [&](double v, int n) {
       return static_cast<std::uint32_t>(clamp(v / grid.side(), 0.0, static_cast<double>(n - 1)));
     };
-    struct Reach {
+    struct TileReach {
       std::uint32_t x0, x1, z0, z1;
     };
-    std::vector<Reach> reach(triangles_in.size());
+    std::vector<TileReach> reach(triangles_in.size());
     const double x = origin.x + grid.box.low.x, z = origin.z + grid.box.low.z;
     constexpr std::size_t kChunk = 4096;
     pool.run(static_cast<std::uint32_t>((reach.size() + kChunk - 1) / kChunk),
@@ -106,7 +106,7 @@ struct TriangleLists {
                }
              });
     list_by_group(reach.size(), grid.count(), first, triangles, [&](std::size_t i, const auto& f) {
-      const Reach& r = reach[i];
+      const TileReach& r = reach[i];
       for (std::uint32_t row = r.z0; row <= r.z1; ++row) {
         for (std::uint32_t column = r.x0; column <= r.x1; ++column)
           f(column + static_cast<std::size_t>(grid.nx) * row);

@@ -71,11 +71,11 @@ class TriangleHeights {
     }
   }
   static bool covers(const std::array<Vec3d, 3>& t, const Vec3d& p) noexcept {
-    constexpr double kRounding = -1e-6;  // m². Seams between triangles belong to both.
+    constexpr double kSeam = -1e-6;  // m². Seams between triangles belong to both.
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec3d &a = t[k], &b = t[(k + 1) % 3];
       // Facing up is clockwise in (x, z).
-      if ((b.z - a.z) * (p.x - a.x) - (b.x - a.x) * (p.z - a.z) < kRounding) return false;
+      if ((b.z - a.z) * (p.x - a.x) - (b.x - a.x) * (p.z - a.z) < kSeam) return false;
     }
     return true;
   }

@@ -9,13 +9,13 @@
 
 #include "ground_plane.hpp"
 #include "poly_sheets.hpp"
+#include "tolerances.hpp"
 
 namespace gsnav::detail {
 namespace {
 
 constexpr double kWeld = 1e-4;      // Metres. Closer points of an edge coincide.
 constexpr double kStraight = 1e-9;  // Tolerance for a straight angle, radians.
-constexpr double kPi = 3.14159265358979323846;
 constexpr std::uint64_t kWall = ~std::uint64_t{0};
 
 /// Edge of the neighbour that lies against edge k of a polygon. kNone at a wall.

@@ -3,11 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace gsnav {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 /// Rotation from the sensor to each face. Rows are the face's right, down and forward directions. Order:
 /// forward, right, back, left, up, down.
@@ -28,7 +27,7 @@ double sphere_scale(const FisheyeLens& lens, double z) noexcept {
 
 std::array<double, 2> focal_length(const SensorSpec& s) noexcept {
   std::array<double, 2> f = s.fisheye.focal_length;
-  const double half = 0.5 * s.hfov * kPi / 180.0;
+  const double half = 0.5 * s.hfov * std::numbers::pi / 180.0;
   const double fit = 0.5 * s.resolution[1] * sphere_scale(s.fisheye, std::cos(half)) / std::sin(half);
   for (double& v : f) v = v > 0 ? v : fit;
   return f;
@@ -53,11 +52,12 @@ std::optional<Vec3d> sensor_ray(const SensorSpec& s, double u, double v) noexcep
   const double height = s.resolution[0], width = s.resolution[1];
   if (s.model == SensorModel::fisheye) return fisheye_ray(s, u, v);
   if (s.model == SensorModel::equirectangular) {
-    const double longitude = (u / width - 0.5) * 2.0 * kPi, latitude = (0.5 - v / height) * kPi;
+    const double longitude = (u / width - 0.5) * 2.0 * std::numbers::pi,
+                 latitude = (0.5 - v / height) * std::numbers::pi;
     return Vec3d{std::cos(latitude) * std::sin(longitude), -std::sin(latitude),
                  std::cos(latitude) * std::cos(longitude)};
   }
-  const double f = 0.5 * width / std::tan(0.5 * s.hfov * kPi / 180.0);
+  const double f = 0.5 * width / std::tan(0.5 * s.hfov * std::numbers::pi / 180.0);
   const Vec3d d{(u - 0.5 * width) / f, (v - 0.5 * height) / f, 1.0};
   return normalized(d);
 }
@@ -96,7 +96,7 @@ CubeMap::CubeMap(const SensorSpec& spec) {
 Camera CubeMap::face_camera(const Camera& sensor, std::size_t face) const noexcept {
   Camera c = sensor;
   const double inner = side_ - 2;
-  c.set_hfov(side_, side_, 2.0 * std::atan(side_ / inner) * 180.0 / kPi);
+  c.set_hfov(side_, side_, 2.0 * std::atan(side_ / inner) * 180.0 / std::numbers::pi);
   c.viewmat.linear = kFaceFromSensor[face] * sensor.viewmat.linear;
   c.viewmat.translation = kFaceFromSensor[face] * sensor.viewmat.translation;
   return c;

@@ -5,12 +5,12 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <numbers>
 #include <vector>
 
 namespace gsnav {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 const SnapOptions kSnap{{0.5, 1.0, 0.5}};
 
 // Penalties, in metres of path.
@@ -59,7 +59,7 @@ class Lookahead {
         bodies_(bodies),
         horizon_(horizon),
         comfort_(comfort),
-        turn_(world.config().turn_angle * kPi / 180.0),
+        turn_(world.config().turn_angle * std::numbers::pi / 180.0),
         reach_(0.95 * world.config().success_distance) {}
 
   Outlook play(const Plan& plan) const {
@@ -103,7 +103,7 @@ class Lookahead {
         return out;
       }
     }
-    const double turns_left = abs(std::remainder(way.bearing - yaw, 2 * kPi)) / turn_;
+    const double turns_left = abs(std::remainder(way.bearing - yaw, 2 * std::numbers::pi)) / turn_;
     out.cost = out.charge + way.left + 0.6 * c.forward_step * turns_left;
     return out;
   }
@@ -120,7 +120,7 @@ class Lookahead {
   }
 
   Action steer(const Guide& way, double yaw) const noexcept {
-    const double error = std::remainder(way.bearing - yaw, 2 * kPi);
+    const double error = std::remainder(way.bearing - yaw, 2 * std::numbers::pi);
     if (abs(error) <= 0.5 * turn_ + 1e-9) return Action::move_forward;
     return error > 0 ? Action::turn_left : Action::turn_right;
   }

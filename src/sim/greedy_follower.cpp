@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include "gsnav/detail/core/field_check.hpp"
@@ -10,7 +11,6 @@
 namespace gsnav {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kPerAction = 0.0125;  // In forward steps. Prefers the shorter of two equally good ways.
 constexpr double kPerCollision = 0.025;
 
@@ -30,7 +30,7 @@ Result<GreedyGeodesicFollower> GreedyGeodesicFollower::make(const NavMesh& mesh,
 }
 
 void GreedyGeodesicFollower::act(AgentPose& agent, Action action) const {
-  const double turn = task_.turn_angle * kPi / 180.0;
+  const double turn = task_.turn_angle * std::numbers::pi / 180.0;
   if (action == Action::turn_left) agent.yaw += turn;
   if (action == Action::turn_right) agent.yaw -= turn;
   if (action != Action::move_forward) return;
@@ -55,10 +55,10 @@ Result<Action> GreedyGeodesicFollower::next(const AgentPose& pose) {
     pending_.pop_back();
     return a;
   }
-  const double turn = task_.turn_angle * kPi / 180.0;
+  const double turn = task_.turn_angle * std::numbers::pi / 180.0;
   double best = -std::numeric_limits<double>::infinity();
   int turns = 0;
-  for (int k = 0; k * turn <= kPi + 1e-9; ++k) {
+  for (int k = 0; k * turn <= std::numbers::pi + 1e-9; ++k) {
     for (const int side : {k, -k}) {
       if (k == 0 && side != k) continue;
       AgentPose trial{at.position, pose.yaw + side * turn, at.poly};

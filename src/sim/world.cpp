@@ -2,6 +2,7 @@
 #include "gsnav/sim/world.hpp"
 
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <utility>
 
@@ -10,9 +11,7 @@
 namespace gsnav {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
-double wrapped(double angle) noexcept { return std::remainder(angle, 2 * kPi); }
+double wrapped(double angle) noexcept { return std::remainder(angle, 2 * std::numbers::pi); }
 
 /// Heading of a rotation: the direction of the rotated -Z on the ground plane.
 double yaw_of(Quatd q) noexcept {
@@ -22,7 +21,7 @@ double yaw_of(Quatd q) noexcept {
 }
 
 /// Tolerance for episodes from files: their points lie on the surface except for rounding.
-const SnapOptions kSnap{{0.5, 1.0, 0.5}};
+const SnapOptions kPlaceSnap{{0.5, 1.0, 0.5}};
 
 }  // namespace
 
@@ -86,9 +85,9 @@ Status World::reset(const PointNavEpisode& episode) {
   const auto fail = [&](const char* what) {
     return Status(Errc::nothing_navigable, "episode \"" + episode.id + "\": " + what);
   };
-  const auto start = navmesh_->snap_point(episode.start_position, kSnap);
+  const auto start = navmesh_->snap_point(episode.start_position, kPlaceSnap);
   if (!start) return fail("start_position is off the NavMesh");
-  const auto goal = navmesh_->snap_point(episode.goal_position, kSnap);
+  const auto goal = navmesh_->snap_point(episode.goal_position, kPlaceSnap);
   if (!goal) return fail("goal_position is off the NavMesh");
   const double l = navmesh_->distance_between(*start, *goal);
   if (!is_finite(l)) return fail("goal_position cannot be reached along the NavMesh");
@@ -145,16 +144,16 @@ Result<World::Motion> World::motion_of(Action action) const {
       m.chord = config_.forward_step / config_.substeps;
       break;
     case Action::turn_left:
-      m.first_turn = config_.turn_angle * kPi / 180.0;
+      m.first_turn = config_.turn_angle * std::numbers::pi / 180.0;
       break;
     case Action::turn_right:
-      m.first_turn = -config_.turn_angle * kPi / 180.0;
+      m.first_turn = -config_.turn_angle * std::numbers::pi / 180.0;
       break;
     case Action::look_up:
-      m.tilt = config_.tilt_angle * kPi / 180.0;
+      m.tilt = config_.tilt_angle * std::numbers::pi / 180.0;
       break;
     case Action::look_down:
-      m.tilt = -config_.tilt_angle * kPi / 180.0;
+      m.tilt = -config_.tilt_angle * std::numbers::pi / 180.0;
       break;
     default:
       return {Errc::invalid_argument,
@@ -245,7 +244,7 @@ StepInfo World::move(const Motion& motion, std::span<const CapsuleSet* const> bo
   const StepOptions options{config_.allow_sliding, config_.skin, StepOptions{}.max_slides};
   StepInfo info;
   s_.agent.yaw = wrapped(s_.agent.yaw + motion.first_turn);
-  s_.agent.pitch = clamp(s_.agent.pitch + motion.tilt, -0.5 * kPi, 0.5 * kPi);
+  s_.agent.pitch = clamp(s_.agent.pitch + motion.tilt, -0.5 * std::numbers::pi, 0.5 * std::numbers::pi);
   distances_.clear();
   avatars_.clear();
   for (const CapsuleSet* set : bodies) {
@@ -293,12 +292,13 @@ Status World::set_agent(const Vec3d& position, double yaw, double pitch) {
   if (!is_finite(position) || !is_finite(yaw) || !is_finite(pitch)) {
     return {Errc::invalid_argument, "set_agent: position, yaw and pitch must be finite"};
   }
-  const auto at = navmesh_->snap_point(position, kSnap);
+  const auto at = navmesh_->snap_point(position, kPlaceSnap);
   if (!at) return {Errc::nothing_navigable, "set_agent: the position is off the NavMesh"};
   if (!is_finite(navmesh_->distance_between(*at, s_.goal))) {
     return {Errc::nothing_navigable, "set_agent: the goal cannot be reached from there"};
   }
-  s_.agent = {at->position, wrapped(yaw), at->poly, clamp(pitch, -0.5 * kPi, 0.5 * kPi)};
+  s_.agent = {at->position, wrapped(yaw), at->poly,
+              clamp(pitch, -0.5 * std::numbers::pi, 0.5 * std::numbers::pi)};
   measure_distance();
   return {};
 }
@@ -319,7 +319,7 @@ PointGoal World::point_goal() const noexcept {
   const Vec3d d = s_.episode.goal_position - s_.agent.position;
   const double bearing = std::atan2(-d.x, -d.z);
   const double angle = wrapped(bearing - s_.agent.yaw);
-  return {std::hypot(d.x, d.z), angle > -kPi ? angle : kPi};
+  return {std::hypot(d.x, d.z), angle > -std::numbers::pi ? angle : std::numbers::pi};
 }
 
 EpisodeMetrics World::metrics() const {
