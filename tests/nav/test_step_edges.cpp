@@ -22,18 +22,18 @@ namespace {
 Soup hills(std::uint64_t seed) {
   Soup soup;
   Rng rng(seed);
-  constexpr std::uint32_t kSide = 41;
+  constexpr std::uint32_t kPosts = 41;
   std::vector<double> heights;
-  for (std::uint32_t i = 0; i < kSide * kSide; ++i) heights.push_back(rng.uniform(0, 0.3));
-  for (std::uint32_t r = 0; r < kSide; ++r) {
-    for (std::uint32_t c = 0; c < kSide; ++c)
-      soup.vertices.push_back({0.5 * c, heights[kSide * r + c], 0.5 * r});
+  for (std::uint32_t i = 0; i < kPosts * kPosts; ++i) heights.push_back(rng.uniform(0, 0.3));
+  for (std::uint32_t r = 0; r < kPosts; ++r) {
+    for (std::uint32_t c = 0; c < kPosts; ++c)
+      soup.vertices.push_back({0.5 * c, heights[kPosts * r + c], 0.5 * r});
   }
-  for (std::uint32_t r = 0; r + 1 < kSide; ++r) {
-    for (std::uint32_t c = 0; c + 1 < kSide; ++c) {
-      const std::uint32_t a = kSide * r + c;
-      soup.triangles.push_back({a, a + kSide, a + kSide + 1});
-      soup.triangles.push_back({a, a + kSide + 1, a + 1});
+  for (std::uint32_t r = 0; r + 1 < kPosts; ++r) {
+    for (std::uint32_t c = 0; c + 1 < kPosts; ++c) {
+      const std::uint32_t a = kPosts * r + c;
+      soup.triangles.push_back({a, a + kPosts, a + kPosts + 1});
+      soup.triangles.push_back({a, a + kPosts + 1, a + 1});
     }
   }
   return soup;
