@@ -20,7 +20,7 @@ using namespace gsnav_test;
 
 namespace {
 
-/// The mean and the opacity of a row at a time, in long double, by the formulas of TemporalRows.
+/// The mean and the opacity of a row at a time, in long double, by the formulas of MotionRows.
 struct ExpectedMoment {
   std::array<long double, 3> mean{};
   long double opacity = 0;

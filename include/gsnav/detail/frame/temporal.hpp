@@ -17,17 +17,17 @@ inline constexpr std::size_t kMotionPlanes = 9;
 ///
 /// At time t, with dt = t - times[i], the mean is base + v dt + a dt^2 / 2 + j dt^3 / 6. The opacity is
 /// base * exp(-dt^2 / (2 (sigma^2 + 1e-8))). Shapes, orientations and colours do not change.
-struct TemporalRows {
+struct MotionRows {
   View<const float> times;   ///< [N], seconds
   View<const float> sigmas;  ///< [N], seconds, >= 0; infinity: never fades
   /// x, y, z of velocity (m/s), acceleration (m/s^2) and jerk (m/s^3), [N] each. Empty planes are zero.
   /// The three planes of one quantity are either all present or all empty.
   View<const float> motion[kMotionPlanes];
 };
-static_assert(sizeof(void*) != 8 || sizeof(TemporalRows) <= 256);
+static_assert(sizeof(void*) != 8 || sizeof(MotionRows) <= 256);
 
 /// The same with all arrays of the Gaussians, each at its own time.
-struct TemporalView : TemporalRows {
+struct TemporalView : MotionRows {
   GaussianRows base;
 };
 static_assert(sizeof(void*) != 8 || sizeof(TemporalView) <= 656);
@@ -53,7 +53,7 @@ GSNAV_HD Vec3<S> temporal_offset(const Vec3<S>& velocity, const Vec3<S>& acceler
 /// State of Gaussian i at time t: returns its offset from the base in metres, and its opacity. An
 /// opacity below 1/255 becomes 0, and the offset is then 0 as well.
 template <class S>
-GSNAV_HD Vec3<S> temporal_state(const ShapeRows& base, const TemporalRows& in, std::size_t i, double t,
+GSNAV_HD Vec3<S> temporal_state(const ShapeRows& base, const MotionRows& in, std::size_t i, double t,
                                 S& opacity) noexcept {
   const S dt = static_cast<S>(t - static_cast<double>(in.times[i]));
   opacity = S(opacity_of(base, i)) * temporal_weight(dt, S(in.sigmas[i]));
@@ -73,7 +73,7 @@ GSNAV_HD Vec3<S> temporal_state(const ShapeRows& base, const TemporalRows& in, s
 template <class S>
 struct GaussianAt {
   ShapeRows base;
-  TemporalRows in;
+  MotionRows in;
   double t = 0;
   View<float> means[3];
   View<float> opacities;

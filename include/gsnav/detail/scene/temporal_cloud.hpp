@@ -10,7 +10,7 @@
 
 namespace gsnav {
 
-/// Gaussians in host memory that move and fade over time (TemporalRows has the formulas).
+/// Gaussians in host memory that move and fade over time (MotionRows has the formulas).
 struct TemporalCloud {
   GaussianCloud cloud;        ///< Each Gaussian as it is at its own time.
   std::vector<float> times;   ///< [N] seconds.
