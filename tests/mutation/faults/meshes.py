@@ -5,6 +5,7 @@ from . import fault
 MESH = "tests/ops/test_mesh.cpp"
 CASES = "tests/hard_cases/test_composite.cpp"
 PANES = "tests/hard_cases/test_fragments.cpp"
+RAYS = "random triangles, also huge ones and behind the camera: what a ray tracer in long double meets"
 
 FAULTS = [
     fault("mesh_edges_of_both", "of", "(owns ? 0 : 1)", "0", MESH, "triangles that share edges own each pixel once",
@@ -16,8 +17,10 @@ FAULTS = [
           "planes: depth in closed form, from a centimetre to the horizon"),
     fault("mesh_sliver_depth", "inverse_z_at", "clamp(plane, t.inverse_z_min, t.inverse_z_max)", "plane", MESH,
           "slivers and needles keep the depth of their corners"),
-    fault("mesh_no_near_clip", "distance", "case 0: return p.z - near_plane;", "case 0: return p.z - 1e-9;", MESH,
-          "random triangles, also huge ones and behind the camera: what a ray tracer in long double meets"),
+    fault("mesh_no_near_clip", "distance", "k == 0 ? p.z - near_plane :", "k == 0 ? p.z - 1e-9 :", MESH, RAYS),
+    fault("mesh_side_without_margin", "ImageSide", "extent - c + margin", "extent - c", MESH, RAYS),
+    fault("mesh_pixel_centres_at_integers", "PinholePoint", "x(fma(L(lens.fx), u, L(lens.cx)))",
+          "x(fma(L(lens.fx), u, L(lens.cx) + L(scalar_of<L>(0.5))))", MESH, RAYS),
     fault("mesh_ignored", "alpha_before_mesh", "(ray_depth(depth, px, py) > mesh)",
           "(ray_depth(depth, px, py) > mesh + L(S(1e9)))",
           CASES, "N49_mesh_between_layers", "N50_mesh_straddle_cloud", why="Gaussians behind a mesh are seen"),

@@ -35,6 +35,8 @@ FAULTS = [
     fault("response_ignored", "splat_exponent", "if (along_rays) return perspective_exponent",
           "if (false) return perspective_exponent",
           RESPONSE, "N02_exact_ray_grid", why="the ellipse of the linearised response", on=EVERY),
+    fault("pixel_centres_at_integers", "PinholePoint", "x(fma(L(lens.fx), u, L(lens.cx)))",
+          "x(fma(L(lens.fx), u, L(lens.cx) + L(scalar_of<L>(0.5))))", RESPONSE, "N01_ewa_offaxis_grid", on=EVERY),
     fault("needles_in_float", "needs_double",
           "  return (fma(abs(p.k), length_x, p.b * length_y) > L(S(kFloatLength))) ||\n"
           "         (fma(abs(p.k), abs(ref.dx), p.b * abs(ref.dy)) > L(S(kFloatOffset)));",
@@ -47,12 +49,12 @@ FAULTS = [
           "const Vec3<L> l1 = m.row[0] * fz_x;",
           RESPONSE, "N01_ewa_offaxis_grid", on=EVERY, why="beside the view axis depth widens a footprint"),
     fault("mean_in_float", "make_splat",
-          "  return make_splat<GeometryOnly>(camera, depth, projected, mean_x, mean_y, out);",
+          "  return make_splat<GeometryOnly>(camera, depth, projected, mean.x, mean.y, out);",
           "  return make_splat<GeometryOnly>(camera, depth, projected, projected.splat.mean_x, projected.splat.mean_y,"
           " out);",
           RESPONSE, "N01_ewa_offaxis_grid", "N02_exact_ray_grid"),
     fault("mean_in_float_in_lanes", "g",
-          "reference_of<F>(camera.width, camera.height, mean_x, mean_y)",
+          "reference_of<F>(camera.width, camera.height, mean.x, mean.y)",
           "reference_of<F>(camera.width, camera.height, p.mean_x, p.mean_y)",
           RESPONSE, "N01_ewa_offaxis_grid"),
     fault("needles_in_float_in_lanes", "write_splats",

@@ -5,8 +5,8 @@ from . import fault
 TEST = "tests/hard_cases/test_properties.cpp"
 
 FAULTS = [
-    fault("depth_with_an_epsilon", "project",
-          "const L inv_z = L(S(1)) / t.z;", "const L inv_z = L(S(1)) / (t.z + L(S(1e-7)));",
+    fault("depth_with_an_epsilon", "PinholePoint",
+          "inv_z(L(scalar_of<L>(1)) / point.z)", "inv_z(L(scalar_of<L>(1)) / (point.z + L(scalar_of<L>(1e-7))))",
           TEST, "property_scale_by_power_of_two", why="INRIA: a length that belongs to no scene"),
     fault("pixel_by_its_corner", "PixelWalk",
           "    px = S(x) + S(0.5);\n    py = S(y) + S(0.5);\n", "    px = S(x);\n    py = S(y);\n",

@@ -32,6 +32,10 @@ struct ChunkInView {
     return dot(direction, center) + abs(direction.x) * half.x + abs(direction.y) * half.y +
            abs(direction.z) * half.z;
   }
+  /// The function of a side of the image, as a direction.
+  GSNAV_HD Vec3d across(const ImageAxis& axis, const ImageSide<double>& side) const noexcept {
+    return axis.direction * side.across + camera.rotation.row[2] * side.ahead;
+  }
   GSNAV_HD double z_max() const noexcept { return largest(camera.rotation.row[2]) + slack; }
   GSNAV_HD double z_min() const noexcept {
     return max(-largest(-camera.rotation.row[2]) - slack, camera.near_plane / camera.scale);
@@ -42,19 +46,17 @@ struct ChunkInView {
   }
 
   /// Reach of footprints beyond their means along one image axis: `wide` in pixels times depth, plus
-  /// `fixed` in pixels. The arguments of reach() are the focal length, principal point, limit of the
-  /// Jacobian and image size of the axis.
+  /// `fixed` in pixels.
   struct Reach {
     double wide, fixed;
   };
-  GSNAV_HD Reach reach(double z_min, double s_max, double f, double c, double limit,
-                       double extent) const noexcept {
+  GSNAV_HD Reach reach(double z_min, double s_max, const ImageAxis& axis) const noexcept {
     const double radius = sqrt(max(s_max, 0.0)) / kWhitenScale;
     const double h = sqrt(camera.eps2d);
-    const double reach = f * bounds.scale_max * sqrt(1 + limit * limit);
+    const double reach = axis.f * bounds.scale_max * axis.slant();
     // At least the padding of splat_bounds: relative, plus 5e-7 of the aspect ratio, and absolute.
     const double pad = 1.002 + 5e-7 * (reach / (z_min * h) + 1);
-    return {pad * radius * reach + 1e-5 * (f + abs(c) + extent) * (size + slack),
+    return {pad * radius * reach + 1e-5 * (axis.f + abs(axis.c) + axis.extent) * (size + slack),
             pad * radius * h + 0.01};
   }
 };
@@ -64,8 +66,8 @@ struct ChunkInView {
 /// True if a Gaussian within the bounds may be visible (`Projected::visible`). Conservative: never false
 /// if one is visible, and true if anything is not finite.
 ///
-/// "Left of the image" is linear in the mean after multiplying by z: f x + (cx + fixed) z < -wide. Such
-/// a function has its maximum at a corner of the box.
+/// "Left of the image" is linear in the mean after multiplying by z (ImageSide). Such a function has its
+/// maximum at a corner of the box.
 /// @param s_max ChunkInView::s_max of the bounds, or of larger bounds that contain them
 GSNAV_HD bool may_be_visible(const ProjectionCamera<double>& camera, const ChunkBounds& b,
                              double s_max) noexcept {
@@ -75,20 +77,12 @@ GSNAV_HD bool may_be_visible(const ProjectionCamera<double>& camera, const Chunk
   if (camera.response != Response::ewa) return true;
   const double z_min = chunk.z_min();
   if (s_max < -1e-5) return false;
-  const auto outside = [&](const Vec3d& axis, double f, double c, double limit,
-                           double extent) GSNAV_INLINED {
-    const auto [wide, fixed] = chunk.reach(z_min, s_max, f, c, limit, extent);
-    const Vec3d& z = camera.rotation.row[2];
-    return chunk.largest(axis * f + z * (c + fixed)) < -wide ||  // left of (above) the first pixel
-                                                                 // right of (below) the last pixel
-           chunk.largest(axis * -f + z * (extent - c + fixed)) < -wide;
+  const auto outside = [&](const ImageAxis& axis) GSNAV_INLINED {
+    const auto [wide, fixed] = chunk.reach(z_min, s_max, axis);
+    return chunk.largest(chunk.across(axis, axis.first_side(fixed))) < -wide ||
+           chunk.largest(chunk.across(axis, axis.last_side(fixed))) < -wide;
   };
-  const double limit_u = max(abs(camera.u_min), abs(camera.u_max));
-  const double limit_v = max(abs(camera.v_min), abs(camera.v_max));
-  return !outside(camera.rotation.row[0], camera.fx, camera.cx, limit_u,
-                  static_cast<double>(camera.width)) &&
-         !outside(camera.rotation.row[1], camera.fy, camera.cy, limit_v,
-                  static_cast<double>(camera.height));
+  return !outside(camera.image_axis(0)) && !outside(camera.image_axis(1));
 }
 
 GSNAV_HD bool may_be_visible(const ProjectionCamera<double>& camera, const ChunkBounds& b) noexcept {
@@ -99,13 +93,12 @@ GSNAV_HD bool may_be_visible(const ProjectionCamera<double>& camera, const Chunk
 /// then skip little. The result affects speed only.
 GSNAV_HD bool lies_in_view(const ProjectionCamera<double>& camera, const ChunkBounds& b) noexcept {
   const detail::ChunkInView chunk(camera, b);
-  const Vec3d& z = camera.rotation.row[2];
-  const auto inside = [&](const Vec3d& axis, double f, double c, double extent) GSNAV_INLINED {
-    return chunk.largest(axis * -f - z * c) <= 0 && chunk.largest(axis * f + z * (c - extent)) <= 0;
+  const auto inside = [&](const ImageAxis& axis) GSNAV_INLINED {
+    return chunk.largest(-chunk.across(axis, axis.first_side(0))) <= 0 &&
+           chunk.largest(-chunk.across(axis, axis.last_side(0))) <= 0;
   };
-  return beyond_near_plane(camera.near_plane, -chunk.largest(-z) * camera.scale) &&
-         inside(camera.rotation.row[0], camera.fx, camera.cx, static_cast<double>(camera.width)) &&
-         inside(camera.rotation.row[1], camera.fy, camera.cy, static_cast<double>(camera.height));
+  return beyond_near_plane(camera.near_plane, -chunk.largest(-camera.rotation.row[2]) * camera.scale) &&
+         inside(camera.image_axis(0)) && inside(camera.image_axis(1));
 }
 
 /// Bounds of the sort keys and footprints of a chunk, for one camera.
@@ -125,19 +118,15 @@ GSNAV_HD ChunkExtent chunk_extent(const ProjectionCamera<double>& camera,
   const double row =
       camera.sort_order == SortOrder::z_depth ? 1.0 : max(1.0, norm(camera.rotation.row[2]));
   e.nearest = static_cast<float>(z_min / row * camera.scale * (1 - 1e-6));
-  const auto along = [&](const Vec3d& axis, double f, double c, double limit, double extent, double& low,
-                         double& high) GSNAV_INLINED {
-    const auto [wide, fixed] = chunk.reach(z_min, s_max, f, c, limit, extent);
-    const double left = -chunk.largest(axis * -f) - wide, right = chunk.largest(axis * f) + wide;
-    low = c - fixed + left / (left < 0 ? z_min : z_max);
-    high = c + fixed + right / (right > 0 ? z_min : z_max);
+  const auto along = [&](const ImageAxis& axis, double& low, double& high) GSNAV_INLINED {
+    const auto [wide, fixed] = chunk.reach(z_min, s_max, axis);
+    const double left = -chunk.largest(axis.direction * -axis.f) - wide,
+                 right = chunk.largest(axis.direction * axis.f) + wide;
+    low = axis.c - fixed + left / (left < 0 ? z_min : z_max);
+    high = axis.c + fixed + right / (right > 0 ? z_min : z_max);
   };
-  const double limit_u = max(abs(camera.u_min), abs(camera.u_max));
-  const double limit_v = max(abs(camera.v_min), abs(camera.v_max));
-  along(camera.rotation.row[0], camera.fx, camera.cx, limit_u, static_cast<double>(camera.width), e.x0,
-        e.x1);
-  along(camera.rotation.row[1], camera.fy, camera.cy, limit_v, static_cast<double>(camera.height), e.y0,
-        e.y1);
+  along(camera.image_axis(0), e.x0, e.x1);
+  along(camera.image_axis(1), e.y0, e.y1);
   return e;
 }
 

@@ -94,15 +94,11 @@ struct ProjectedRow {
 namespace detail {
 
 /// Projects only the mean, in double.
-template <class L>
-GSNAV_HD void project_mean(const ProjectionCamera<double>& camera, const Vec3<L>& delta, L& mean_x,
-                           L& mean_y) noexcept {
-  const auto row = [&](int r) GSNAV_INLINED {
-    return Vec3<L>{L(camera.rotation(r, 0)), L(camera.rotation(r, 1)), L(camera.rotation(r, 2))};
-  };
-  const L inv_z = L(1.0) / dot(row(2), delta);
-  mean_x = fma(L(camera.fx), dot(row(0), delta) * inv_z, L(camera.cx));
-  mean_y = fma(L(camera.fy), dot(row(1), delta) * inv_z, L(camera.cy));
+/// @param delta mean - camera position, asset frame
+template <class D>
+GSNAV_HD PinholePoint<D> project_mean(const ProjectionCamera<double>& camera,
+                                      const Vec3<D>& delta) noexcept {
+  return {camera, mat_cast<D>(camera.rotation) * delta};
 }
 
 /// Centre of the pixel in [0, size) that is nearest to x.
@@ -284,9 +280,8 @@ template <bool GeometryOnly>
 GSNAV_HD bool make_splat(const ProjectionCamera<float>& camera, const ProjectionCamera<double>& camera64,
                          bool depth, const RowKey<float>& key, const ProjectedRow<float>& projected,
                          Splat<float>& out) noexcept {
-  double mean_x, mean_y;
-  detail::project_mean(camera64, key.delta64, mean_x, mean_y);
-  return make_splat<GeometryOnly>(camera, depth, projected, mean_x, mean_y, out);
+  const PinholePoint<double> mean = detail::project_mean(camera64, key.delta64);
+  return make_splat<GeometryOnly>(camera, depth, projected, mean.x, mean.y, out);
 }
 
 /// Makes the records of a row computed in double, for the float64 reference and for rows that need it

@@ -3,6 +3,7 @@
 
 #include "gsnav/detail/frame/projection_camera.hpp"
 #include "gsnav/detail/frame/splat.hpp"
+#include "gsnav/detail/image/pinhole.hpp"
 #include "gsnav/math/functions.hpp"
 #include "gsnav/math/mat.hpp"
 #include "gsnav/math/quat.hpp"
@@ -32,9 +33,7 @@ struct SplatAxes {
 template <class L>
 GSNAV_HD SplatAxes<L> splat_axes(const Mat3<scalar_of<L>>& rotation, const Vec3<L>& delta,
                                  const Quat<L>& quat, const Vec3<L>& scales) noexcept {
-  const Mat3<L> r{{{L(rotation(0, 0)), L(rotation(0, 1)), L(rotation(0, 2))},
-                   {L(rotation(1, 0)), L(rotation(1, 1)), L(rotation(1, 2))},
-                   {L(rotation(2, 0)), L(rotation(2, 1)), L(rotation(2, 2))}}};
+  const Mat3<L> r = mat_cast<L>(rotation);
   const Mat3<L> axes = r * rotation_matrix(quat);
   const Vec3<L> areas{scales.y * scales.z, scales.z * scales.x, scales.x * scales.y};
   SplatAxes<L> out;
@@ -52,9 +51,7 @@ GSNAV_HD SplatAxes<L> splat_axes(const Mat3<scalar_of<L>>& rotation, const Vec3<
 template <class L>
 GSNAV_HD SplatAxes<L> splat_axes(const Mat3<scalar_of<L>>& rotation, const Vec3<L>& delta,
                                  const Mat3<L>& factor) noexcept {
-  const Mat3<L> r{{{L(rotation(0, 0)), L(rotation(0, 1)), L(rotation(0, 2))},
-                   {L(rotation(1, 0)), L(rotation(1, 1)), L(rotation(1, 2))},
-                   {L(rotation(2, 0)), L(rotation(2, 1)), L(rotation(2, 2))}}};
+  const Mat3<L> r = mat_cast<L>(rotation);
   SplatAxes<L> out;
   out.position = r * delta;
   out.factor = r * factor;
@@ -173,10 +170,10 @@ GSNAV_HD Projected<L> project(const ProjectionCamera<scalar_of<L>>& camera, cons
   const Vec3<L>& t = axes.position;
   const Mat3<L>& m = axes.factor;
 
-  const L inv_z = L(S(1)) / t.z;
-  const L u = t.x * inv_z, v = t.y * inv_z;
-  out.mean_x = fma(L(camera.fx), u, L(camera.cx));
-  out.mean_y = fma(L(camera.fy), v, L(camera.cy));
+  const PinholePoint<L> at(camera, t);
+  const L &inv_z = at.inv_z, &u = at.u, &v = at.v;
+  out.mean_x = at.x;
+  out.mean_y = at.y;
 
   const bool ewa = camera.response == Response::ewa;
   const L uj = ewa ? clamp(u, L(camera.u_min), L(camera.u_max)) : u;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "gsnav/detail/image/pinhole.hpp"
 #include "gsnav/frame/gaussians.hpp"
 #include "gsnav/frame/rules.hpp"
 #include "gsnav/image/camera.hpp"
@@ -51,6 +52,23 @@ struct ProjectionRules {
   int key_bits = 32;
 };
 
+/// One axis of the image, as bounds of footprints need it.
+struct ImageAxis {
+  Vec3d direction;       ///< in the asset frame
+  double f, c;           ///< focal length and principal point, pixels
+  double limit, extent;  ///< largest |u| (|v|) in the Jacobian; size of the image, pixels
+
+  /// |(1, u)| for the largest u of the Jacobian.
+  GSNAV_HD double slant() const noexcept { return sqrt(1 + limit * limit); }
+  /// Its first (left, upper) and last sides, moved outwards by `margin` pixels.
+  GSNAV_HD ImageSide<double> first_side(double margin) const noexcept {
+    return ImageSide<double>::lower(f, c, margin);
+  }
+  GSNAV_HD ImageSide<double> last_side(double margin) const noexcept {
+    return ImageSide<double>::upper(f, c, extent, margin);
+  }
+};
+
 /// A camera in the frame of one set, so that Gaussians need not be transformed to the world. With
 /// x_world = s R x + t, camera coordinates are s (W R)(x - c), where c is the camera's position in the
 /// asset's frame.
@@ -73,6 +91,13 @@ struct ProjectionCamera {
   Response response = Response::ewa;
   Compat compat = Compat::none;
   KeyCode key_code{};
+
+  /// Columns (0) or rows (1) of the image.
+  GSNAV_HD ImageAxis image_axis(int k) const noexcept {
+    if (k == 0)
+      return {rotation.row[0], fx, cx, max(abs(u_min), abs(u_max)), static_cast<double>(width)};
+    return {rotation.row[1], fy, cy, max(abs(v_min), abs(v_max)), static_cast<double>(height)};
+  }
 };
 
 /// Makes the ProjectionCamera of a set. Host code; computed in double and rounded once.

@@ -186,10 +186,9 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
     prefetch_colors(gs.color, gs.size(), gs.color.degree_of(pack.first, args.sh_degree), pack.first);
   }
 
-  doubles_of<F> mean_x, mean_y;
-  gsnav::detail::project_mean(args.camera64, pack.key.delta64, mean_x, mean_y);
+  const auto mean = gsnav::detail::project_mean(args.camera64, pack.key.delta64);
   const SplatGeometry<F> g =
-      splat_geometry(p, reference_of<F>(camera.width, camera.height, mean_x, mean_y));
+      splat_geometry(p, reference_of<F>(camera.width, camera.height, mean.x, mean.y));
 
   // Transpose the records from lanes to consecutive memory.
   alignas(64) float geometry[kWidth * 8], bounds[kWidth * 8], depths[2][kWidth * 8];

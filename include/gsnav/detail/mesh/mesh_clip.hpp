@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "gsnav/detail/image/pinhole.hpp"
 #include "gsnav/image/camera.hpp"
 #include "gsnav/math/functions.hpp"
 #include "gsnav/math/vec.hpp"
@@ -49,20 +50,18 @@ struct MeshCamera {
             0.5 * c.width, 0.5 * c.height, c.near_plane,         c.width,
             c.height};
   }
+  /// Signed distance to side k (left, right, top, bottom) of the pixels that are at most half_x, half_y
+  /// from the image's centre. Positive inside.
+  GSNAV_HD double distance_to_side(int k, double half_x, double half_y, const Vec3d& p) const noexcept {
+    const bool across = k < 2;
+    const double f = across ? fx : fy, c = across ? cx : cy, half = across ? half_x : half_y;
+    const auto side =
+        k % 2 == 0 ? ImageSide<double>::lower(f, c, half) : ImageSide<double>::upper(f, c, 0, half);
+    return fma(side.across, across ? p.x : p.y, side.ahead * p.z);
+  }
   /// Signed distance to clip plane k (the first five outcodes), positive inside.
   GSNAV_HD double distance(int k, const Vec3d& p) const noexcept {
-    switch (k) {
-      case 0:
-        return p.z - near_plane;
-      case 1:
-        return fma(fx, p.x, (kMeshGuard + cx) * p.z);
-      case 2:
-        return fma(-fx, p.x, (kMeshGuard - cx) * p.z);
-      case 3:
-        return fma(fy, p.y, (kMeshGuard + cy) * p.z);
-      default:
-        return fma(-fy, p.y, (kMeshGuard - cy) * p.z);
-    }
+    return k == 0 ? p.z - near_plane : distance_to_side(k - 1, kMeshGuard, kMeshGuard, p);
   }
   GSNAV_HD std::uint32_t outcode(const Vec3d& p) const noexcept {
     if (!is_finite(p.x) || !is_finite(p.y) || !is_finite(p.z)) return kMeshNotFinite;
@@ -72,10 +71,9 @@ struct MeshCamera {
     }
     // These tests are linear in p. A triangle with all corners beyond one side is therefore beyond it,
     // even if it reaches behind the camera.
-    if (fma(fx, p.x, (half_width + cx) * p.z) < 0) code |= kMeshLeft;
-    if (fma(-fx, p.x, (half_width - cx) * p.z) < 0) code |= kMeshRight;
-    if (fma(fy, p.y, (half_height + cy) * p.z) < 0) code |= kMeshTop;
-    if (fma(-fy, p.y, (half_height - cy) * p.z) < 0) code |= kMeshBottom;
+    for (int k = 0; k < 4; ++k) {
+      if (distance_to_side(k, half_width, half_height, p) < 0) code |= kMeshLeft << k;
+    }
     return code;
   }
 };
@@ -94,9 +92,8 @@ GSNAV_HD std::int32_t snap_to_lattice(double pixels) noexcept {
 
 /// Projects a point that lies inside all clip planes.
 GSNAV_HD MeshPoint project_to_lattice(const MeshCamera& c, const Vec3d& p) noexcept {
-  const double inverse = 1.0 / p.z;
-  return {snap_to_lattice(fma(c.fx, p.x * inverse, c.cx)),
-          snap_to_lattice(fma(c.fy, p.y * inverse, c.cy))};
+  const PinholePoint<double> at(c, p);
+  return {snap_to_lattice(at.x), snap_to_lattice(at.y)};
 }
 
 /// Clips a triangle to the planes in `codes` (Sutherland-Hodgman). Returns the number of corners. The
