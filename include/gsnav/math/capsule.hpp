@@ -19,7 +19,8 @@ struct Capsule {
 
 /// Extends a box to contain a capsule.
 inline void add_capsule(Aabb<double>& box, const Capsule<double>& c) noexcept {
-  for (const Vec3<double>& p : {c.p0, c.p1}) {
+  const Vec3<double> ends[2] = {c.p0, c.p1};
+  for (const Vec3<double>& p : ends) {
     box.add(p - Vec3<double>{c.radius, c.radius, c.radius});
     box.add(p + Vec3<double>{c.radius, c.radius, c.radius});
   }
