@@ -68,12 +68,11 @@ TEST_CASE("a side of the image is where its function changes its sign") {
   for (int i = 0; i < 20000; ++i) {
     const double z = rng.uniform(0.1, 5.0), pixel = rng.uniform(-400, 800), margin = rng.uniform(0, 50);
     const double x = (pixel - lens.cx) / lens.fx * z;
-    const auto lower = ImageSide<double>::lower(lens.fx, lens.cx, margin),
-               upper = ImageSide<double>::upper(lens.fx, lens.cx, 320, margin);
-    CHECK((lower.across * x + lower.ahead * z) / z == doctest::Approx(pixel + margin).epsilon(1e-9));
-    CHECK((upper.across * x + upper.ahead * z) / z ==
-          doctest::Approx(320 + margin - pixel).epsilon(1e-9));
-    inside += lower.across * x + lower.ahead * z >= 0 && upper.across * x + upper.ahead * z >= 0 ? 1 : 0;
+    const auto first = ImageSide<double>::first(lens.fx, lens.cx, margin),
+               last = ImageSide<double>::last(lens.fx, lens.cx, 320, margin);
+    CHECK((first.across * x + first.ahead * z) / z == doctest::Approx(pixel + margin).epsilon(1e-9));
+    CHECK((last.across * x + last.ahead * z) / z == doctest::Approx(320 + margin - pixel).epsilon(1e-9));
+    inside += first.across * x + first.ahead * z >= 0 && last.across * x + last.ahead * z >= 0 ? 1 : 0;
   }
   CHECK(inside > 5000);
   CHECK(inside < 15000);

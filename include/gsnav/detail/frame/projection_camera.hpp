@@ -60,12 +60,12 @@ struct ImageAxis {
 
   /// |(1, u)| for the largest u of the Jacobian.
   GSNAV_HD double slant() const noexcept { return sqrt(1 + limit * limit); }
-  /// Its first (left, upper) and last sides, moved outwards by `margin` pixels.
+  /// Its first (left or top) and last sides, moved outwards by `margin` pixels.
   GSNAV_HD ImageSide<double> first_side(double margin) const noexcept {
-    return ImageSide<double>::lower(f, c, margin);
+    return ImageSide<double>::first(f, c, margin);
   }
   GSNAV_HD ImageSide<double> last_side(double margin) const noexcept {
-    return ImageSide<double>::upper(f, c, extent, margin);
+    return ImageSide<double>::last(f, c, extent, margin);
   }
 };
 

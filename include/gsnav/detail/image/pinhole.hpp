@@ -33,11 +33,11 @@ template <class S>
 struct ImageSide {
   S across, ahead;
 
-  /// Left or upper side, moved outwards by `margin` pixels. f and c are the focal length and the
-  /// principal point of the image axis.
-  GSNAV_HD static ImageSide lower(S f, S c, S margin) noexcept { return {f, c + margin}; }
-  /// Right or lower side of an image of `extent` pixels.
-  GSNAV_HD static ImageSide upper(S f, S c, S extent, S margin) noexcept {
+  /// Side of the first pixel (left or top), moved outwards by `margin` pixels. f and c are the focal
+  /// length and the principal point of the image axis, in pixels.
+  GSNAV_HD static ImageSide first(S f, S c, S margin) noexcept { return {f, c + margin}; }
+  /// Side of the last pixel (right or bottom) of an image of `extent` pixels.
+  GSNAV_HD static ImageSide last(S f, S c, S extent, S margin) noexcept {
     return {-f, extent - c + margin};
   }
 };

@@ -56,7 +56,7 @@ struct MeshCamera {
     const bool across = k < 2;
     const double f = across ? fx : fy, c = across ? cx : cy, half = across ? half_x : half_y;
     const auto side =
-        k % 2 == 0 ? ImageSide<double>::lower(f, c, half) : ImageSide<double>::upper(f, c, 0, half);
+        k % 2 == 0 ? ImageSide<double>::first(f, c, half) : ImageSide<double>::last(f, c, 0, half);
     return fma(side.across, across ? p.x : p.y, side.ahead * p.z);
   }
   /// Signed distance to clip plane k (the first five outcodes), positive inside.
