@@ -7,7 +7,7 @@ namespace gsnav {
 
 /// SH basis function of degree 0: 1 / (2 sqrt(pi)).
 inline constexpr double kSh0 = 0.28209479177387814;
-/// Colour, in [0, 1] if it can be shown, of a coefficient of degree 0, without other bands.
+/// Colour of a Gaussian whose only SH coefficient is that of degree 0. It is not limited to [0, 1].
 GSNAV_HD constexpr double color_of_sh0(double coefficient) noexcept { return 0.5 + kSh0 * coefficient; }
 /// Coefficient of degree 0 that gives a colour.
 GSNAV_HD constexpr double sh0_of_color(double color) noexcept { return (color - 0.5) / kSh0; }

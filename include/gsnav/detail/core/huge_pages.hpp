@@ -11,9 +11,9 @@
 
 namespace gsnav {
 
-/// Size of a huge page, 2 MiB.
+/// Bytes of a huge page: 2 MiB.
 inline constexpr std::size_t kHugePage = std::size_t{2} << 20;
-/// Size of a page, at least.
+/// Bytes of the smallest page of any system.
 inline constexpr std::size_t kPage = 4096;
 
 #if defined(__linux__)

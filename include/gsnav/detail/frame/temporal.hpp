@@ -26,7 +26,7 @@ struct MotionRows {
 };
 static_assert(sizeof(void*) != 8 || sizeof(MotionRows) <= 256);
 
-/// The same with all arrays of the Gaussians, each at its own time.
+/// Gaussians that move and fade. In `base`, each has the mean and opacity of its own time.
 struct TemporalView : MotionRows {
   GaussianRows base;
 };
