@@ -2,11 +2,12 @@
 #pragma once
 
 #include <limits>
+#include <numbers>
 
 namespace gsnav::detail {
 
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
-inline constexpr double kPi = 3.14159265358979323846;
+inline constexpr double kPi = std::numbers::pi;
 /// Tolerance for rounding, in metres, m², radians or relative. What only touches counts.
 inline constexpr double kRounding = 1e-9;
 /// Points closer than this are equal, metres.
