@@ -23,6 +23,14 @@ class _Request:
         self.error: BaseException | None = None
 
 
+class _Round:
+    """Functions of participants, and their errors. A round that is asked for twice runs once."""
+
+    def __init__(self, works: list[tuple[Any, Callable[[], None]]]) -> None:
+        self.works, self.done = works, threading.Event()
+        self.errors: list[BaseException] = []
+
+
 class Turns:
     """Participants whose drawings run on at most `drawers` threads, each on `share` threads of the CPU.
 
@@ -53,17 +61,16 @@ class Turns:
 
         Raises the first error of a function. After Ctrl-C it waits for the functions, too.
         """
-        from queue import SimpleQueue
-
-        done: SimpleQueue[BaseException | None] = SimpleQueue()
-        self._rounds.put((list(works), done))
+        asked = _Round(list(works))
         try:
-            error = done.get()
-        except BaseException:
-            done.get()
+            self._rounds.put(asked)
+            asked.done.wait()
+        except BaseException:  # It may come before the round is asked for, or after its end.
+            self._rounds.put(asked)
+            asked.done.wait()
             raise
-        if error is not None:
-            raise error
+        if asked.errors:
+            raise asked.errors[0]
 
     def close(self) -> None:
         """Ends the threads. Nothing may run."""
@@ -79,34 +86,34 @@ class Turns:
         self._begin_thread()
         _here.turns, self._hub = self, greenlet.getcurrent()
         while (asked := self._rounds.get()) is not None:
-            works, done = asked
-            errors: list[BaseException] = []
+            if asked.done.is_set():
+                continue
             try:
-                self._round(works, errors, greenlet.greenlet)
+                self._round(asked, greenlet.greenlet)
                 self._swap(None)
             except BaseException as error:  # At exit no drawing can begin. `run` must not wait for it.
-                errors.append(error)
-            done.put(errors[0] if errors else None)
+                asked.errors.append(error)
+            asked.done.set()
 
-    def _round(self, works: list[Any], errors: list[BaseException], new: Any) -> None:
+    def _round(self, asked: _Round, new: Any) -> None:
         def begin(work: Callable[[], None]) -> None:
             try:
                 work()
             except BaseException as error:
-                errors.append(error)
+                asked.errors.append(error)
 
         waiting: dict[Any, list[_Request]] = {}
         drawing = 0
         ready: collections.deque[tuple[Any, Any, Callable[[Any], Any]]] = collections.deque(
-            (new(begin), who, lambda g, work=work: g.switch(work)) for who, work in works
+            (new(begin), who, lambda g, work=work: g.switch(work)) for who, work in asked.works
         )
         while ready or drawing:
             while ready:
                 greenlet, who, resume = ready.popleft()
                 self._swap(who)
-                asked = resume(greenlet)
+                wish = resume(greenlet)
                 if not greenlet.dead:
-                    key, request = asked
+                    key, request = wish
                     request.greenlet, request.who = greenlet, who
                     waiting.setdefault(key, []).append(request)
                 # When no other participant can ask, groups need not wait for more.

@@ -103,6 +103,24 @@ def test_ctrl_c_waits_for_the_participants():
     assert ended == [0, 1]
 
 
+def test_ctrl_c_at_the_end_of_a_round():
+    """It may interrupt the waiting thread before or after that has seen the end. None waits for an end twice."""
+    turns, ended = _turns.Turns(drawers=1, share=1), []
+
+    def work(i):
+        ended.append(i)
+        signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+
+    usual = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        for i in range(1000):
+            with pytest.raises(KeyboardInterrupt):
+                play(turns, work, 1)
+            assert len(ended) == i + 1
+    finally:
+        signal.signal(signal.SIGINT, usual)
+
+
 def test_closing_ends_the_threads():
     before = threading.active_count()
     turns = _turns.Turns(drawers=3, share=1)
