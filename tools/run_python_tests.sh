@@ -25,9 +25,9 @@ fi
 python=${PYTHON:-python3}
 # As CMake names the compiler by itself. ccache keeps objects by this name.
 export CC=${CC:-cc} CXX=${CXX:-c++}
-venv=$root/build/venv build=$root/build/python flags=${GSNAV_FLAGS:--O3 -DNDEBUG} stubs=ON run=()
+venv=$root/build/venv build=$root/build/python flags=${GSNAV_FLAGS:--O3 -DNDEBUG} stubs=ON timeout=600 run=()
 if [[ ${GSNAV_ASAN:-0} == 1 ]]; then
-  venv+=-asan build+=-asan flags="-O1 -g1 -fno-omit-frame-pointer -fsanitize=address" stubs=OFF
+  venv+=-asan build+=-asan flags="-O1 -g1 -fno-omit-frame-pointer -fsanitize=address" stubs=OFF timeout=0
   # Python is not built for the sanitizer, so its library must be loaded first. Python leaks at exit.
   run=(env LD_PRELOAD="$(g++ -print-file-name=libasan.so) $(g++ -print-file-name=libstdc++.so)"
        ASAN_OPTIONS=detect_leaks=0:allocator_may_return_null=1 PYTHONMALLOC=malloc)
@@ -59,7 +59,7 @@ fi
 echo "Installing what the build and the tests need in $venv"
 "$venv/bin/pip" install --quiet --disable-pip-version-check "scikit-build-core>=0.11" "nanobind>=2.8" \
   "numpy>=1.26" "gymnasium>=1.1" "greenlet>=3" "matplotlib>=3.8" "mypy>=1.11" "numpy-quaternion" "pytest>=8" \
-  "pytest-xdist>=3.6" ${GSNAV_TEST_WITH:-}
+  "pytest-timeout>=2.3" "pytest-xdist>=3.6" ${GSNAV_TEST_WITH:-}
 echo "Building the package, $CMAKE_BUILD_PARALLEL_LEVEL files at a time"
 # The build folder is kept, so that only changed files are compiled.
 "$venv/bin/pip" install --disable-pip-version-check --no-build-isolation --no-deps --force-reinstall \
@@ -78,4 +78,6 @@ if [[ $stubs == ON ]]; then
 fi
 echo "Testing"
 workers=$((CMAKE_BUILD_PARALLEL_LEVEL < 8 ? CMAKE_BUILD_PARALLEL_LEVEL : 8))
-exec "${run[@]}" "$venv/bin/python" -m pytest -n "$workers" --dist loadfile "$@"
+# A test that hangs ends its process, after it has said where.
+exec "${run[@]}" "$venv/bin/python" -m pytest -n "$workers" --dist loadfile \
+  --timeout="$timeout" --timeout-method=thread "$@"
