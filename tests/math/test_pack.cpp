@@ -12,6 +12,7 @@
 #include "gsnav/detail/math/pack_columns.hpp"
 #include "gsnav/detail/math/pack_double.hpp"
 #include "gsnav/detail/math/pack_layout.hpp"
+#include "gsnav/detail/math/pack_words.hpp"
 #include "gsnav/detail/math/packs.hpp"
 #include "gsnav/math/quat.hpp"
 
@@ -113,6 +114,49 @@ void check_columns(Rng& rng) {
   store_columns<K>(columns, written.data());
   REQUIRE(written == matrix);
 }
+
+#if defined(GSNAV_WORDS)
+/// Columns of words, against its elements; and every finite half and every word as a float.
+template <int N>
+void check_words(Rng& rng) {
+  std::uint16_t matrix[N][8];
+  std::int8_t bytes[N][8];
+  for (int row = 0; row < N; ++row) {
+    for (int k = 0; k < 8; ++k) {
+      matrix[row][k] = static_cast<std::uint16_t>(rng.uniform() * 65536.0);
+      bytes[row][k] = static_cast<std::int8_t>(matrix[row][k] >> 8);
+    }
+  }
+  Words<N> eight[8], three[8], codes[8];
+  load_words<N>([&](int row) { return words_of<8>(matrix[row]); }, eight);
+  load_words<N>([&](int row) { return words_of<3>(matrix[row]); }, three);
+  load_words<N>([&](int row) { return words_of_bytes(bytes[row]); }, codes);
+  for (int k = 0; k < 8; ++k) {
+    const Pack<float, N> values = floats_of_integers(codes[k]);
+    for (int row = 0; row < N; ++row) {
+      const std::uint16_t of_eight = eight[k][row], of_three = three[k][row];
+      REQUIRE(of_eight == matrix[row][k]);
+      if (k < 3) REQUIRE(of_three == matrix[row][k]);
+      REQUIRE(values[row] == static_cast<float>(bytes[row][k]));
+    }
+  }
+  for (unsigned first = 0; first < 0x10000u; first += N) {
+    Words<N> words;
+    for (unsigned i = 0; i < N; ++i) words[i] = static_cast<std::uint16_t>(first + i);
+    const Pack<float, N> halves = floats_of_halves(words), integers = floats_of_integers(words);
+    for (int i = 0; i < N; ++i) {
+      const std::uint16_t word = words[i];
+      REQUIRE(integers[i] == static_cast<float>(static_cast<std::int16_t>(word)));
+      const int exponent = word >> 10 & 31, fraction = word & 1023;
+      if (exponent == 31) continue;  // no finite half
+      const double magnitude =
+          exponent == 0 ? std::ldexp(fraction, -24) : std::ldexp(1024 + fraction, exponent - 25);
+      const auto half = static_cast<float>(std::copysign(magnitude, word >> 15 != 0 ? -1.0 : 1.0));
+      REQUIRE(bits_of(halves[i]) == bits_of(half));
+    }
+  }
+}
+#endif
 
 /// Chosen lanes, against a loop over the bits that choose them.
 template <int N>
@@ -254,6 +298,12 @@ TEST_CASE("columns and chosen lanes of packs are those of the matrix") {
   check_columns<3, 4>(rng), check_columns<4, 4>(rng), check_columns<8, 4>(rng);
   check_columns<3, 8>(rng), check_columns<4, 8>(rng), check_columns<8, 8>(rng);
   check_columns<3, 16>(rng), check_columns<4, 16>(rng), check_columns<8, 16>(rng);
+#if defined(GSNAV_WORDS)
+  check_words<8>(rng);
+#if defined(__AVX512F__)
+  check_words<16>(rng);
+#endif
+#endif
   check_chosen_lanes<4>(rng), check_chosen_lanes<8>(rng), check_chosen_lanes<16>(rng);
 }
 

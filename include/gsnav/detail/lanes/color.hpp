@@ -8,6 +8,7 @@
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/frame/set_rows.hpp"
 #include "gsnav/detail/lanes/isa.hpp"
+#include "gsnav/detail/math/pack_words.hpp"
 
 namespace gsnav::lanes {
 inline namespace GSNAV_LANES_TAG {
@@ -19,11 +20,71 @@ struct Survivors {
   std::uint32_t delta[3][kRoom];  ///< bit patterns of floats
 };
 
+/// Number of values of the bands above degree 0 that are read together.
+inline constexpr int kBandGroup = 8;
+
+/// Reads K halves of each of kWidth rows of `stride` values, one row per lane.
+template <int K>
+GSNAV_HD void load_halves(const std::uint16_t* first, std::size_t stride, const std::uint32_t* rows,
+                          F* columns) noexcept {
+#if defined(GSNAV_WORDS)
+  const auto row = [=](int l) GSNAV_INLINED { return words_of<K>(first + stride * rows[l]); };
+  Words<kWidth> words[8];
+  load_words<kWidth>(row, words);
+  for (int k = 0; k < K; ++k) columns[k] = floats_of_halves(words[k]);
+#else
+  float values[K * kWidth];
+  for (int l = 0; l < kWidth; ++l) {
+    for (int k = 0; k < K; ++k)
+      values[K * l + k] = sh_value(first[stride * rows[l] + static_cast<std::size_t>(k)]);
+  }
+  load_columns<K>(values, columns);
+#endif
+}
+
+/// Reads kBandGroup codes of each of kWidth rows of `stride` values, in units of `steps`, one row per
+/// lane.
+GSNAV_HD void load_codes(const std::int8_t* first, std::size_t stride, const std::uint32_t* rows,
+                         const float* steps, F* columns) noexcept {
+#if defined(GSNAV_WORDS)
+  const auto row = [=](int l) GSNAV_INLINED { return words_of_bytes(first + stride * rows[l]); };
+  Words<kWidth> words[8];
+  load_words<kWidth>(row, words);
+  for (int k = 0; k < kBandGroup; ++k) columns[k] = floats_of_integers(words[k]) * F(steps[k]);
+#else
+  float values[kBandGroup * kWidth];
+  for (int l = 0; l < kWidth; ++l) {
+    for (int k = 0; k < kBandGroup; ++k)
+      values[kBandGroup * l + k] =
+          sh_value(first[stride * rows[l] + static_cast<std::size_t>(k)], steps[k]);
+  }
+  load_columns<kBandGroup>(values, columns);
+#endif
+}
+
+/// Reads values [from, from + kBandGroup) of the bands of kWidth rows of one chunk, one row per lane.
+GSNAV_HD void load_bands(const ColorRows& sh, BandEncoding encoding, const std::uint32_t* rows,
+                         std::size_t from, F* columns) noexcept {
+  const std::size_t stride = sh.rest();
+  if (encoding == BandEncoding::codes) {
+    float steps[kBandGroup];
+    const PackedChunk& chunk = sh.chunks[rows[0] / kProjectChunk];
+    for (int k = 0; k < kBandGroup; ++k)
+      steps[k] = chunk.sh_steps[packed_band(1 + (static_cast<int>(from) + k) / 3)];
+    load_codes(sh.shN_codes.data + from, stride, rows, steps, columns);
+  } else if (encoding == BandEncoding::halves) {
+    load_halves<kBandGroup>(sh.shN_half.data + from, stride, rows, columns);
+  } else {
+    const float* at[kWidth];
+    for (int l = 0; l < kWidth; ++l) at[l] = sh.shN.data + stride * rows[l] + from;
+    load_columns<kBandGroup>(at, columns);
+  }
+}
+
 /// Colours of kWidth Gaussians of one chunk, with the bits of gaussian_color. Lane l is row rows[l].
-/// Coefficients are stored by rows; groups of 8 columns are transposed into lanes as they are loaded.
+/// Coefficients are stored by rows; groups of columns are transposed into lanes as they are loaded.
 GSNAV_HD SplatColor<F> gaussian_colors(const ColorRows& sh, int degree, const std::uint32_t* rows,
                                        Vec3<F> delta) noexcept {
-  constexpr int kGroup = 8;
   if (degree > 0) {
     delta = view_direction(delta);
     if (!sh.rotations.empty()) {
@@ -36,45 +97,22 @@ GSNAV_HD SplatColor<F> gaussian_colors(const ColorRows& sh, int degree, const st
   }
   // Plain vectors, because packs would be initialised first.
   typename F::vector c[3 * sh_coefficient_count(kMaxShDegree)];
-  const float* at[kWidth];
-  float widened[kWidth][kGroup];
-  const bool packed = sh.packed();
-  for (int l = 0; l < kWidth; ++l) {
-    const std::size_t row = rows[l];
-    if (packed) {
-      for (std::size_t k = 0; k < 3; ++k) widened[l][k] = sh_value(sh.sh0_half[3 * row + k]);
-    }
-    at[l] = packed ? widened[l] : sh.sh0.data + 3 * row;
-  }
   F dc[3];
-  load_columns<3>(at, dc);
+  if (sh.packed()) {
+    load_halves<3>(sh.sh0_half.data, 3, rows, dc);
+  } else {
+    const float* at[kWidth];
+    for (int l = 0; l < kWidth; ++l) at[l] = sh.sh0.data + 3 * std::size_t{rows[l]};
+    load_columns<3>(at, dc);
+  }
   for (int k = 0; k < 3; ++k) c[k] = dc[k].v;
-  const std::size_t stride = sh.rest();
   const int columns = 3 * (sh_coefficient_count(degree) - 1);  // 0, 9, 24 or 45
   const BandEncoding encoding = sh.band_encoding();
-  for (int first = 0; first < columns; first += kGroup) {
-    const int from = first + kGroup <= columns ? first : columns - kGroup;
-    if (encoding == BandEncoding::codes) {  // all rows belong to the same chunk
-      float steps[kGroup];
-      const PackedChunk& chunk = sh.chunks[rows[0] / kProjectChunk];
-      for (int k = 0; k < kGroup; ++k) steps[k] = chunk.sh_steps[packed_band(1 + (from + k) / 3)];
-      for (int l = 0; l < kWidth; ++l) {
-        const std::int8_t* codes = sh.shN_codes.data + stride * rows[l] + from;
-        for (int k = 0; k < kGroup; ++k) widened[l][k] = sh_value(codes[k], steps[k]);
-        at[l] = widened[l];
-      }
-    } else if (encoding == BandEncoding::floats) {
-      for (int l = 0; l < kWidth; ++l) at[l] = sh.shN.data + stride * rows[l] + from;
-    } else {
-      for (int l = 0; l < kWidth; ++l) {
-        const std::uint16_t* halves = sh.shN_half.data + stride * rows[l] + from;
-        for (int k = 0; k < kGroup; ++k) widened[l][k] = sh_value(halves[k]);
-        at[l] = widened[l];
-      }
-    }
-    F group[kGroup];
-    load_columns<kGroup>(at, group);
-    for (int k = 0; k < kGroup; ++k) c[3 + from + k] = group[k].v;
+  for (int first = 0; first < columns; first += kBandGroup) {
+    const int from = first + kBandGroup <= columns ? first : columns - kBandGroup;
+    F group[kBandGroup];
+    load_bands(sh, encoding, rows, static_cast<std::size_t>(from), group);
+    for (int k = 0; k < kBandGroup; ++k) c[3 + from + k] = group[k].v;
   }
   const Vec3<F> color = sh_color<F>(degree, delta, [&c](int k) noexcept {
     return Vec3<F>{F(c[3 * k]), F(c[3 * k + 1]), F(c[3 * k + 2])};
