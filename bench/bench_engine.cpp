@@ -7,7 +7,8 @@
 //
 // Prints `views N`. For each line `OUTPUT/PROFILE VIEW` on its standard input it draws a view, or all
 // views in one call if VIEW is -1. Then it prints `ms TIME HASH`: the time by frame, and a hash of the
-// images. OUTPUT is rgb, depth or rgbd. PROFILE is exact, fast, seen (fast with visible sets) or lod.
+// images. OUTPUT is rgb, depth or rgbd. PROFILE is exact, fast, seen (fast with visible sets), compact
+// or packed (fast with such storage), or lod.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -20,6 +21,7 @@
 
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/scene/lod_cut.hpp"
+#include "gsnav/scene/packed_cloud.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 #include "visible_workload.hpp"
 #include "workload.hpp"
@@ -63,6 +65,8 @@ struct Engine {
   std::optional<LodTree> tree;
   std::optional<LodCut> cut;
   std::optional<VisibleSets> visible;
+  std::optional<GaussianCloud> compact;
+  std::optional<PackedCloud> packed;
 
   Engine(int width, int height, int threads)
       : backend(threads), renderer(backend), cameras(gsnav_bench::sized(width, height)) {}
@@ -73,7 +77,9 @@ struct Engine {
                      : output == "rgbd" ? kRgb | kAlpha | kMedianDepth
                                         : kRgb;
     set_profile(config, profile == "exact");
-    GaussianSet whole = workload().cloud.set();
+    GaussianSet whole = profile == "compact"  ? compact->set()
+                        : profile == "packed" ? packed->set()
+                                              : workload().cloud.set();
     std::span<const GaussianSet> sets(&whole, 1);
     if (profile == "seen") {
       if (const auto cell = visible->cell_of(views[0])) set_seen(whole, visible->seen_from(*cell));
@@ -89,6 +95,8 @@ struct Engine {
 
   void prepare(const std::string& profile) {
     if (profile == "seen" && !visible) visible = gsnav_bench::workload_visible_sets();
+    if (profile == "compact" && !compact) compact_sh(compact.emplace(workload().cloud));
+    if (profile == "packed" && !packed) packed = pack_cloud(workload().cloud);
     if (profile == "lod" && !cut) {
       tree = build_lod(backend, workload().cloud).value();
       cut.emplace(*tree, workload().cloud);
