@@ -81,7 +81,8 @@ GSNAV_HD Words<8> words_of(const std::uint16_t* p) noexcept {
     return words;
   } else {
     static_assert(K == 3);
-    std::uint32_t two;  // A copy of 6 bytes goes through the stack, where the load waits for both stores.
+    // A copy of 6 bytes would go through the stack, where the load waits for two stores.
+    std::uint32_t two;
     std::memcpy(&two, p, sizeof two);
     return reinterpret_cast<Words<8>>(
         _mm_cvtsi64_si128(static_cast<long long>(std::uint64_t{p[2]} << 32 | two)));
