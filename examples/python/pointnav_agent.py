@@ -15,8 +15,8 @@ import numpy as np
 import torch
 import torch.distributed as dist
 from pointnav_curves import plot
-from pointnav_policy import ACTIONS, read_checkpoint
-from pointnav_worlds import LEFT, RIGHT, device_of
+from pointnav_policy import ACTIONS, load, read_checkpoint
+from pointnav_worlds import CHANNELS, LEFT, RIGHT, device_of
 from torch import Tensor, nn
 
 import gsnav
@@ -197,6 +197,18 @@ def checkpoint_of(path: pathlib.Path, args: argparse.Namespace, option: str, age
     except RuntimeError as e:
         sys.exit(f"{path}: weights of another network: {' '.join(str(e).split())[:300]}")
     return kept
+
+
+def begin_with(path: pathlib.Path, args: argparse.Namespace, agent: Agent) -> None:
+    """Gives a new agent the weights of a checkpoint, or of a file .npz, which has none of the value."""
+    if path.suffix != ".npz":
+        checkpoint_of(path, args, "--begin-with", agent)
+        return
+    policy = load(path)
+    sensor = next((f"--sensor {name}" for name, c in CHANNELS.items() if c == policy.channels), "--blind")
+    if (policy.size, policy.channels) != (args.size, agent.shape[0]):
+        sys.exit(f"--begin-with {path}: an agent of --size {policy.size} {sensor}. Use these, or another file.")
+    agent.load_state_dict(agent.state_dict() | {name: torch.from_numpy(w) for name, w in policy.weights.items()})
 
 
 def progress(log: list[dict[str, float]], updates: int, rate: float) -> None:

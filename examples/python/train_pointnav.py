@@ -25,8 +25,8 @@ except ImportError:
     sys.exit("train_pointnav.py needs PyTorch: pip install torch")
 import numpy as np
 import torch.distributed as dist
-from pointnav_agent import (Agent, Mirror, Reorder, Rows, agreed, checkpoint_of, clear, devices_of, hash_of, made_by,
-                            pieces, progress, set_determinism, write_log)
+from pointnav_agent import (Agent, Mirror, Reorder, Rows, agreed, begin_with, checkpoint_of, clear, devices_of,
+                            hash_of, made_by, pieces, progress, set_determinism, write_log)
 from pointnav_policy import ACTIONS
 from pointnav_worlds import (CHANNELS, METRICS, TRAIN_SEEDS, Draw, Worlds, goals, mixed, number, run_program,
                              sensor_arguments, sensors_of, world_arguments)
@@ -284,7 +284,7 @@ def resume(learner: Learner, out: pathlib.Path) -> list[dict[str, float]]:
     path = out / "checkpoint.pt"
     if not path.exists():
         if learner.args.begin_with is not None:
-            checkpoint_of(learner.args.begin_with, learner.args, "--begin-with", learner.agent)
+            begin_with(learner.args.begin_with, learner.args, learner.agent)
         return []
     kept = checkpoint_of(path, learner.args, "folder for --out", learner.agent, KEPT)
     now, then = made_by(learner.device), kept.get("made_by")
@@ -351,7 +351,7 @@ def arguments() -> argparse.Namespace:
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("--out", type=pathlib.Path, default="pointnav", help="folder of checkpoint, log and curves")
     p.add_argument("--steps", type=number(float, 0, 1e15), default=1e8, help="environment steps, up to a checkpoint")
-    p.add_argument("--begin-with", type=pathlib.Path, help="checkpoint whose weights a new run begins with")
+    p.add_argument("--begin-with", type=pathlib.Path, help="take the weights of a checkpoint.pt or FILE.npz")
     p.add_argument("--minutes", type=number(float, 0), default=math.inf, help="end at the first checkpoint after that")
     p.add_argument("--seed", type=number(int, 0, 2**32 - 1), default=1, help="seed of weights, episodes and actions")
     p.add_argument("--flats", type=int, default=64, choices=range(1, 65), metavar="1..64", help="flats to train in")
@@ -376,7 +376,7 @@ def arguments() -> argparse.Namespace:
     if a.rollout % a.chunks:
         p.error(f"--rollout {a.rollout} must be a multiple of --chunks {a.chunks}")
     if a.begin_with is not None and not a.begin_with.exists():
-        p.error(f"--begin-with {a.begin_with}: not found; name a checkpoint.pt")
+        p.error(f"--begin-with {a.begin_with}: not found; name a checkpoint.pt or a file .npz")
     return a
 
 

@@ -126,6 +126,19 @@ def test_errors_say_what_to_do(first, tmp_path):
     assert str(file) in refused(*TINY, "--out", file) and "Traceback" not in refused(*TINY, "--out", file)
     other = refused(*TINY, "--size", "80", "--out", tmp_path / "new", "--begin-with", first[0] / "checkpoint.pt")
     assert "--size 80" in other and "trained with 64" in other
+    for words in (["--size", "80"], ["--sensor", "rgb"], ["--blind"]):
+        other = refused(*TINY, *words, "--out", tmp_path / "new", "--begin-with", FOLDER / "pointnav_depth.npz")
+        assert "pointnav_depth.npz: an agent of --size 64 --sensor depth" in other
+
+
+def test_a_run_begins_with_a_file_of_weights(tmp_path):
+    path = FOLDER / "pointnav_depth.npz"
+    # The first update learns only the value.
+    trained(tmp_path, "--begin-with", path, "--critic-updates", "1", updates=1, every=1)
+    with np.load(path) as file:
+        assert set(file.files) == {"size", *(name for name in weights(tmp_path) if not name.startswith("value"))}
+        for name, value in weights(tmp_path).items():
+            assert name.startswith("value") or np.array_equal(value, file[name]), name
 
 
 @pytest.mark.parametrize("kind", ["empty", "text", "half", "other"])
@@ -135,6 +148,7 @@ def test_damaged_files_are_named(kind, first, tmp_path):
     (tmp_path / "run").mkdir()
     for path, script, option in ((tmp_path / "run" / "checkpoint.pt", "train_pointnav.py", "--out"),
                                  (tmp_path / "begin.pt", "train_pointnav.py", "--begin-with"),
+                                 (tmp_path / "begin.npz", "train_pointnav.py", "--begin-with"),
                                  (tmp_path / "agent.pt", "play_pointnav.py", "--weights"),
                                  (tmp_path / "agent.npz", "play_pointnav.py", "--weights")):
         if content is not None:
