@@ -294,16 +294,18 @@ TEST_CASE("N53_tile_max_mesh_cull of chunks, before they are projected") {
     wall.geometry.triangles.push_back({first, first + 2, first + 3});
   }
   const OneMesh mesh(wall);
+  RenderConfig config = all_outputs();
+  config.tuning.tile_size = 16;  // every renderer counts the same tiles
   for (const double f : {30.0, 64.0, 200.0}) {
     const Camera camera = axis_camera(90, f);
     CaseRenderer<float, SerialBackend> reference("serial float");
     const std::vector<Placed> scene{&rooms, &large, {&placed, place}};
     const auto all =
-        reference.render(scene, {camera}, all_outputs(), mesh.instances);  // which projects every chunk
+        reference.render(scene, {camera}, config, mesh.instances);  // which projects every chunk
     for_each_renderer([&](auto& renderer) {
       using R = std::remove_reference_t<decltype(renderer)>;
       if constexpr (R::is_float) {
-        const auto some = renderer.render(scene, {camera}, all_outputs(), mesh.instances);
+        const auto some = renderer.render(scene, {camera}, config, mesh.instances);
         CHECK(some.rgb == all.rgb);
         CHECK(some.median_depth == all.median_depth);
         CHECK(some.expected_depth == all.expected_depth);

@@ -136,6 +136,7 @@ TEST_CASE("N26_pair_count_zero") {
     });
   }
   // One pair, every power of two, and one either side: dots of one tile each, in one and in many tiles.
+  config.tuning.tile_size = 16;
   for (int k = 0; k <= 13; ++k) {
     for (const int off : {-1, 0, 1}) {
       const int count = (1 << k) + off;

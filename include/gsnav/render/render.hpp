@@ -235,16 +235,17 @@ Result<bool> draw_in_slices(B& backend, RenderWorkspace<float, B>& ws, const Cam
                             const RenderConfig& config, const FrameImages<float>& images,
                             RenderStats& stats) {
   // The upper bound already says one slice: skip planning.
-  if (depth_slices_of(config, stats.gaussians, camera) < 2) return false;
+  const std::size_t threads = concurrency_of(backend);
+  if (depth_slices_of(config, stats.gaussians, camera, threads) < 2) return false;
   DepthSlices& slices = ws.slices;
   const View<const ViewedSet<float>> sets = view_of(ws.projections);
-  slices.plan(backend, sets);
-  const int count = depth_slices_of(config, slices.candidates(), camera);
+  const TileGrid grid = grid_of<B>(config, camera);
+  slices.plan(backend, sets, grid.tile_size);
+  const int count = depth_slices_of(config, slices.candidates(), camera, threads);
   if (count < 2) return false;
   slices.split(count);
   const int last = slices.count() - 1;
 
-  const TileGrid grid = grid_of<B>(config, camera);
   const std::size_t pixels =
       static_cast<std::size_t>(grid.tile_size) * static_cast<std::size_t>(grid.tile_size);
   ws.open.resize_discard(grid.count());

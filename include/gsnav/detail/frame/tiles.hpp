@@ -66,13 +66,16 @@ struct TileGrid {
   bool operator==(const TileGrid&) const = default;
 };
 
-/// Squares of 4 x 4 pixels that still accept splats, as a summed-area table for queries of rectangles.
+/// Squares of pixels that still accept splats, as a summed-area table for queries of rectangles.
 struct OpenSquares {
-  static constexpr int kSize = 4;
+  static constexpr int kPerSide = 8;  ///< squares per side of a tile
   View<const std::uint32_t>
       sums;  ///< [rows + 1][columns + 1], number of open squares above and left. Empty: all are open.
   std::size_t stride = 0;  ///< columns + 1
+  int size = 0;            ///< pixels per side of a square
 
+  /// Pixels per side of a square: 1, 2 or 4.
+  GSNAV_HD static constexpr int size_in(int tile_size) noexcept { return tile_size / kPerSide; }
   GSNAV_HD bool empty() const noexcept { return sums.empty(); }
   /// True if some square in columns [x0, x1) and rows [y0, y1) is open.
   GSNAV_HD bool any(std::size_t x0, std::size_t y0, std::size_t x1, std::size_t y1) const noexcept {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -77,13 +78,18 @@ class TilePixels {
     });
   }
 
-  /// One bit per square (OpenSquares), set if the square has an open block.
-  std::uint64_t open_squares() const noexcept {
-    constexpr int kSquare = OpenSquares::kSize;
-    static_assert(kSquare % kBlockWidth == 0 && kSquare % kBlockHeight == 0);
+  /// One bit per square (OpenSquares), set if the square has an open pixel.
+  std::uint64_t open_squares() noexcept {
+    const int shift = std::countr_zero(static_cast<unsigned>(OpenSquares::size_in(size)));
     std::uint64_t squares = 0;
     for_each_block([&](int block, int x, int y) {
-      if (open[block]) squares |= std::uint64_t{1} << (y / kSquare * (size / kSquare) + x / kSquare);
+      if (!open[block]) return;
+      for (std::uint32_t lanes = lane_bits(states[block].open(args_.rules)); lanes != 0;
+           lanes &= lanes - 1) {
+        const int lane = std::countr_zero(lanes);
+        const int column = (x + lane % kBlockWidth) >> shift, row = (y + lane / kBlockWidth) >> shift;
+        squares |= std::uint64_t{1} << (row * OpenSquares::kPerSide + column);
+      }
     });
     return squares;
   }

@@ -29,7 +29,7 @@ namespace detail {
 /// The lanes of `lanes` whose bounds reach an open square, as bits.
 GSNAV_HD std::uint32_t reaching_open(const OpenSquares& open, const PixelBox<F>& box,
                                      std::uint32_t lanes) noexcept {
-  const F inverse(1.0f / OpenSquares::kSize), one(1.0f);
+  const F inverse(1.0f / static_cast<float>(open.size)), one(1.0f);
   float bounds[4][kWidth];
   truncated(box.x0 * inverse).store(bounds[0]);
   truncated(box.y0 * inverse).store(bounds[1]);

@@ -33,12 +33,14 @@ concept SlicingBackend = ProjectsChunks<B, S> && RunsStage<B, stage::Blend, Rast
 /// and wait for their own slices.
 class DepthSlices {
  public:
-  static constexpr int kMost = 8;
+  static constexpr int kMost = 16;
 
   /// Finds the depth and the image region of each chunk.
   /// @param sets one projection per set
+  /// @param tile_size pixels
   template <class B>
-  void plan(B& backend, View<const ViewedSet<float>> sets) {
+  void plan(B& backend, View<const ViewedSet<float>> sets, int tile_size) {
+    square_ = OpenSquares::size_in(tile_size);
     chunks_.resize(sets.size == 0 ? 0
                                   : sets[sets.size - 1].first_chunk + sets[sets.size - 1].chunk_count());
     for (const ViewedSet<float>& args : sets) {
@@ -66,8 +68,9 @@ class DepthSlices {
   void split(int n) noexcept {
     count_ = 0;
     std::size_t taken = 0, bucket = 0;
+    const double first = std::min(kFirst, kFirstOfMany / n);
     for (int s = 0; s + 1 < n; ++s) {
-      const double share = kFirst + (1 - kFirst) * s / n;
+      const double share = first + (1 - first) * s / n;
       const std::size_t wanted = static_cast<std::size_t>(share * static_cast<double>(candidates_));
       if (taken >= wanted) continue;  // a slice would be empty
       while (bucket + 1 < kBuckets && taken < wanted) taken += weights_[bucket++];
@@ -100,7 +103,7 @@ class DepthSlices {
   /// Open squares for the projection of the next slice, from TileProgress::open of the last one. Valid
   /// until the next call.
   OpenSquares open_squares(const TileGrid& grid, View<const std::uint64_t> open) {
-    const std::size_t side = static_cast<std::size_t>(grid.tile_size / OpenSquares::kSize);
+    constexpr std::size_t side = OpenSquares::kPerSide;
     const std::size_t tiles = static_cast<std::size_t>(grid.columns);
     const std::size_t stride = tiles * side + 1, rows = static_cast<std::size_t>(grid.rows) * side;
     sums_.resize(stride * (rows + 1));
@@ -117,7 +120,7 @@ class DepthSlices {
           *out++ = *++above + (row += static_cast<std::uint32_t>(squares >> x & 1));
       }
     }
-    return {{sums_.data(), sums_.size()}, stride};
+    return {{sums_.data(), sums_.size()}, stride, square_};
   }
 
   /// Grows the capacity to that of `o` (see ScratchMemory::grow_to).
@@ -135,8 +138,8 @@ class DepthSlices {
   /// Number of depth buckets: 16 per octave, from 1 mm on.
   static constexpr std::size_t kBuckets = 512;
   static constexpr int kBucketShift = 19;
-  /// Fraction of the Gaussians in the first slice.
-  static constexpr double kFirst = 0.35;
+  /// Share of the Gaussians in the first slice, at most. It is larger than the others.
+  static constexpr double kFirst = 0.35, kFirstOfMany = 2.4;
 
   /// Bucket of a chunk's nearest key, and the half-open range of squares that it may reach.
   struct Place {
@@ -149,9 +152,10 @@ class DepthSlices {
     return base_ + (static_cast<std::uint32_t>(bucket) << kBucketShift);
   }
   Place place_of(const ViewedSet<float>& args, std::size_t c) const noexcept {
-    constexpr int kSize = OpenSquares::kSize;
-    const int width = args.camera.width, height = args.camera.height;
-    const auto squares = [](int size) { return static_cast<std::uint16_t>((size + kSize - 1) / kSize); };
+    const int side = square_, width = args.camera.width, height = args.camera.height;
+    const auto squares = [side](int size) {
+      return static_cast<std::uint16_t>((size + side - 1) / side);
+    };
     const std::uint16_t columns = squares(width), rows = squares(height);
     const View<const ChunkBounds> bounds = args.gaussians.chunk_bounds;
     const std::size_t id = args.selection.chunk_id(c);
@@ -161,12 +165,12 @@ class DepthSlices {
     if (!may_be_visible(args.camera64, chunk)) return {};
     const ChunkExtent e = chunk_extent(args.camera64, chunk);
     // Bounds that are not finite tell us nothing: treat the chunk as nearest and as covering the image.
-    const auto begin = [](double pixel, int size) {
+    const auto begin = [side](double pixel, int size) {
       return static_cast<std::uint16_t>((pixel > 0 ? std::min(pixel, static_cast<double>(size)) : 0.0) /
-                                        kSize);
+                                        side);
     };
-    const auto end = [&squares](double pixel, int size) {
-      return pixel < size ? static_cast<std::uint16_t>((pixel > 0 ? pixel : 0.0) / kSize + 1)
+    const auto end = [&squares, side](double pixel, int size) {
+      return pixel < size ? static_cast<std::uint16_t>((pixel > 0 ? pixel : 0.0) / side + 1)
                           : squares(size);
     };
     Place place{0, begin(e.x0, width), begin(e.y0, height), end(e.x1, width), end(e.y1, height)};
@@ -185,22 +189,27 @@ class DepthSlices {
   std::array<std::size_t, kMost> ends_{};
   std::uint32_t base_ = bits_of(0.001f);
   std::size_t candidates_ = 0;
-  int count_ = 1;
+  int count_ = 1, square_ = 1;
 };
 
 namespace detail {
 
-/// Number of depth slices for a frame with at most `candidates` visible Gaussians.
-inline int depth_slices_of(const RenderConfig& config, std::size_t candidates,
-                           const Camera& camera) noexcept {
+/// Number of depth slices for a frame with at most `candidates` visible Gaussians, drawn by `threads`
+/// threads.
+inline int depth_slices_of(const RenderConfig& config, std::size_t candidates, const Camera& camera,
+                           std::size_t threads) noexcept {
   if (config.response != Response::ewa || config.compat != Compat::none || config.quality.key_bits < 32)
     return 1;
   if (config.tuning.depth_slices != 0) return config.tuning.depth_slices;
   // With few Gaussians per pixel, projection is a small part of the frame, and slices cannot save much.
-  constexpr std::size_t kFew = 131072;
+  // Each slice costs its stages some time, more where threads wait for one another.
+  constexpr std::size_t kFew = 131072, kFewPerPixel = 8, kSmall = 128 * 128;
   const std::size_t pixels =
       static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
-  return candidates < kFew || candidates < pixels / 2 ? 1 : 4;
+  const bool alone = threads == 1;
+  if (candidates < (alone ? std::min(kFew, kFewPerPixel * pixels) : kFew) || candidates < pixels / 2)
+    return 1;
+  return pixels > kSmall ? 4 : alone ? 12 : 6;
 }
 
 }  // namespace detail
