@@ -16,13 +16,15 @@
 namespace gsnav {
 
 /// Width of the tiles that an image is rendered in. On CPUs large images use 32 pixels: their footprints
-/// are large too and then reach fewer tiles.
+/// are large too and then reach fewer tiles. Small ones use 8: each pixel that closes then hides splats
+/// of later slices (OpenSquares).
 template <Backend B>
 int tile_size_of(const RenderConfig& c, int width, int height) noexcept {
   if (c.tuning.tile_size != 0) return c.tuning.tile_size;
-  constexpr std::int64_t kLarge = 1000000;
-  const bool large = std::int64_t{width} * height >= kLarge;
-  return is_host_backend<B> && large && c.compat == Compat::none ? 32 : 16;
+  constexpr std::int64_t kSmall = 8192, kLarge = 1000000;
+  const std::int64_t pixels = std::int64_t{width} * height;
+  if (!is_host_backend<B> || c.compat != Compat::none) return 16;
+  return pixels >= kLarge ? 32 : pixels <= kSmall ? 8 : 16;
 }
 
 /// Smallest log2(alpha) at which a Gaussian is blended. It is at least -126, the limit of exp2 in float,
