@@ -192,11 +192,16 @@ def checkpoint_of(path: pathlib.Path, args: argparse.Namespace, option: str, age
         if getattr(args, name) != then:
             sys.exit(f"--{name.replace('_', '-')} {getattr(args, name)}: {path} was trained with {then}. Use that, or "
                      f"another {option}.")
+    take_weights(agent, kept["agent"], path)
+    return kept
+
+
+def take_weights(agent: Agent, weights: dict[str, Tensor], path: pathlib.Path) -> None:
+    """Gives the agent the weights that `path` has. Ends the program if they are those of another network."""
     try:
-        agent.load_state_dict(kept["agent"])
+        agent.load_state_dict(weights)
     except RuntimeError as e:
         sys.exit(f"{path}: weights of another network: {' '.join(str(e).split())[:300]}")
-    return kept
 
 
 def begin_with(path: pathlib.Path, args: argparse.Namespace, agent: Agent) -> None:
@@ -205,10 +210,11 @@ def begin_with(path: pathlib.Path, args: argparse.Namespace, agent: Agent) -> No
         checkpoint_of(path, args, "--begin-with", agent)
         return
     policy = load(path)
-    sensor = next((f"--sensor {name}" for name, c in CHANNELS.items() if c == policy.channels), "--blind")
+    sensors = {0: "--blind", **{c: f"--sensor {name}" for name, c in CHANNELS.items()}}
     if (policy.size, policy.channels) != (args.size, agent.shape[0]):
+        sensor = sensors.get(policy.channels, f"{policy.channels} channels")
         sys.exit(f"--begin-with {path}: an agent of --size {policy.size} {sensor}. Use these, or another file.")
-    agent.load_state_dict(agent.state_dict() | {name: torch.from_numpy(w) for name, w in policy.weights.items()})
+    take_weights(agent, agent.state_dict() | {name: torch.from_numpy(w) for name, w in policy.weights.items()}, path)
 
 
 def progress(log: list[dict[str, float]], updates: int, rate: float) -> None:

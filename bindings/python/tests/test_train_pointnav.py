@@ -133,6 +133,11 @@ def test_errors_say_what_to_do(first, tmp_path):
 
 def test_a_run_begins_with_a_file_of_weights(tmp_path):
     path = FOLDER / "pointnav_depth.npz"
+    with np.load(path) as file:
+        np.savez(tmp_path / "more.npz", **file, more=np.zeros(3))
+    run = subprocess.run(command(tmp_path / "more", "--begin-with", tmp_path / "more.npz"), capture_output=True,
+                         text=True)
+    assert run.returncode == 1 and "more.npz: weights of another network" in run.stderr, run.stderr
     # The first update learns only the value.
     trained(tmp_path, "--begin-with", path, "--critic-updates", "1", updates=1, every=1)
     with np.load(path) as file:
