@@ -59,13 +59,13 @@ class Turns:
     def run(self, works: Iterable[tuple[Any, Callable[[], None]]]) -> None:
         """Runs a function for each participant, any hashable object but None. Returns when all have ended.
 
-        Raises the first error of a function. After Ctrl-C it waits for the functions, too.
+        Raises the first error of a function. After Ctrl-C it waits for the functions, too; a second one ends that.
         """
         asked = _Round(list(works))
         try:
             self._rounds.put(asked)
             asked.done.wait()
-        except BaseException:  # It may come before the round is asked for, or after its end.
+        except BaseException:  # Ctrl-C may come before the round is asked for, or after its end.
             self._rounds.put(asked)
             asked.done.wait()
             raise
