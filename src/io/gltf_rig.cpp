@@ -2,6 +2,7 @@
 // skeleton made from it.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <set>
 #include <string>
@@ -44,7 +45,7 @@ Mat3d squared(const Mat3d& m) {
   }
   const Mat3d between = transpose(out) * m;
   const double trace = between(0, 0) + between(1, 1) + between(2, 2);
-  return determinant(out) > 0.5 && trace > 1 + 2 * std::cos(30 * 3.14159265358979323846 / 180) ? out : m;
+  return determinant(out) > 0.5 && trace > 1 + 2 * std::cos(30 * std::numbers::pi / 180) ? out : m;
 }
 
 Affine3<double> inverse_of(const Affine3<double>& m) {

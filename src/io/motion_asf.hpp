@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <numbers>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -13,7 +14,7 @@
 
 namespace gsnav::io::detail {
 
-inline constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180.0;
+inline constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
 
 /// A bone of an Acclaim skeleton.
 struct AsfBone {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <charconv>
 #include <cmath>
+#include <numbers>
 #include <string_view>
 
 #include "file.hpp"
@@ -10,7 +11,7 @@
 namespace gsnav::io {
 namespace {
 
-constexpr double kRadians = 3.14159265358979323846 / 180.0;
+constexpr double kRadians = std::numbers::pi / 180.0;
 
 struct Channel {
   bool rotation = false;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <thread>
@@ -158,7 +159,7 @@ detail::FloorSettings floor_settings(const NavMeshSettings& settings, const Gaus
   const detail::VoxelSettings cells(settings);
   return {static_cast<std::size_t>(cells.height), static_cast<std::size_t>(cells.climb),
           static_cast<std::size_t>(std::floor(options.floor_band / g.level + 1e-6)),
-          std::tan(settings.agent_max_slope * 3.14159265358979323846 / 180.0)};
+          std::tan(settings.agent_max_slope * std::numbers::pi / 180.0)};
 }
 
 Status no_floor(const NavMeshSettings& settings, const GaussianNavOptions& options, const VoxelGrid& g,

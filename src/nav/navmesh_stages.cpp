@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <numbers>
 #include <utility>
 
 namespace gsnav::detail {
@@ -62,7 +63,7 @@ VoxelSettings::VoxelSettings(const NavMeshSettings& s) noexcept
       radius(clamp_cells(std::ceil(s.agent_radius / s.cell_size - kEdge))) {}
 
 double slope_cosine(const NavMeshSettings& s) noexcept {
-  return std::cos(s.agent_max_slope * 3.14159265358979323846 / 180.0);
+  return std::cos(s.agent_max_slope * std::numbers::pi / 180.0);
 }
 
 Result<Aabb<double>> check_triangles(std::span<const Vec3d> vertices,

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -84,7 +85,7 @@ Capsule<double> capsule_about(const std::vector<Vec3d>& points, const Vec3d& axi
 }
 
 double capsule_volume(const Capsule<double>& c) noexcept {
-  return 3.14159265358979323846 * c.radius * c.radius * (norm(c.p1 - c.p0) + 4.0 / 3 * c.radius);
+  return std::numbers::pi * c.radius * c.radius * (norm(c.p1 - c.p0) + 4.0 / 3 * c.radius);
 }
 
 /// Appends one capsule that contains `share` of the points. If that takes a quarter less volume, splits

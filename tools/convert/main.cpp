@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
@@ -96,7 +97,7 @@ Status edit(GaussianCloud& cloud, const Options& o) {
   by.scale = o.scale;
   if (!o.rotate.empty()) {
     const Vec3d axis{o.rotate[0], o.rotate[1], o.rotate[2]};
-    by.rotation = axis_angle(normalized(axis), o.rotate[3] * 3.14159265358979323846 / 180);
+    by.rotation = axis_angle(normalized(axis), o.rotate[3] * std::numbers::pi / 180);
   }
   if (!o.translate.empty()) by.translation = {o.translate[0], o.translate[1], o.translate[2]};
   if (!o.rotate.empty() || !o.translate.empty() || o.scale != 1) transform(cloud, by);
@@ -149,8 +150,8 @@ Status compare(const GaussianCloud& source, const std::vector<std::uint32_t>& ro
   std::printf(
       "  largest errors: mean %.3g m, scale %.3g %% (%.3g m), rotation %.3g deg, opacity %.3g, colour "
       "%.3g, SH %.3g\n",
-      e.mean, 100 * e.scale, e.scale_metres, e.rotation * 180 / 3.14159265358979323846, e.opacity,
-      e.colour, e.bands);
+      e.mean, 100 * e.scale, e.scale_metres, e.rotation * 180 / std::numbers::pi, e.opacity, e.colour,
+      e.bands);
   std::vector<Camera> cameras = views_around(source, guess_up(source).up, o.views, o.width, o.height);
   if (!o.cameras.empty()) {
     auto given = io::load_cameras(o.cameras, o.width, o.height);

@@ -8,6 +8,7 @@
 #include <exception>
 #include <new>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <utility>
 
 #include "../common/overlay.hpp"
@@ -197,7 +198,7 @@ Status Session::advance(const Controls& c, int actions) {
     if (Status put = put_time(*c.time); !put) return put;
   }
   gsnav::WorldState s = world_.state();
-  s.agent.yaw = std::remainder(s.agent.yaw + c.turn, 2 * 3.14159265358979323846);
+  s.agent.yaw = std::remainder(s.agent.yaw + c.turn, 2 * std::numbers::pi);
   s.agent.pitch = std::clamp(s.agent.pitch + c.tilt, -kTurnedUp, kTurnedUp);
   if (Status put = world_.set_state(s); !put) return put;
   if (world_.done()) return {};
@@ -263,7 +264,7 @@ Status Session::draw_map(const Controls& c, const gsnav::CapsuleSet& bodies) {
   canvas.ring(f.x(goal), f.y(goal), 6, 2, kGoal, 1.0f);
   const gsnav::AgentPose& agent = world_.agent();
   // Field of view: the edges of the picture up to a distance of 2 m.
-  const double half = 0.5 * stage_.config.sensors.front().hfov * 3.14159265358979323846 / 180.0;
+  const double half = 0.5 * stage_.config.sensors.front().hfov * std::numbers::pi / 180.0;
   const double x = f.x(agent.position), y = f.y(agent.position);
   gsnav::Vec2<double> view[3] = {{x, y}, {}, {}};
   for (int i = 0; i < 2; ++i) {

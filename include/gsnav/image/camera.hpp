@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <numbers>
 
 #include "gsnav/math/mat.hpp"
 #include "gsnav/math/similarity.hpp"
@@ -36,7 +37,7 @@ struct Camera {
   Camera& set_hfov(int w, int h, double hfov_degrees) noexcept {
     width = w;
     height = h;
-    fx = fy = 0.5 * w / std::tan(hfov_degrees * 3.14159265358979323846 / 360.0);
+    fx = fy = 0.5 * w / std::tan(hfov_degrees * std::numbers::pi / 360.0);
     cx = 0.5 * w;
     cy = 0.5 * h;
     return *this;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 
 #include "gsnav/frame/sh.hpp"
 #include "gsnav/math/quat.hpp"
@@ -22,7 +23,7 @@ class ShRotation {
                                  0.8611363115940526};
     constexpr double kWeights[] = {0.34785484513745385, 0.6521451548625461, 0.6521451548625461,
                                    0.34785484513745385};
-    constexpr double kPi = 3.14159265358979323846;
+    constexpr double kPi = std::numbers::pi;
     constexpr int kSteps = 8;
     const Quatd back = conjugate(rotation);
     for (std::size_t node = 0; node < 4; ++node) {

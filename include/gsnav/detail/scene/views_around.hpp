@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <vector>
 
 #include "gsnav/image/camera.hpp"
@@ -22,7 +23,7 @@ inline std::vector<Camera> views_around(const Aabb<double>& box, const Vec3d& up
   const double distance = 1.8 * std::max(0.5 * norm(box.high - box.low), 1e-3);
   const Vec3d side = std::fabs(up.z) < 0.5 ? Vec3d{0, 0, 1} : Vec3d{1, 0, 0};
   const Vec3d across = normalized(side - up * dot(side, up)), other = cross(across, up);
-  constexpr double kPi = 3.14159265358979323846;
+  constexpr double kPi = std::numbers::pi;
   for (int v = 0; v < count; ++v) {
     const double angle = 2 * kPi * v / count;
     const Vec3d eye =
