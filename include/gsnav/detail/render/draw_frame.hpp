@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <utility>
@@ -16,14 +17,19 @@ namespace gsnav {
 ///   see-through mesh.
 template <class S, Backend B>
 Status draw_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const GaussianSet> sets,
-                  const MeshFrame& meshes, const Camera& camera, const RenderConfig& config,
+                  const MeshFrame& meshes, const Camera& camera, const RenderConfig& asked,
                   const FrameImages<S>& images, RenderStats* stats = nullptr) {
-  if (meshes.instances.empty())
-    return render_camera<S>(backend, ws, sets, camera, config, images, stats);
-  if (Status s = validate(config); !s) return s;
+  if (meshes.instances.empty()) return render_camera<S>(backend, ws, sets, camera, asked, images, stats);
+  if (Status s = validate(asked); !s) return s;
   RenderStats counted;
   MeshStats drawn;
-  const int tile_size = tile_size_of<B>(config, camera.width, camera.height);
+  const bool seen_through = any_seen_through(meshes.instances);
+  RenderConfig config = asked;
+  int& tile_size = config.tuning.tile_size;
+  tile_size = tile_size_of<B>(asked, camera.width, camera.height);
+  // These frames have one slice of depth, in which small tiles gain nothing.
+  if (asked.tuning.tile_size == 0 && !seen_through && config.composite == Composite::merged)
+    tile_size = std::max(tile_size, 16);
   const bool color = images.rgb != nullptr;
   if (Status s = draw_meshes<S>(backend, ws.mesh, meshes.instances, camera, meshes.light, tile_size,
                                 color, {}, &drawn);
@@ -37,7 +43,7 @@ Status draw_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaussia
                      std::as_const(ws.mesh.tile_far).view(),
                      {},
                      {}};
-  if (any_seen_through(meshes.instances)) {
+  if (seen_through) {
     if (config.composite == Composite::hard_depth) {
       return {
           Errc::unsupported,
