@@ -13,8 +13,8 @@ namespace {
 
 using Policy = cuda::policy::Regions;
 
-/// Pixels outside the image at which a record may need double (detail::needs_double). The whitened form
-/// of a pixel is at most this factor times its distance.
+/// The whitened form of a pixel is at most this factor times its distance from the mean. It decides
+/// which records may need double (detail::needs_double).
 double whitened_per_pixel(const GaussianSet& set) {
   return kWhitenScale / std::sqrt(static_cast<double>(set.eps2d));
 }

@@ -129,7 +129,7 @@ struct ScatterTiles {
 
 /// Blends the pixels of a frame without meshes (detail/frame/blend.hpp). The form of a backend that
 /// ProjectsChunks must obey args.progress. It starts from the pixel states of the previous slice of
-/// depth, stores its own for the next slice, and marks the cells that are still open. The generic form
+/// depth, stores its own for the next slice, and marks the squares that are still open. The generic form
 /// draws a frame of one slice.
 struct Blend {
   /// Blends with the generic kernels.

@@ -51,7 +51,7 @@ struct WeighTile {
     }
   }
 
-  static constexpr int kSide = 16;  // of the largest tile, in pixels
+  static constexpr int kSide = 16;  // of the tiles of this pass, in pixels
   View<const SplatBounds> bounds;
   View<const std::uint32_t> rows;  ///< [slots], row of each slot
 
