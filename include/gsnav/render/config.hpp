@@ -72,7 +72,8 @@ inline Status validate(const Quality& q) {
 
 /// The settings of RenderConfig that change no bit of an image. A renderer may ignore them.
 struct Tuning {
-  int tile_size = 0;     ///< Tile width in pixels: 8, 16 or 32, or 0 to choose by the image's size.
+  int tile_size = 0;  ///< Tile width in pixels: 8, 16 or 32, or 0 to choose by the image's size.
+  static constexpr int kMostDepthSlices = 16;  ///< Upper limit of depth_slices.
   int depth_slices = 0;  ///< Number of front-to-back passes, 1 to 16, or 0 to choose automatically.
                          ///< Later passes skip what earlier ones hide. Only for backends that can slice
                          ///< (OpenMP).
@@ -86,7 +87,7 @@ inline Status validate(const Tuning& t) {
   if (t.tile_size != 0 && t.tile_size != 8 && t.tile_size != 16 && t.tile_size != 32) {
     return bad("tile_size", t.tile_size, "must be 8, 16 or 32, or 0 to choose");
   }
-  if (t.depth_slices < 0 || t.depth_slices > 16) {
+  if (t.depth_slices < 0 || t.depth_slices > Tuning::kMostDepthSlices) {
     return bad("depth_slices", t.depth_slices, "must be in [1, 16], or 0 to choose");
   }
   return {};

@@ -179,7 +179,7 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   bin.bounds = ws.bounds.view();
   bin.log2_alpha_min = static_cast<S>(log2_alpha_min(config.quality));
   bin.elliptic = config.response == Response::ewa;
-  bin.blocks = visible < 4096 ? 1 : concurrency_of(backend);
+  bin.blocks = bin_blocks(backend, visible);
   ws.cursors.resize_discard(bin.blocks * bin.grid.count());
   ws.tile_offsets.resize_discard(bin.grid.count() + 1);
   bin.cursors = ws.cursors.view();

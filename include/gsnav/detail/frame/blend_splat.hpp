@@ -13,6 +13,9 @@
 
 namespace gsnav {
 
+/// Alpha above which Habitat-GS has a depth, and draws Gaussians over a mesh.
+inline constexpr double kHabitatReturnAlpha = 0.01;
+
 /// Constants of blending, in the scalar of the kernel.
 template <class S>
 struct BlendRules {

@@ -23,12 +23,6 @@ GSNAV_HD L alpha_before_mesh(L alpha, const SplatDepth<S>& depth, L mesh, L px, 
   return select(unsure && (ray_depth(depth, px, py) > mesh), L(S(0)), alpha);
 }
 
-/// True where a pixel has a mesh.
-template <class L>
-GSNAV_HD mask_of<L> has_mesh(L depth) noexcept {
-  return depth <= L(scalar_of<L>(3.4e38));
-}
-
 /// Blends a mesh surface at depth z metres, also where the pixel is closed for Gaussians. Alpha 0 means
 /// no surface, and z must still be finite. With alpha 1 the transmittance becomes 0.
 template <bool Color, class L, DepthMode D, class S>
@@ -155,7 +149,8 @@ struct HardDepthPixel {
 
   GSNAV_HD void operator()(std::size_t pixel) const noexcept {
     const S a = alpha[pixel], z = mesh.depth[pixel], d = expected[pixel];
-    const bool covered = has_mesh(z), dropped = !(a > S(0.01)), lost = dropped || (covered && d > z);
+    const bool covered = has_mesh(z), dropped = !(a > S(kHabitatReturnAlpha)),
+               lost = dropped || (covered && d > z);
     const S t = lost ? S(1) : S(1) - a;
     for_each_image<DepthMode::all>(images, [&]<Output O>(S* image) GSNAV_INLINED {
       if (image == nullptr) return;

@@ -4,10 +4,17 @@
 #include <cstdint>
 
 #include "gsnav/core/view.hpp"
+#include "gsnav/math/functions.hpp"
 
 // Images of meshes, in the form in which the blending of Gaussians reads them.
 
 namespace gsnav {
+
+/// True where a depth of a layer is that of a mesh, not infinite.
+template <class L>
+GSNAV_HD mask_of<L> has_mesh(L depth) noexcept {
+  return depth <= L(scalar_of<L>(3.4e38));
+}
 
 /// A see-through surface at one pixel.
 template <class S>

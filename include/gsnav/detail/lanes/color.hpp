@@ -21,7 +21,7 @@ struct Survivors {
 };
 
 /// Number of values of the bands above degree 0 that are read together.
-inline constexpr int kBandGroup = 8;
+inline constexpr int kBandGroup = 8;  // of load_words, too
 
 /// Reads K halves of each of kWidth rows of `stride` values, one row per lane.
 template <int K>

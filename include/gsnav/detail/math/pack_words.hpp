@@ -12,7 +12,7 @@
 // So transposing words before they become floats takes half of the instructions.
 
 #if defined(__x86_64__) && defined(__AVX2__) && defined(__F16C__)
-#define GSNAV_WORDS  ///< defined where this header declares anything
+#define GSNAV_WORDS  ///< Without it, this header declares nothing.
 
 namespace gsnav {
 
@@ -25,7 +25,9 @@ template <int N>
 using Words = typename WordsOf<N>::type;
 
 namespace detail {
-/// Source lane for lane l where units of W words of two registers alternate, in each group of 8 words.
+/// Lane of two registers (the second begins at N) that lane l takes, in each group of 8 lanes: W words
+/// of the first register, W of the second, and so on; from the lower halves of their groups, or the
+/// upper.
 template <int N, int W>
 constexpr int alternating_lane(int l, bool high) noexcept {
   const int unit = l % 8 / W;
@@ -72,7 +74,7 @@ GSNAV_HD void load_words(const Row& row, Words<N>* columns) noexcept {
   }
   detail::transpose_words<N>(columns);
 }
-/// 3 or 8 words, and zeros after them.
+/// K = 3 or 8 words from p on. The other lanes are 0.
 template <int K>
 GSNAV_HD Words<8> words_of(const std::uint16_t* p) noexcept {
   if constexpr (K == 8) {

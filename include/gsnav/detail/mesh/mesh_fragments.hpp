@@ -44,7 +44,7 @@ GSNAV_HD void for_each_fragment(const FragmentArgs<S>& args, std::size_t tile, c
                           static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.width) +
                           static_cast<std::size_t>(x);
                       const S z = S(1) / mesh_inverse_z(t, x, y);
-                      if (z <= args.behind[pixel] && z <= S(3.4e38)) f(pixel, t, x, y, z);
+                      if (z <= args.behind[pixel] && has_mesh(z)) f(pixel, t, x, y, z);
                     }
                   });
   }

@@ -33,7 +33,7 @@ concept SlicingBackend = ProjectsChunks<B, S> && RunsStage<B, stage::Blend, Rast
 /// and wait for their own slices.
 class DepthSlices {
  public:
-  static constexpr int kMost = 16;
+  static constexpr int kMost = Tuning::kMostDepthSlices;
 
   /// Finds the depth and the image region of each chunk.
   /// @param sets one projection per set
@@ -138,7 +138,7 @@ class DepthSlices {
   /// Number of depth buckets: 16 per octave, from 1 mm on.
   static constexpr std::size_t kBuckets = 512;
   static constexpr int kBucketShift = 19;
-  /// Share of the Gaussians in the first slice, at most. It is larger than the others.
+  /// Share of the Gaussians in the first slice of n: kFirst, or kFirstOfMany / n if that is less.
   static constexpr double kFirst = 0.35, kFirstOfMany = 2.4;
 
   /// Bucket of a chunk's nearest key, and the half-open range of squares that it may reach.

@@ -14,6 +14,7 @@
 #include "gsnav/core/stages.hpp"
 #include "gsnav/detail/image/validate_camera.hpp"
 #include "gsnav/detail/mesh/mesh_shade.hpp"
+#include "gsnav/detail/render/rules.hpp"
 #include "gsnav/detail/render/scratch_memory.hpp"
 #include "gsnav/render/config.hpp"
 #include "gsnav/render/frames.hpp"
@@ -226,7 +227,7 @@ MeshRasterArgs<S> raster_args(MeshWorkspace<S, B>& ws, const Camera& camera, int
 template <class S, Backend B>
 Status bin_meshes(B& backend, MeshWorkspace<S, B>& ws, MeshRasterArgs<S>& raster) {
   BinArgs<S>& bin = raster.bin;
-  bin.blocks = raster.triangles.size < 4096 ? 1 : concurrency_of(backend);
+  bin.blocks = bin_blocks(backend, raster.triangles.size);
   ws.cursors.resize_discard(bin.blocks * bin.grid.count());
   ws.tile_offsets.resize_discard(bin.grid.count() + 1);
   bin.cursors = ws.cursors.view();

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
 #include "gsnav/core/backend.hpp"
@@ -21,10 +22,17 @@ namespace gsnav {
 template <Backend B>
 int tile_size_of(const RenderConfig& c, int width, int height) noexcept {
   if (c.tuning.tile_size != 0) return c.tuning.tile_size;
-  constexpr std::int64_t kSmall = 8192, kLarge = 1000000;
+  constexpr std::int64_t kMostOf8 = 8192, kLeastOf32 = 1000000;
   const std::int64_t pixels = std::int64_t{width} * height;
   if (!is_host_backend<B> || c.compat != Compat::none) return 16;
-  return pixels >= kLarge ? 32 : pixels <= kSmall ? 8 : 16;
+  return pixels >= kLeastOf32 ? 32 : pixels <= kMostOf8 ? 8 : 16;
+}
+
+/// Number of work items that list n splats or triangles by tiles.
+template <Backend B>
+std::size_t bin_blocks(const B& backend, std::size_t n) noexcept {
+  constexpr std::size_t kFew = 4096;
+  return n < kFew ? 1 : concurrency_of(backend);
 }
 
 /// Smallest log2(alpha) at which a Gaussian is blended. It is at least -126, the limit of exp2 in float,
@@ -50,7 +58,7 @@ void follow(Compat compat, BlendRules<S>& r) noexcept {
   r.exclusive_stop = compat != Compat::none;
   // gsplat stops at T <= T_min where INRIA stops at T < T_min.
   if (compat == Compat::gsplat) r.transmittance_min = std::nextafter(r.transmittance_min, S(1));
-  if (compat == Compat::habitat_gs) r.return_alpha = S(0.01);
+  if (compat == Compat::habitat_gs) r.return_alpha = S(kHabitatReturnAlpha);
 }
 
 }  // namespace detail
