@@ -104,7 +104,7 @@ def test_ctrl_c_waits_for_the_participants():
 
 
 def test_ctrl_c_at_the_end_of_a_round():
-    """It may interrupt the waiting thread before or after that has seen the end. None waits for an end twice."""
+    """It may come before or after the waiting thread has seen the end, which is not waited for again."""
     turns, ended = _turns.Turns(drawers=1, share=1), []
 
     def work(i):

@@ -27,7 +27,8 @@ Status draw_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaussia
   RenderConfig config = asked;
   int& tile_size = config.tuning.tile_size;
   tile_size = tile_size_of<B>(asked, camera.width, camera.height);
-  // These frames have one slice of depth, in which small tiles gain nothing.
+  // Opaque meshes: the frame has one slice of depth, in which small tiles cost more than they save. A
+  // pixel behind a pane walks its list several times, and small tiles have shorter lists.
   if (asked.tuning.tile_size == 0 && !seen_through && config.composite == Composite::merged)
     tile_size = std::max(tile_size, 16);
   const bool color = images.rgb != nullptr;
