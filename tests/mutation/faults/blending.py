@@ -58,7 +58,7 @@ FAULTS = [
           DEPTH_TEST, "N46_depth_tilted_disk", "N47_depth_far", why="wrong by decimetres on tilted disks"),
     fault("depth_not_clamped", "ray_depth", CLAMPED, "return L(d.z) + defined;",
           DEPTH_TEST, "N46_depth_tilted_disk", why="flat disks run past their extent, and behind the camera"),
-    fault("depth_clamped_at_3_sigma", "make_splat_depth", "d.reach = sqrt(L(S(2 * kLn2)) * p.s_max) *",
+    fault("depth_clamped_at_3_sigma", "make_splat_depth", "d.reach = sqrt(footprint_radius2(p.s_max)) *",
           "d.reach = L(S(3)) *",
           DEPTH_TEST, "N46_depth_tilted_disk"),
     fault("depth_of_edge_on_divided", "ray_depth", DELTA, "  const L defined = delta;\n",

@@ -91,7 +91,7 @@ FAULTS = [
           FOOTPRINT, "N19_offscreen_rod_fan",
           why="INRIA forgets the principal point"),
     fault("ray_without_bend", "add_perspective",
-          "out.bend = L(S(2 * kLn2)) * (det / ((z * z) * d0));",
+          "out.bend = L(S(kSquaredSigmas)) * (det / ((z * z) * d0));",
           "out.bend = L(S(0)) * det;",
           RESPONSE, "N02_exact_ray_grid"),
     fault("ray_without_dilation", "add_perspective",

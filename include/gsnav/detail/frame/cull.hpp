@@ -51,7 +51,7 @@ struct ChunkInView {
     double wide, fixed;
   };
   GSNAV_HD Reach reach(double z_min, double s_max, const ImageAxis& axis) const noexcept {
-    const double radius = sqrt(max(s_max, 0.0)) / kWhitenScale;
+    const double radius = footprint_radius(s_max);
     const double h = sqrt(camera.eps2d);
     const double reach = axis.f * bounds.scale_max * axis.slant();
     // At least the padding of splat_bounds: relative, plus 5e-7 of the aspect ratio, and absolute.

@@ -209,7 +209,7 @@ GSNAV_HD void narrow_to_compat(const ProjectionCamera<S>& camera, const Projecte
                                SplatBounds& b) noexcept {
   const S scale2 = S(kWhitenScale * kWhitenScale);
   if (camera.compat == Compat::gsplat) {
-    const S extent = min(S(3.33), sqrt(max(p.s_max, S(0))) * S(1 / kWhitenScale));
+    const S extent = min(S(3.33), footprint_radius(p.s_max));
     clip_to_tiles(p.mean_x, ceiling(extent * sqrt(p.variance_x)), S(0), camera.width, b.x0, b.x1);
     clip_to_tiles(p.mean_y, ceiling(extent * sqrt(p.variance_y)), S(0), camera.height, b.y0, b.y1);
     return;

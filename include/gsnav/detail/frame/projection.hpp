@@ -12,13 +12,20 @@ namespace gsnav {
 
 /// sqrt(log2(e) / 2). With it, |w|^2 in the whitened coordinates of SplatGeometry is log2(e) q / 2.
 inline constexpr double kWhitenScale = 0.84932180028801904272;
-/// Squared radius of a footprint, in standard deviations. `excess` is log2 of the opacity over the
-/// smallest alpha.
-template <class S>
-GSNAV_HD constexpr S footprint_radius2(S excess) noexcept {
-  return excess * S(1 / (kWhitenScale * kWhitenScale));
+/// 2 ln 2: a squared distance in standard deviations, per unit of |w|^2.
+inline constexpr double kSquaredSigmas = 1 / (kWhitenScale * kWhitenScale);
+
+/// Squared radius of a footprint, in standard deviations. `excess` is opacity_excess of the Gaussian.
+template <class L>
+GSNAV_HD constexpr L footprint_radius2(L excess) noexcept {
+  return excess * L(scalar_of<L>(kSquaredSigmas));
 }
-inline constexpr double kLn2 = 0.69314718055994530942;
+/// Radius of a footprint, in standard deviations; 0 if `excess` is negative.
+template <class L>
+GSNAV_HD L footprint_radius(L excess) noexcept {
+  using S = scalar_of<L>;
+  return sqrt(max(excess, L(S(0)))) * L(S(1 / kWhitenScale));
+}
 
 /// A Gaussian in camera axes: mean, factor M of its covariance M M^T, and cofactors of M.
 template <class L>
@@ -120,7 +127,7 @@ GSNAV_HD void add_perspective(const ProjectionCamera<S>& camera, const SplatAxes
     const L volume = dot(mx, cx);
     const L det =
         fma(volume, volume, fma(ex, dot(cx, cx), fma(ey, dot(cy, cy), (ex * ey) * dot(mz, mz))));
-    out.bend = L(S(2 * kLn2)) * (det / ((z * z) * d0));
+    out.bend = L(S(kSquaredSigmas)) * (det / ((z * z) * d0));
   }
   out.slope_x = slope_u / L(camera.fx);
   out.slope_y = slope_v / L(camera.fy);
@@ -137,7 +144,7 @@ GSNAV_HD void add_perspective(const ProjectionCamera<S>& camera, const SplatAxes
   const auto ellipse = (rest > zero) && (open > zero) && (rest * open > L(S(0.01)));
   const L along_x = m1 / out.a, along_y = (m2 - out.k * along_x) / out.b;
   const L reach_x = one / (out.a * out.a);
-  const L reach_y = out.variance_y * L(S(1.0 / (kWhitenScale * kWhitenScale)));
+  const L reach_y = out.variance_y * L(S(kSquaredSigmas));
   const L center_x = out.mean_x + kappa2 * along_x / open;
   const L center_y = out.mean_y + kappa2 * along_y / open;
   const L half_x = sqrt(kappa2 * fma(open, reach_x, kappa2 * along_x * along_x)) / open;
@@ -260,7 +267,7 @@ GSNAV_HD SplatDepth<L> make_splat_depth(const ProjectionCamera<scalar_of<L>>& ca
     d.gx[i] = c.x / L(camera.fx);
     d.gy[i] = c.y / L(camera.fy);
   }
-  d.reach = sqrt(L(S(2 * kLn2)) * p.s_max) * norm(axes.factor.row[2]) * L(camera.scale);
+  d.reach = sqrt(footprint_radius2(p.s_max)) * norm(axes.factor.row[2]) * L(camera.scale);
   return d;
 }
 

@@ -26,8 +26,8 @@ inline bool mesh_hides_chunk(const ViewedSet<float>& args, const TileGrid& grid,
   if (bounds.empty() || camera.response != Response::ewa || camera.compat != Compat::none) return false;
   const ChunkBounds& chunk = bounds[args.selection.chunk_id(c)];
   const ChunkExtent e = chunk_extent(camera, chunk);
-  const double k2 = 2 * kLn2 * (ChunkInView(camera, chunk).s_max() + 1e-5);
-  const double reach = sqrt(max(k2, 0.0)) * static_cast<double>(chunk.scale_max) * camera.scale;
+  const double radius2 = footprint_radius2(ChunkInView(camera, chunk).s_max() + 1e-5);
+  const double reach = sqrt(max(radius2, 0.0)) * static_cast<double>(chunk.scale_max) * camera.scale;
   const double nearest = static_cast<double>(e.nearest) * (1 - 1e-6) - reach * (1 + 1e-5);
   const auto tile = [&grid](double pixel, int tiles) {
     return static_cast<int>(clamp(pixel / grid.tile_size, 0.0, static_cast<double>(tiles - 1)));
