@@ -42,7 +42,8 @@ struct ChunkInView {
   }
   /// |w|^2 at the edge of the largest footprint, in kernel units.
   GSNAV_HD double s_max() const noexcept {
-    return log2(max(static_cast<double>(bounds.opacity_max), 1e-30)) - camera.log2_alpha_min;
+    return opacity_excess(log2_of_opacity(static_cast<double>(bounds.opacity_max)),
+                          camera.log2_alpha_min);
   }
 
   /// Reach of footprints beyond their means along one image axis: `wide` in pixels times depth, plus

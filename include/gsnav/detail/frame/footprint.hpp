@@ -83,7 +83,7 @@ class FootprintStrips {
     const L far_y = max(abs(y0 - g.ref_y), abs(y1 - g.ref_y));
     const L k = abs(g.k);
     const L size = fma(g.a + k, far_x, fma(g.b, far_y, abs(g.w1) + abs(g.w2) + abs(e.pulled)));
-    const L edge = root(max(g.log2_opacity - L(log2_alpha_min), zero));
+    const L edge = root(max(opacity_excess(g.log2_opacity, log2_alpha_min), zero));
     const L r = fma(size, L(S(2e-6)), edge * L(S(1.000002)));
     r2_ = r * r;
     turn_y_ = ((k * r) * e.inv_a) * e.inv_b;

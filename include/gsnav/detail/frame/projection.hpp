@@ -209,9 +209,8 @@ GSNAV_HD Projected<L> project(const ProjectionCamera<scalar_of<L>>& camera, cons
     const L det_base = fma(base, (a0 + c0) + base, det0);
     opacity = opacity * max(sqrt(det_base / det), L(camera.min_compensation));
   }
-  // The smallest normal number keeps log2 defined. Such lanes fail the test s_max >= 0.
-  out.log2_opacity = log2(max(opacity, L(S(1.2e-38))));
-  out.s_max = out.log2_opacity - L(camera.log2_alpha_min);
+  out.log2_opacity = log2_of_opacity(opacity);
+  out.s_max = opacity_excess(out.log2_opacity, camera.log2_alpha_min);
 
   if (ewa) {
     const L radius = sqrt(max(out.s_max, L(S(0))));

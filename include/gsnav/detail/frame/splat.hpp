@@ -24,6 +24,18 @@ struct SplatGeometry {
   S log2_opacity{};    ///< log2 of the opacity after the filter's compensation
 };
 
+/// log2 of an opacity. The smallest normal float keeps it defined for 0.
+template <class L>
+GSNAV_HD L log2_of_opacity(L opacity) noexcept {
+  return log2(max(opacity, L(scalar_of<L>(1.2e-38))));
+}
+/// log2 of an opacity over the smallest alpha: |w|^2 at the edge of the footprint, negative if there is
+/// none. Both arguments are log2.
+template <class L>
+GSNAV_HD L opacity_excess(L log2_opacity, scalar_of<L> log2_alpha_min) noexcept {
+  return log2_opacity - L(log2_alpha_min);
+}
+
 /// Colour of a projected Gaussian, >= 0. In the set's color space until ConvertSplatColors converts it
 /// to the space of the frame.
 template <class S>
