@@ -31,6 +31,18 @@ struct TileRange {
   GSNAV_HD bool exceeds(int n) const noexcept { return x1 - x0 >= n || y1 - y0 >= n; }
 };
 
+/// Columns of tiles, inclusive at both ends, that contain the pixels of a strip. The strip has some.
+/// `tile_of` is that of TileRange.
+template <class T>
+struct TileColumns {
+  T first, last;
+
+  template <class L, class F>
+  GSNAV_HD static TileColumns of(const PixelColumns<L>& pixels, const F& tile_of) noexcept {
+    return {tile_of(pixels.first), tile_of(pixels.end - L(scalar_of<L>(1)))};
+  }
+};
+
 /// Division of an image into square tiles.
 struct TileGrid {
   int width = 0, height = 0;  ///< image, pixels
@@ -100,14 +112,14 @@ GSNAV_HD void for_each_tile_row(const TileGrid& grid, const SplatGeometry<S>& g,
   const PixelBox<S> box = PixelBox<S>::of(b);
   const FootprintStrips<S> footprint(g, log2_alpha_min, box);
   for (int ty = tiles.y0; ty <= tiles.y1; ++ty) {
-    int first = tiles.x0, last = tiles.x1;
+    TileColumns<int> reached{tiles.x0, tiles.x1};
     if (elliptic) {
-      const PixelColumns<S> columns = footprint.pixels(box, S(ty * ts), S((ty + 1) * ts));
-      if (!columns.any) continue;
-      first = static_cast<int>(columns.first) >> shift;
-      last = (static_cast<int>(columns.end) - 1) >> shift;
+      const PixelColumns<S> pixels = footprint.pixels(box, S(ty * ts), S((ty + 1) * ts));
+      if (!pixels.any) continue;
+      reached = TileColumns<int>::of(
+          pixels, [shift](S pixel) GSNAV_INLINED { return static_cast<int>(pixel) >> shift; });
     }
-    f(ty, first, last);
+    f(ty, reached.first, reached.last);
   }
 }
 

@@ -80,10 +80,11 @@ GSNAV_HD SpanWords find_tiles(const TileGrid& grid, const SplatGeometry<F>& g, f
     for (int r = 0; r < TileSpans::kRows; ++r) {
       if ((lane_bits(F(static_cast<float>(r)) < rows) & wanted) == 0) break;
       const F next = top + size;
-      const PixelColumns<F> columns = footprint.pixels(box, top, next);
-      const auto has_any = columns.any && (F(static_cast<float>(r)) < rows);
-      begin = select(has_any, tile_of(columns.first) - tiles.x0, zero);
-      end = select(has_any, (tile_of(columns.end - one) - tiles.x0) + one, zero);
+      const PixelColumns<F> pixels = footprint.pixels(box, top, next);
+      const TileColumns<F> reached = TileColumns<F>::of(pixels, tile_of);
+      const auto has_any = pixels.any && (F(static_cast<float>(r)) < rows);
+      begin = select(has_any, reached.first - tiles.x0, zero);
+      end = select(has_any, (reached.last - tiles.x0) + one, zero);
       if (r == 0) {
         begin = select(single, zero, begin);
         end = select(single, one, end);
