@@ -33,10 +33,12 @@ struct ViewedSet {
   GSNAV_HD SeenRows seen_rows(std::size_t id) const noexcept {
     return selection.seen_rows(gaussians.chunk_count(), id);
   }
-  /// Rank of a row, which decides between equal keys: that of the set's first Gaussian plus the row's
-  /// id.
+  /// Rank of the Gaussian with a row id, which decides between equal keys: that of the set's first
+  /// Gaussian plus the id.
+  GSNAV_HD std::uint32_t rank_of_id(std::uint32_t id) const noexcept { return first_rank + id; }
+  /// Rank of a row.
   GSNAV_HD std::uint32_t rank_of(std::uint32_t row) const noexcept {
-    return first_rank + (gaussians.row_ids.empty() ? row : gaussians.row_ids[row]);
+    return rank_of_id(gaussians.row_ids.empty() ? row : gaussians.row_ids[row]);
   }
 };
 

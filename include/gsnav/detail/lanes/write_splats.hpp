@@ -137,7 +137,7 @@ GSNAV_HD void store_ranks(const ViewedSet<float>& args, std::size_t first, std::
   std::uint32_t ranks[kWidth];
   if (first + n <= size && !args.gaussians.row_ids.empty()) {  // ids that follow each other in memory
     std::memcpy(ranks, args.gaussians.row_ids.data + first, sizeof ranks);
-    for (std::size_t l = 0; l < n; ++l) ranks[l] += args.first_rank;
+    for (std::size_t l = 0; l < n; ++l) ranks[l] = args.rank_of_id(ranks[l]);
   } else {
     for (std::size_t l = 0; l < n; ++l)
       ranks[l] = args.rank_of(static_cast<std::uint32_t>(first + l < size ? first + l : size - 1));
