@@ -118,8 +118,10 @@ FAULTS = [
     fault("return_alpha_ignored", "pixel_expected_depth", RETURNED, "const auto returned = alpha > zero;",
           DEPTH_TEST, "N48_depth_no_return"),
     fault("behind_ends_the_chunk", "ProjectChunk",
-          "        if (seen.has(i - begin) && project_gaussian(args, out, base + written, i)) ++written;\n",
-          "        if (!project_gaussian(args, out, base + written, i)) break;\n        ++written;\n",
+          "    for_each_candidate(args, c, [&](std::size_t i) GSNAV_INLINED {\n"
+          "      if (project_gaussian(args, out, base + written, i)) ++written;\n",
+          "    bool gone = false;\n    for_each_candidate(args, c, [&](std::size_t i) GSNAV_INLINED {\n"
+          "      gone = gone || !project_gaussian(args, out, base + written, i);\n      if (!gone) ++written;\n",
           CUT_TEST, "N65_cull_invariance"),
     fault("behind_ends_the_chunk_of_lanes", "project_chunk",
           "PackOfRows{shape, packed, i, count}, place, survivors);\n",

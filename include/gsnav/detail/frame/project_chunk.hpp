@@ -119,6 +119,24 @@ GSNAV_HD std::uint32_t candidate_parts(const ViewedSet<S>& args, std::size_t c) 
   return in_view;
 }
 
+/// Calls f(row) for the rows of chunk c that may be visible, in order.
+template <class S, class F>
+GSNAV_HD void for_each_candidate(const ViewedSet<S>& args, std::size_t c, const F& f) noexcept {
+  const std::size_t id = args.selection.chunk_id(c), size = args.gaussians.size();
+  const std::size_t begin = id * kProjectChunk;
+  const std::size_t end = begin + kProjectChunk < size ? begin + kProjectChunk : size;
+  std::uint32_t parts = candidate_parts(args, c);
+  if (parts == 0) return;
+  const SeenRows seen = args.seen_rows(id);
+  for (std::size_t first = begin; first < end; first += kChunkPart, parts >>= 1) {
+    if ((parts & 1u) == 0) continue;
+    const std::size_t last = first + kChunkPart < end ? first + kChunkPart : end;
+    for (std::size_t i = first; i < last; ++i) {
+      if (seen.has(i - begin)) f(i);
+    }
+  }
+}
+
 /// Unit vector along `delta` (mean - camera, asset frame): the direction at which SH is evaluated.
 template <class L>
 GSNAV_HD Vec3<L> view_direction(const Vec3<L>& delta) noexcept {
@@ -230,23 +248,11 @@ struct ProjectChunk {
   ProjectOutputs<S> out;
 
   GSNAV_HD void operator()(std::size_t c) const noexcept {
-    const std::size_t id = args.selection.chunk_id(c), size = args.gaussians.size();
-    const std::size_t begin = id * kProjectChunk;
-    const std::size_t end = begin + kProjectChunk < size ? begin + kProjectChunk : size;
     const std::size_t base = (args.first_chunk + c) * kProjectChunk;
-    std::uint32_t written = 0, parts = candidate_parts(args, c);
-    if (parts == 0) {
-      out.counts[args.first_chunk + c] = 0;
-      return;
-    }
-    const SeenRows seen = args.seen_rows(id);
-    for (std::size_t first = begin; first < end; first += kChunkPart, parts >>= 1) {
-      if ((parts & 1u) == 0) continue;
-      const std::size_t last = first + kChunkPart < end ? first + kChunkPart : end;
-      for (std::size_t i = first; i < last; ++i) {
-        if (seen.has(i - begin) && project_gaussian(args, out, base + written, i)) ++written;
-      }
-    }
+    std::uint32_t written = 0;
+    for_each_candidate(args, c, [&](std::size_t i) GSNAV_INLINED {
+      if (project_gaussian(args, out, base + written, i)) ++written;
+    });
     out.counts[args.first_chunk + c] = written;
   }
 };

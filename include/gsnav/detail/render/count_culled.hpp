@@ -54,20 +54,15 @@ requires is_host_backend<B> CullCounts count_culled(B& backend, std::span<const 
     };
     std::vector<Count> counts(args.chunk_count());
     backend.parallel_for(counts.size(), [&](std::size_t c) {
-      const std::size_t id = set.selection.chunk_id(c), first = id * kProjectChunk;
-      const std::uint32_t parts = candidate_parts(args, c);
-      if (parts == 0) return;
-      const SeenRows seen = args.seen_rows(id);
-      for (std::size_t i = first; i < first + kProjectChunk && i < gs.size(); ++i) {
-        if ((parts >> ((i - first) / kChunkPart) & 1u) == 0 || !seen.has(i - first)) continue;
+      for_each_candidate(args, c, [&](std::size_t i) {
         ++counts[c].touched;
         RowSplat<float> row;
-        if (!project_row(args, false, i, row)) continue;
+        if (!project_row(args, false, i, row)) return;
         bool any = false;
         for_each_tile(grid, row.splat.geometry, row.splat.bounds, exponent_min,
                       config.response == Response::ewa, [&any](std::size_t) { any = true; });
         counts[c].emitting += any ? 1 : 0;
-      }
+      });
     });
     static_cast<void>(backend.synchronize());
     out.rows += gs.size();
