@@ -91,31 +91,15 @@ GSNAV_HD BlendedRows blend_every_fourth(const float* joints, const std::uint16_t
 #endif
 }
 
-/// Transposes the 4 x 4 blocks in the 128-bit parts of four packs.
+/// Four elements of the matrices of a pack, one element per pack. The arguments are one of the parts of
+/// four BlendedRows.
 struct Columns {
   F c[4];
 
-  GSNAV_HD Columns(F::vector a, F::vector b, F::vector c_, F::vector d) noexcept {
-    constexpr int w = kWidth;
-#if GSNAV_PACK_WIDTH == 16
-#define GSNAV_PARTS(x, y, i, j, k, l)                                                               \
-  __builtin_shufflevector(x, y, i, j, k, l, i + 4, j + 4, k + 4, l + 4, i + 8, j + 8, k + 8, l + 8, \
-                          i + 12, j + 12, k + 12, l + 12)
-#elif GSNAV_PACK_WIDTH == 8
-#define GSNAV_PARTS(x, y, i, j, k, l) \
-  __builtin_shufflevector(x, y, i, j, k, l, i + 4, j + 4, k + 4, l + 4)
-#else
-#define GSNAV_PARTS(x, y, i, j, k, l) __builtin_shufflevector(x, y, i, j, k, l)
-#endif
-    const auto ab_low = GSNAV_PARTS(a, b, 0, w, 1, w + 1),
-               ab_high = GSNAV_PARTS(a, b, 2, w + 2, 3, w + 3);
-    const auto cd_low = GSNAV_PARTS(c_, d, 0, w, 1, w + 1),
-               cd_high = GSNAV_PARTS(c_, d, 2, w + 2, 3, w + 3);
-    c[0].v = GSNAV_PARTS(ab_low, cd_low, 0, 1, w, w + 1);
-    c[1].v = GSNAV_PARTS(ab_low, cd_low, 2, 3, w + 2, w + 3);
-    c[2].v = GSNAV_PARTS(ab_high, cd_high, 0, 1, w, w + 1);
-    c[3].v = GSNAV_PARTS(ab_high, cd_high, 2, 3, w + 2, w + 3);
-#undef GSNAV_PARTS
+  GSNAV_HD Columns(F::vector m0, F::vector m1, F::vector m2, F::vector m3) noexcept {
+    F::vector r[4] = {m0, m1, m2, m3};
+    gsnav::detail::transpose_quarters(r);
+    for (int k = 0; k < 4; ++k) c[k].v = r[k];
   }
 };
 

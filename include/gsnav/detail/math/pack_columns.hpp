@@ -9,6 +9,18 @@
 namespace gsnav {
 
 namespace detail {
+/// Transposes the 4 x 4 matrix in 4 registers.
+GSNAV_HD void transpose_quarters(PackTypes<4>::f* r) noexcept {
+  using V = PackTypes<4>::f;
+  const V low01 = __builtin_shufflevector(r[0], r[1], 0, 4, 1, 5);
+  const V high01 = __builtin_shufflevector(r[0], r[1], 2, 6, 3, 7);
+  const V low23 = __builtin_shufflevector(r[2], r[3], 0, 4, 1, 5);
+  const V high23 = __builtin_shufflevector(r[2], r[3], 2, 6, 3, 7);
+  r[0] = __builtin_shufflevector(low01, low23, 0, 1, 4, 5);
+  r[1] = __builtin_shufflevector(low01, low23, 2, 3, 6, 7);
+  r[2] = __builtin_shufflevector(high01, high23, 0, 1, 4, 5);
+  r[3] = __builtin_shufflevector(high01, high23, 2, 3, 6, 7);
+}
 #if defined(__AVX512F__)
 /// Transposes the 4 x 4 matrices in the four quarters of 4 registers.
 GSNAV_HD void transpose_quarters(PackTypes<16>::f* r) noexcept {
