@@ -9,6 +9,7 @@
 #include "gsnav/detail/io/ply.hpp"
 #include "gsnav/detail/math/curves.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
+#include "gsnav/frame/rules.hpp"
 
 namespace gsnav::io {
 namespace {
@@ -48,7 +49,7 @@ float logit_of(float opacity) {
   const double p = opacity;
   float logit = static_cast<float>(std::log(p / (1.0 - p)));
   // Rounding must not move a Gaussian below the threshold at which loaders drop it.
-  constexpr float kVisible = 1.0f / 255.0f;
+  constexpr float kVisible = static_cast<float>(kAlphaMin);
   const auto back = [&logit] { return static_cast<float>(sigmoid(logit)); };
   while (opacity >= kVisible && back() < kVisible) logit = std::nextafter(logit, 0.0f);
   return logit;

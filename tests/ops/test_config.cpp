@@ -2,6 +2,7 @@
 // Impossible configurations are refused with the field's name.
 #include <doctest/doctest.h>
 
+#include <cmath>
 #include <limits>
 #include <new>
 #include <span>
@@ -45,6 +46,12 @@ class FullBackend : public SerialBackend {
 };
 
 }  // namespace
+
+TEST_CASE("the smallest alpha of the contract and its log2 are one number") {
+  CHECK(kLog2AlphaMin == std::log2(kAlphaMin));
+  CHECK(Quality{}.alpha_min == kAlphaMin);
+  CHECK(static_cast<float>(kAlphaMin) == 1.0f / 255.0f);
+}
 
 TEST_CASE("a renderer without memory returns an error that says for what") {
   const GaussianCloud cloud = random_cloud(1, {.count = 10});

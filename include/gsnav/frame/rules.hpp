@@ -9,6 +9,11 @@
 
 namespace gsnav {
 
+/// Smallest alpha that the image contract blends. Gaussians of a lower opacity are never drawn.
+inline constexpr double kAlphaMin = 1.0 / 255;
+/// log2 of kAlphaMin.
+inline constexpr double kLog2AlphaMin = -7.99435343685885793770;
+
 /// Images that a render can produce. Combine them with |. Images that are not requested are not
 /// computed.
 enum Output : unsigned {

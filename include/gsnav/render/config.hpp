@@ -26,7 +26,7 @@ struct Quality {
   Exponential exponential = Exponential::exact;
   /// Skip a Gaussian at a pixel where its alpha is lower. Range (0, 1); values below 2^-126 act as
   /// 2^-126.
-  double alpha_min = 1.0 / 255;
+  double alpha_min = kAlphaMin;
   double max_alpha = 0.99;  ///< upper limit of a Gaussian's alpha, in (0, 1]
   /// Stop blending a pixel once its transmittance is lower. Range [0, 1).
   double transmittance_min = 1e-4;

@@ -146,7 +146,7 @@ inline RowFate activate(const RawGaussian& raw, std::size_t rest, ActiveGaussian
   Quatd quat = raw.quat;
   if (!normalize(quat)) return RowFate::zero_quat;
   out.opacity = static_cast<float>(sigmoid(raw.opacity_logit));
-  if (out.opacity < 1.0f / 255.0f) return RowFate::transparent;
+  if (out.opacity < static_cast<float>(kAlphaMin)) return RowFate::transparent;
   out.clamped = false;
   for (int k = 0; k < 3; ++k) {
     const double s = raw.log_scales[k];

@@ -68,7 +68,7 @@ FAULTS = [
           ROWS, "N34_opacity_inf"),
     fault("opacity_nan_kept", "activate", FINITE, "  bool finite = is_finite(raw.mean);\n",
           ROWS, "N34_opacity_inf"),
-    fault("transparent_kept", "activate", "if (out.opacity < 1.0f / 255.0f) return",
+    fault("transparent_kept", "activate", "if (out.opacity < static_cast<float>(kAlphaMin)) return",
           "if (out.opacity < 0.0f) return", ROWS, "N34_opacity_inf"),
     fault("world_in_float", "id_of",
           "origin[k] = kOriginLattice * std::nearbyint(mean[k] / kOriginLattice);", "origin[k] = 0;",

@@ -9,6 +9,7 @@
 #include "gsnav/detail/frame/splat.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/image/mesh_layer.hpp"
+#include "gsnav/frame/rules.hpp"
 #include "gsnav/math/functions.hpp"
 
 namespace gsnav {
@@ -23,7 +24,7 @@ struct BlendRules {
   S transmittance_min{S(1e-4)};  ///< A pixel is closed by the Gaussian that makes its transmittance less
                                  ///< than this.
   S first_hit_tau{S(0.5)};
-  S log2_alpha_min{S(-7.9943534368588579)};  ///< log2 of the smallest alpha that is blended
+  S log2_alpha_min{S(kLog2AlphaMin)};  ///< log2 of the smallest alpha that is blended
   S return_alpha{S(0)};         ///< Expected depth is 0 (no return) unless alpha exceeds this.
   bool exclusive_stop = false;  ///< The Gaussian that closes a pixel is not blended (Compat).
   bool normalize_closed =

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 
 #include "gsnav/detail/image/pinhole.hpp"
@@ -48,7 +47,7 @@ struct ProjectionRules {
   SortOrder sort_order = SortOrder::z_depth;
   Response response = Response::ewa;
   Compat compat = Compat::none;
-  double log2_alpha_min = std::log2(1.0 / 255);
+  double log2_alpha_min = kLog2AlphaMin;
   int key_bits = 32;
 };
 

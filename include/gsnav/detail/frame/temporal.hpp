@@ -6,6 +6,7 @@
 #include "gsnav/core/view.hpp"
 #include "gsnav/detail/frame/set_rows.hpp"
 #include "gsnav/frame/gaussians.hpp"
+#include "gsnav/frame/rules.hpp"
 #include "gsnav/math/functions.hpp"
 
 namespace gsnav {
@@ -57,7 +58,7 @@ GSNAV_HD Vec3<S> temporal_state(const ShapeRows& base, const MotionRows& in, std
                                 S& opacity) noexcept {
   const S dt = static_cast<S>(t - static_cast<double>(in.times[i]));
   opacity = S(opacity_of(base, i)) * temporal_weight(dt, S(in.sigmas[i]));
-  if (!(opacity >= S(1.0 / 255))) {
+  if (!(opacity >= S(kAlphaMin))) {
     opacity = S(0);
     return {};
   }
