@@ -57,7 +57,7 @@ std::optional<Vec3d> sensor_ray(const SensorSpec& s, double u, double v) noexcep
     return Vec3d{std::cos(latitude) * std::sin(longitude), -std::sin(latitude),
                  std::cos(latitude) * std::cos(longitude)};
   }
-  const double f = 0.5 * width / std::tan(0.5 * s.hfov * std::numbers::pi / 180.0);
+  const double f = Camera::focal_of_hfov(width, s.hfov);
   const Vec3d d{(u - 0.5 * width) / f, (v - 0.5 * height) / f, 1.0};
   return normalized(d);
 }

@@ -32,12 +32,17 @@ struct Camera {
     return inverse(world_from_asset) * position();
   }
 
+  /// Focal length in pixels of an image that is `w` pixels wide, by its horizontal field of view in
+  /// degrees.
+  static double focal_of_hfov(double w, double hfov_degrees) noexcept {
+    return 0.5 * w / std::tan(hfov_degrees * std::numbers::pi / 360.0);
+  }
   /// Sets a w x h image with square pixels, a horizontal field of view in degrees and a centred
   /// principal point.
   Camera& set_hfov(int w, int h, double hfov_degrees) noexcept {
     width = w;
     height = h;
-    fx = fy = 0.5 * w / std::tan(hfov_degrees * std::numbers::pi / 360.0);
+    fx = fy = focal_of_hfov(w, hfov_degrees);
     cx = 0.5 * w;
     cy = 0.5 * h;
     return *this;
