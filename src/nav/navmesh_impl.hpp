@@ -93,7 +93,6 @@ struct NavMesh::Impl {
   /// The shortest path, relative to the mesh's origin. It has no points if there is no path.
   NavPath path(const detail::Site& start, const detail::Site& goal) const;
 
-  dtPolyRef ref_of(PolyId id) const noexcept { return refs[id]; }
   PolyId id_of(dtPolyRef ref) const noexcept {
     return first_poly[mesh->decodePolyIdTile(ref)] + mesh->decodePolyIdPoly(ref);
   }

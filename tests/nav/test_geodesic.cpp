@@ -40,8 +40,8 @@ double detour_length(const NavMesh& mesh, const dtNavMeshQuery* query, const Nav
   const dtQueryFilter filter;
   std::vector<dtPolyRef> refs(mesh.polygon_count() + 2);
   int count = 0, corners = 0;
-  if (query->findPath(impl.ref_of(a.poly), impl.ref_of(b.poly), from.data(), to.data(), &filter,
-                      refs.data(), &count, static_cast<int>(refs.size())) != DT_SUCCESS) {
+  if (query->findPath(impl.refs[a.poly], impl.refs[b.poly], from.data(), to.data(), &filter, refs.data(),
+                      &count, static_cast<int>(refs.size())) != DT_SUCCESS) {
     return kInfinity;
   }
   std::vector<float> straight(3 * refs.size());

@@ -35,7 +35,7 @@ double habitat_no_slide(const NavMesh& mesh, const dtNavMeshQuery& query, const 
   float at[3];
   dtPolyRef visited[256];
   int count = 0;
-  query.moveAlongSurface(impl.ref_of(start.poly), from.data(), to.data(), &filter, at, visited, &count,
+  query.moveAlongSurface(impl.refs[start.poly], from.data(), to.data(), &filter, at, visited, &count,
                          256);
   double best = -1;
   for (int i = 0; i < count; ++i) {
@@ -86,7 +86,7 @@ TEST_CASE("defect 1: without sliding a step stops at the first wall, which is wh
     float t = 0, normal[3];
     int count = 0;
     dtPolyRef path[256];
-    query->raycast(mesh.impl().ref_of(p.poly), from.data(), to.data(), &filter, &t, normal, path, &count,
+    query->raycast(mesh.impl().refs[p.poly], from.data(), to.data(), &filter, &t, normal, path, &count,
                    256);
     const double ray = min(static_cast<double>(t), 1.0);
     const SurfaceWalk w = mesh.walk(p, d, false);
@@ -117,7 +117,7 @@ TEST_CASE("defect 2: paths of more than 256 polygons are found") {
   const dtQueryFilter filter;
   dtPolyRef polys[256];
   int count = 0;
-  CHECK(query->findPath(mesh.impl().ref_of(a.poly), mesh.impl().ref_of(b.poly), from.data(), to.data(),
+  CHECK(query->findPath(mesh.impl().refs[a.poly], mesh.impl().refs[b.poly], from.data(), to.data(),
                         &filter, polys, &count, 256) != DT_SUCCESS);
 }
 
@@ -130,8 +130,8 @@ TEST_CASE("defect 3: distances are symmetric") {
     dtPolyRef polys[256];
     float corners[3 * 256];
     int count = 0, n = 0;
-    query->findPath(mesh.impl().ref_of(a.poly), mesh.impl().ref_of(b.poly), from.data(), to.data(),
-                    &filter, polys, &count, 256);
+    query->findPath(mesh.impl().refs[a.poly], mesh.impl().refs[b.poly], from.data(), to.data(), &filter,
+                    polys, &count, 256);
     query->findStraightPath(from.data(), to.data(), polys, count, corners, nullptr, nullptr, &n, 256);
     double sum = 0;
     for (int i = 1; i < n; ++i)

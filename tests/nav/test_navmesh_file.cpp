@@ -276,7 +276,7 @@ TEST_CASE("navmesh file: 64-bit references and many tiles") {
       REQUIRE(mesh.island_of(queue[i]) == mesh.island_of(first));
       const dtMeshTile* tile = nullptr;
       const dtPoly* poly = nullptr;
-      impl.mesh->getTileAndPolyByRefUnsafe(impl.ref_of(queue[i]), &tile, &poly);
+      impl.mesh->getTileAndPolyByRefUnsafe(impl.refs[queue[i]], &tile, &poly);
       for (unsigned l = poly->firstLink; l != DT_NULL_LINK; l = tile->links[l].next) {
         const PolyId next = impl.id_of(tile->links[l].ref);
         if (!reached[next]) queue.push_back(next);

@@ -60,7 +60,7 @@ std::string file_of(const NavMesh& mesh) {
 }
 
 std::uint32_t tile_of(const NavMesh& mesh, PolyId id) {
-  return mesh.impl().mesh->decodePolyIdTile(mesh.impl().ref_of(id));
+  return mesh.impl().mesh->decodePolyIdTile(mesh.impl().refs[id]);
 }
 
 /// Edges that lead into another tile, and the greatest difference in height of the two polygons along
