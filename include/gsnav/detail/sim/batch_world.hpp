@@ -102,10 +102,6 @@ class BatchWorld {
   const World& world(std::size_t e) const noexcept { return *environments_[e].world; }
   /// Index of the scene that environment e is in.
   std::size_t scene_of(std::size_t e) const noexcept { return environments_[e].scene; }
-  /// Number of intervals whose bodies are cached.
-  std::size_t held_bodies() const noexcept { return bodies_.size(); }
-  /// Sets the largest number of intervals that stay cached after a step.
-  void keep_bodies(std::size_t most) noexcept { most_bodies_ = most; }
   /// True if the last call stepped or reset environment e.
   bool moved(std::size_t e) const noexcept { return environments_[e].moved; }
   /// Results of the last call.
@@ -128,6 +124,7 @@ class BatchWorld {
               const std::function<Status()>& before_reset = {});
 
  private:
+  friend struct BatchWorldCache;  // Tests read and limit the number of cached intervals.
   struct Environment {
     std::optional<World> world;
     std::size_t scene = 0, episodes = 0;
@@ -155,7 +152,7 @@ class BatchWorld {
   EpisodeSource next_episode_;
   std::vector<Environment> environments_;
   bool begun_ = false;
-  std::size_t most_bodies_ = 2048;
+  std::size_t most_bodies_ = 2048;  // Largest number of intervals that stay cached after a step.
 
   BodyCache bodies_;
   struct Missing {
