@@ -178,9 +178,9 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
   const Projected<F>& p = pack.projected.splat;
   const PixelBox<F> box = gsnav::detail::pixel_box(camera, p);
   // Few rows are too inexact in float. Each of them is projected alone.
-  const std::uint32_t alone = lane_bits(gsnav::detail::needs_double(camera, p)) & bits;
-  bits &= lane_bits(box.any_pixel()) | alone;
-  if (!out.open.empty()) bits &= detail::reaching_open(out.open, box, bits) | alone;
+  const std::uint32_t needs_double = lane_bits(gsnav::detail::needs_double(camera, p)) & bits;
+  bits &= lane_bits(box.any_pixel()) | needs_double;
+  if (!out.open.empty()) bits &= detail::reaching_open(out.open, box, bits) | needs_double;
   if (bits == 0) return 0;
   const bool color = !out.colors.empty(), depth = !out.depths.empty();
   if (color) {
@@ -201,7 +201,7 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
   {
     detail::SpanWords spans;
     if (!out.spans.empty()) {
-      spans = detail::find_tiles(out.grid, g, camera.log2_alpha_min, box, bits & ~alone);
+      spans = detail::find_tiles(out.grid, g, camera.log2_alpha_min, box, bits & ~needs_double);
     }
     detail::store_bounds(box, spans, bounds);
     std::memcpy(words, &spans.tile_word, sizeof words);
@@ -223,7 +223,7 @@ GSNAV_STAGE std::uint32_t write_splats(const ViewedSet<float>& args, const Proje
   std::uint32_t written = 0, kept = 0;
   for (std::uint32_t left = bits; left != 0; left &= left - 1) {
     const std::size_t l = static_cast<std::size_t>(std::countr_zero(left)), at = slot + written;
-    if ((alone >> l & 1u) != 0) {
+    if ((needs_double >> l & 1u) != 0) {
       if (!detail::project_alone(args, out, at, rows[l])) continue;
       words[l] = 0;
     } else {
