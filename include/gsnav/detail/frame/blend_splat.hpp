@@ -25,8 +25,8 @@ struct BlendRules {
                                  ///< than this.
   S first_hit_tau{S(0.5)};
   S log2_alpha_min{S(kLog2AlphaMin)};  ///< log2 of the smallest alpha that is blended
-  S return_alpha{S(0)};         ///< Expected depth is 0 (no return) unless alpha exceeds this.
-  bool exclusive_stop = false;  ///< The Gaussian that closes a pixel is not blended (Compat).
+  S return_alpha{S(0)};                ///< Expected depth is 0 (no return) unless alpha exceeds this.
+  bool exclusive_stop = false;         ///< The Gaussian that closes a pixel is not blended (Compat).
   bool normalize_closed =
       false;  ///< A closed pixel counts as opaque: its sums are divided by its alpha.
 };
