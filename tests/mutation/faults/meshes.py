@@ -40,6 +40,6 @@ FAULTS = [
           CASES,
           "N49_mesh_between_layers"),
     fault("mesh_cull_by_centre", "behind", "d.z - d.reach > depth", "d.z > depth", CASES, "N53_tile_max_mesh_cull"),
-    fault("mesh_chunk_without_reach", "nearest", "* (1 - 1e-6) - reach * (1 + 1e-5);",
+    fault("mesh_chunk_without_reach", "nearest_reach", "* (1 - 1e-6) - reach * (1 + 1e-5);",
           "+ reach;", CASES, "N53_tile_max_mesh_cull of chunks, before they are projected"),
 ]

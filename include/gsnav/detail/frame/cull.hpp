@@ -131,4 +131,14 @@ GSNAV_HD ChunkExtent chunk_extent(const ProjectionCamera<double>& camera,
   return e;
 }
 
+/// Lower bound of the depths at which Gaussians of a chunk have an effect, metres: none reaches nearer
+/// than the largest and most opaque one would.
+/// @param e chunk_extent of the chunk
+GSNAV_HD double nearest_reach(const ProjectionCamera<double>& camera, const ChunkBounds& b,
+                              const ChunkExtent& e) noexcept {
+  const double radius2 = footprint_radius2(detail::ChunkInView(camera, b).s_max() + 1e-5);
+  const double reach = sqrt(max(radius2, 0.0)) * static_cast<double>(b.scale_max) * camera.scale;
+  return static_cast<double>(e.nearest) * (1 - 1e-6) - reach * (1 + 1e-5);
+}
+
 }  // namespace gsnav

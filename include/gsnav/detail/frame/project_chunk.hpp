@@ -9,6 +9,7 @@
 #include "gsnav/detail/frame/project_row.hpp"
 #include "gsnav/detail/frame/set_rows.hpp"
 #include "gsnav/detail/frame/splat.hpp"
+#include "gsnav/detail/frame/squares.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/frame/gaussians.hpp"
 #include "gsnav/frame/sh.hpp"

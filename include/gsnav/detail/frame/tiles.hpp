@@ -75,26 +75,15 @@ struct TileGrid {
     const int shift = tile_shift();
     return TileRange<int>::of(box, [shift](int pixel) GSNAV_INLINED { return pixel >> shift; });
   }
-  bool operator==(const TileGrid&) const = default;
-};
-
-/// Squares of pixels that still accept splats, as a summed-area table for queries of rectangles.
-struct OpenSquares {
-  static constexpr int kPerSide = 8;  ///< squares per side of a tile
-  View<const std::uint32_t>
-      sums;  ///< [rows + 1][columns + 1], number of open squares above and left. Empty: all are open.
-  std::size_t stride = 0;  ///< columns + 1
-  int size = 0;            ///< pixels per side of a square
-
-  /// Pixels per side of a square: 1, 2 or 4.
-  GSNAV_HD static constexpr int size_in(int tile_size) noexcept { return tile_size / kPerSide; }
-  GSNAV_HD bool empty() const noexcept { return sums.empty(); }
-  /// True if some square in columns [x0, x1) and rows [y0, y1) is open.
-  GSNAV_HD bool any(std::size_t x0, std::size_t y0, std::size_t x1, std::size_t y1) const noexcept {
-    const std::uint32_t* const top = sums.data + y0 * stride;
-    const std::uint32_t* const bottom = sums.data + y1 * stride;
-    return bottom[x1] - bottom[x0] != top[x1] - top[x0];
+  /// Tiles that bounds in pixels (ChunkExtent) reach, or the nearest ones if they lie outside the image.
+  template <class Extent>
+  GSNAV_HD TileRange<int> tiles_near(const Extent& e) const noexcept {
+    const auto tile = [this](double pixel, int tiles) GSNAV_INLINED {
+      return static_cast<int>(clamp(pixel / tile_size, 0.0, static_cast<double>(tiles - 1)));
+    };
+    return {tile(e.x0, columns), tile(e.y0, rows), tile(e.x1, columns), tile(e.y1, rows)};
   }
+  bool operator==(const TileGrid&) const = default;
 };
 
 /// Calls f(row, first, last), columns inclusive, for each row of tiles that a splat may touch, in order.

@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "gsnav/detail/frame/composite.hpp"
+#include "gsnav/detail/frame/squares.hpp"
 #include "gsnav/detail/lanes/block_lists.hpp"
 #include "gsnav/detail/lanes/write_tile.hpp"
 

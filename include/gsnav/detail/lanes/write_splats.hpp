@@ -9,6 +9,7 @@
 
 #include "gsnav/detail/frame/footprint.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
+#include "gsnav/detail/frame/squares.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/lanes/color.hpp"
 #include "gsnav/detail/lanes/isa.hpp"

@@ -16,9 +16,7 @@ namespace gsnav {
 namespace detail {
 
 /// True if a mesh hides every Gaussian of a chunk at every pixel that it may reach. Arrays are in host
-/// memory. The test is conservative: it is never true if some Gaussian of the chunk is visible. The
-/// chunk's bounds are those of chunk_extent, and no Gaussian reaches nearer than the largest and most
-/// opaque one would.
+/// memory. The test is conservative: it is never true if some Gaussian of the chunk is visible.
 inline bool mesh_hides_chunk(const ViewedSet<float>& args, const TileGrid& grid,
                              const View<const float>& tile_far, std::size_t c) noexcept {
   const ProjectionCamera<double>& camera = args.camera64;
@@ -26,19 +24,13 @@ inline bool mesh_hides_chunk(const ViewedSet<float>& args, const TileGrid& grid,
   if (bounds.empty() || camera.response != Response::ewa || camera.compat != Compat::none) return false;
   const ChunkBounds& chunk = bounds[args.selection.chunk_id(c)];
   const ChunkExtent e = chunk_extent(camera, chunk);
-  const double radius2 = footprint_radius2(ChunkInView(camera, chunk).s_max() + 1e-5);
-  const double reach = sqrt(max(radius2, 0.0)) * static_cast<double>(chunk.scale_max) * camera.scale;
-  const double nearest = static_cast<double>(e.nearest) * (1 - 1e-6) - reach * (1 + 1e-5);
-  const auto tile = [&grid](double pixel, int tiles) {
-    return static_cast<int>(clamp(pixel / grid.tile_size, 0.0, static_cast<double>(tiles - 1)));
-  };
   if (!(e.x0 <= e.x1 && e.y0 <= e.y1)) return false;  // bounds that are not finite tell us nothing
-  const int x0 = tile(e.x0, grid.columns), x1 = tile(e.x1, grid.columns);
-  const int y0 = tile(e.y0, grid.rows), y1 = tile(e.y1, grid.rows);
-  for (int y = y0; y <= y1; ++y) {
+  const double nearest = nearest_reach(camera, chunk, e);
+  const TileRange<int> tiles = grid.tiles_near(e);
+  for (int y = tiles.y0; y <= tiles.y1; ++y) {
     const float* const row =
         tile_far.data + static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.columns);
-    for (int x = x0; x <= x1; ++x) {
+    for (int x = tiles.x0; x <= tiles.x1; ++x) {
       if (!(nearest > static_cast<double>(row[x]))) return false;
     }
   }

@@ -12,6 +12,7 @@
 #include "gsnav/core/view.hpp"
 #include "gsnav/detail/frame/cull.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
+#include "gsnav/detail/frame/squares.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/render/order_visible.hpp"
 #include "gsnav/image/camera.hpp"
@@ -94,7 +95,8 @@ class DepthSlices {
     for (std::size_t c = 0; c < args.chunk_count(); ++c) {
       const Place& place = chunks_[args.first_chunk + c];
       if (place.bucket < begin || place.bucket >= end || !place.candidate()) continue;
-      if (!open.empty() && !open.any(place.x0, place.y0, place.x1, place.y1)) continue;
+      const SquareRange& at = place.squares;
+      if (!open.empty() && !open.any(at.x0, at.y0, at.x1, at.y1)) continue;
       list_.push_back(static_cast<std::uint32_t>(c));
     }
     return {list_.data(), list_.size()};
@@ -141,46 +143,35 @@ class DepthSlices {
   /// Share of the Gaussians in the first slice of n: kFirst, or kFirstOfMany / n if that is less.
   static constexpr double kFirst = 0.35, kFirstOfMany = 2.4;
 
-  /// Bucket of a chunk's nearest key, and the half-open range of squares that it may reach.
+  /// Bucket of a chunk's nearest key, and the squares that it may reach.
   struct Place {
     std::uint16_t bucket = 0;
-    std::uint16_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
-    bool candidate() const noexcept { return x0 < x1; }
+    SquareRange squares;
+    bool candidate() const noexcept { return !squares.empty(); }
   };
 
   std::uint32_t key_of_bucket(std::size_t bucket) const noexcept {
     return base_ + (static_cast<std::uint32_t>(bucket) << kBucketShift);
   }
+  /// Bucket of a positive key.
+  std::uint16_t bucket_of(float key) const noexcept {
+    const std::uint32_t bits = bits_of(key);
+    const std::size_t bucket = bits > base_ ? (bits - base_) >> kBucketShift : 0;
+    return static_cast<std::uint16_t>(std::min(bucket, kBuckets - 1));
+  }
   Place place_of(const ViewedSet<float>& args, std::size_t c) const noexcept {
-    const int side = square_, width = args.camera.width, height = args.camera.height;
-    const auto squares = [side](int size) {
-      return static_cast<std::uint16_t>((size + side - 1) / side);
-    };
-    const std::uint16_t columns = squares(width), rows = squares(height);
+    const int width = args.camera.width, height = args.camera.height;
+    const Place anywhere{0, SquareRange::all(width, height, square_)};
     const View<const ChunkBounds> bounds = args.gaussians.chunk_bounds;
     const std::size_t id = args.selection.chunk_id(c);
     if (!args.selection.may_be_seen(id)) return {};
-    if (bounds.empty()) return {0, 0, 0, columns, rows};
-    const ChunkBounds& chunk = bounds[id];
-    if (!may_be_visible(args.camera64, chunk)) return {};
-    const ChunkExtent e = chunk_extent(args.camera64, chunk);
+    if (bounds.empty()) return anywhere;
+    if (!may_be_visible(args.camera64, bounds[id])) return {};
+    const ChunkExtent e = chunk_extent(args.camera64, bounds[id]);
+    const SquareRange reached = SquareRange::of(e, width, height, square_);
     // Bounds that are not finite tell us nothing: treat the chunk as nearest and as covering the image.
-    const auto begin = [side](double pixel, int size) {
-      return static_cast<std::uint16_t>((pixel > 0 ? std::min(pixel, static_cast<double>(size)) : 0.0) /
-                                        side);
-    };
-    const auto end = [&squares, side](double pixel, int size) {
-      return pixel < size ? static_cast<std::uint16_t>((pixel > 0 ? pixel : 0.0) / side + 1)
-                          : squares(size);
-    };
-    Place place{0, begin(e.x0, width), begin(e.y0, height), end(e.x1, width), end(e.y1, height)};
-    if (place.x0 >= place.x1 || place.y0 >= place.y1) return {0, 0, 0, columns, rows};
-    if (e.nearest > 0) {
-      const std::uint32_t key = bits_of(e.nearest);
-      const std::size_t bucket = key > base_ ? (key - base_) >> kBucketShift : 0;
-      place.bucket = static_cast<std::uint16_t>(std::min(bucket, kBuckets - 1));
-    }
-    return place;
+    if (reached.empty()) return anywhere;
+    return {e.nearest > 0 ? bucket_of(e.nearest) : std::uint16_t{0}, reached};
   }
 
   std::vector<Place> chunks_;
