@@ -9,13 +9,13 @@
 #include <utility>
 
 #include "gsnav/detail/scene/lod_greedy.hpp"
+#include "gsnav/detail/scene/lod_settings.hpp"
 
 namespace gsnav {
 namespace {
 
 constexpr std::size_t kLeast = 100;  // Gaussians of the coarsest level
 constexpr std::size_t kBlock = 256;  // Gaussians that are merged at once
-constexpr int kNeighbours = 8;       // as LodSettings
 
 /// The Gaussians of one level.
 class LevelOfBody {
@@ -50,12 +50,9 @@ class LevelOfBody {
       std::vector<std::uint32_t> part = parts_[j];
       merge(part.begin(), part.end(), out, out.parts_[j]);
     }
-    double squares = 0, mass = 0;
-    for (const LodGaussian& g : out.shapes_) {
-      squares += g.mass * g.spread;
-      mass += g.mass;
-    }
-    if (mass > 0) out.error_ = std::max(error_, static_cast<float>(std::sqrt(squares / mass)));
+    LodDistance moved;
+    for (const LodGaussian& g : out.shapes_) moved.add(g.mass, g.spread);
+    out.error_ = std::max(error_, static_cast<float>(moved.size()));
     return out;
   }
 
@@ -126,7 +123,7 @@ class LevelOfBody {
                    std::vector<std::uint32_t>& part) const {
     std::vector<LodGaussian> shapes;
     for (const std::uint32_t r : rows) shapes.push_back(shapes_[r]);
-    detail::GreedyMerge merge(kNeighbours);
+    detail::GreedyMerge merge(LodSettings{}.neighbours);
     merge.run(shapes, (rows.size() + 1) / 2);
     const std::size_t first = out.size();
     std::vector<double> masses(merge.size());
@@ -144,7 +141,7 @@ class LevelOfBody {
       out.shapes_.push_back(merge.left(g));
       // No Gaussian takes more than all light, so its area grows instead.
       LodGaussian& shape = out.shapes_.back();
-      const double opacity = shape.mass / std::max(lod_area(shape.covariance), 1e-30);
+      const double opacity = lod_opacity(shape);
       if (opacity > 1) shape.covariance.add(Sym3(shape.covariance), opacity - 1);
     }
   }

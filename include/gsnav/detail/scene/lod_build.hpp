@@ -133,7 +133,7 @@ class LodBuilder {
       mass[to] += r.mass;
       if (heaviest[to] == rows.size() || r.mass > rows[heaviest[to]].mass) heaviest[to] = i;
     }
-    double squares = 0, total = 0;
+    LodDistance moved;
     for (std::size_t g = 0; g < n; ++g) {
       const std::size_t row = first + g;
       const Row& like = rows[heaviest[g]];
@@ -143,12 +143,11 @@ class LodBuilder {
       for (std::size_t k = 0; k < rest_; ++k) {
         m.shN[rest_ * row + k] = static_cast<float>(sh[g * (3 + rest_) + 3 + k] / mass[g]);
       }
-      squares += merge.left(g).mass * merge.left(g).spread;
-      total += merge.left(g).mass;
+      moved.add(merge.left(g).mass, merge.left(g).spread);
     }
     for (std::size_t row = first + n; row < first + kProjectChunk; ++row)
       pad(row, n == 0 ? row : first + n - 1);
-    if (total > 0) node.error = std::max(node.error, static_cast<float>(std::sqrt(squares / total)));
+    node.error = std::max(node.error, static_cast<float>(moved.size()));
     ChunkBounds& own = m.chunk_bounds[chunk];
     Aabb<double> box;
     for (std::size_t row = first; row < first + kProjectChunk; ++row) {

@@ -45,7 +45,7 @@ inline void set_lod_gaussian(GaussianCloud& cloud, std::size_t i, const LodGauss
     cloud.means[static_cast<std::size_t>(k)][i] = static_cast<float>(g.mean[k] - origin[k]);
   }
   const Svd3<double> axes = svd(g.covariance.matrix());
-  double opacity = g.mass / std::max(lod_area(g.covariance), 1e-30), grow = 1;
+  double opacity = lod_opacity(g), grow = 1;
   if (opacity > 1) {
     grow = std::sqrt(opacity);
     opacity = 1;

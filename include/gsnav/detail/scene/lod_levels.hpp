@@ -135,13 +135,12 @@ inline double distance_to_level(const GaussianCloud& fine, const BoxRows& in_fin
   std::vector<Vec3d> points(in_coarse.count);
   for (std::size_t i = 0; i < points.size(); ++i) points[i] = coarse.mean(in_coarse.row(i));
   const PointTree tree(points);
-  double squares = 0, mass = 0;
+  LodDistance moved;
   for (std::size_t i = 0; i < in_fine.count; ++i) {
     const LodGaussian g = lod_gaussian(fine, in_fine.row(i), 0);
-    squares += g.mass * tree.nearest_squared(g.mean);
-    mass += g.mass;
+    moved.add(g.mass, tree.nearest_squared(g.mean));
   }
-  return mass > 0 ? std::sqrt(squares / mass) : 0;
+  return moved.size();
 }
 
 inline Status bad_level(std::size_t level, const std::string& what) {

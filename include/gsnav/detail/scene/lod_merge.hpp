@@ -55,6 +55,21 @@ struct LodGaussian {
 /// covariance's principal minors. It is s1 s2 for a disc (its face) and sqrt(3) s^2 for a ball. For
 /// Gaussians of one shape it is proportional to the projected area.
 inline double lod_area(const Sym3& c) noexcept { return std::sqrt(std::max(c.minors(), 0.0)); }
+/// Opacity that a Gaussian of this mass and shape has. It exceeds 1 if the area is less than the mass.
+inline double lod_opacity(const LodGaussian& g) noexcept {
+  return g.mass / std::max(lod_area(g.covariance), 1e-30);
+}
+
+/// Root of the mean of squared distances, weighted by mass.
+struct LodDistance {
+  double squares = 0, mass = 0;
+  void add(double weight, double squared) noexcept {
+    squares += weight * squared;
+    mass += weight;
+  }
+  /// Metres; 0 without mass.
+  double size() const noexcept { return mass > 0 ? std::sqrt(squares / mass) : 0; }
+};
 
 /// Merges two Gaussians by moment matching: the result has the sum of their masses, and the mean and
 /// covariance of both together, weighted by mass. To second order in their distance it makes the same
@@ -102,9 +117,7 @@ inline double lod_overlap(const LodGaussian& a, const LodGaussian& b, const Vec3
   const Vec3d d = a.mean - b.mean;
   const double x = dot(u, d), y = dot(v, d);
   const double q = (sum.yy * x * x - 2 * sum.xy * x * y + sum.xx * y * y) / det;
-  const auto opacity = [](const LodGaussian& g) {
-    return std::min(1.0, g.mass / std::max(lod_area(g.covariance), 1e-30));
-  };
+  const auto opacity = [](const LodGaussian& g) { return std::min(1.0, lod_opacity(g)); };
   return opacity(a) * opacity(b) * std::sqrt(fa.det() * fb.det() / det) * std::exp(-0.5 * q);
 }
 
