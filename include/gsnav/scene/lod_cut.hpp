@@ -44,6 +44,12 @@ inline GaussianSet filtered_for_photo(GaussianSet set, const LodChoice& choice) 
   return set;
 }
 
+/// Size of a metre at a depth of 1, in units of choice.pixels.
+inline double lod_units_per_metre(const ProjectionCamera<double>& camera,
+                                  const LodChoice& choice) noexcept {
+  return max(camera.fx, camera.fy) / choice.pixels;
+}
+
 /// Error of merged Gaussians as a multiple of the largest that is allowed.
 /// @param error,grain values of LodNode, metres.
 /// @param scale size of a metre at their nearest depth, in units of choice.pixels.
@@ -101,7 +107,8 @@ class LodCut {
                                       View<const std::uint32_t> seen = {}) {
     const auto p = make_projection_camera<double>(camera, photo_set(*cloud_, choice, world_from_asset));
     refined_.resize(tree_->nodes.size());
-    return choose(detail::SeenByCamera{p}, max(p.fx, p.fy), choice, world_from_asset, seen);
+    return choose(detail::SeenByCamera{p}, lod_units_per_metre(p, choice), choice, world_from_asset,
+                  seen);
   }
 
   /// Chooses the nodes for all cameras in a box that have the size, focal lengths and near plane of
@@ -118,7 +125,7 @@ class LodCut {
     const double x = max(camera.cx, camera.width - camera.cx) / camera.fx,
                  y = max(camera.cy, camera.height - camera.cy) / camera.fy;
     return choose(detail::SeenFromBox{box, 1 / sqrt(1 + x * x + y * y), p.near_plane / p.scale},
-                  max(p.fx, p.fy), choice, world_from_asset, seen);
+                  lod_units_per_metre(p, choice), choice, world_from_asset, seen);
   }
   /// Forgets the last choice, and with it the hysteresis.
   void reset() { refined_.clear(); }
@@ -143,7 +150,7 @@ class LodCut {
 
  private:
   template <class Viewer>
-  std::span<const GaussianSet> choose(const Viewer& viewer, double focal, const LodChoice& choice,
+  std::span<const GaussianSet> choose(const Viewer& viewer, double per_metre, const LodChoice& choice,
                                       const Similarity& world_from_asset,
                                       View<const std::uint32_t> seen) {
     seen_ = seen.empty()
@@ -154,7 +161,6 @@ class LodCut {
     sets_.clear();
     stats_ = {};
     if (tree_->nodes.empty()) return {};
-    const double per_metre = focal / choice.pixels;
     if (tree_->boxes.empty()) {
       visit(tree_->levels() - 1, tree_->nodes.size() - 1, viewer, per_metre, choice);
     } else {

@@ -32,7 +32,7 @@ inline std::size_t level_of_body(const AvatarAsset& asset, const Similarity& wor
   placed.world_from_asset = world_from_body;
   const auto p = make_projection_camera<double>(camera, placed);
   const double nearest = detail::SeenByCamera{p}.nearest(bounds);
-  const double scale = max(p.fx, p.fy) / choice.pixels / nearest;
+  const double scale = lod_units_per_metre(p, choice) / nearest;
   std::size_t level = asset.levels.size();
   while (level > 0 && relative_lod_error(asset.levels[level - 1].error, asset.levels[level - 1].grain,
                                          scale, choice) > 1) {
