@@ -19,6 +19,7 @@
 #include "gsnav/detail/render/order_visible.hpp"
 #include "gsnav/detail/render/render_workspace.hpp"
 #include "gsnav/detail/render/rules.hpp"
+#include "gsnav/detail/render/tuning.hpp"
 #include "gsnav/detail/render/validate_set.hpp"
 #include "gsnav/render/config.hpp"
 

@@ -11,6 +11,7 @@
 #include "gsnav/detail/frame/projection_camera.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/render/rules.hpp"
+#include "gsnav/detail/render/tuning.hpp"
 #include "gsnav/render/config.hpp"
 
 namespace gsnav {

@@ -15,7 +15,7 @@
 #include "gsnav/detail/frame/squares.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
 #include "gsnav/detail/render/order_visible.hpp"
-#include "gsnav/image/camera.hpp"
+#include "gsnav/detail/render/tuning.hpp"
 #include "gsnav/render/config.hpp"
 
 namespace gsnav {
@@ -69,7 +69,7 @@ class DepthSlices {
   void split(int n) noexcept {
     count_ = 0;
     std::size_t taken = 0, bucket = 0;
-    const double first = std::min(kFirst, kFirstOfMany / n);
+    const double first = detail::first_slice_share(n);
     for (int s = 0; s + 1 < n; ++s) {
       const double share = first + (1 - first) * s / n;
       const std::size_t wanted = static_cast<std::size_t>(share * static_cast<double>(candidates_));
@@ -140,8 +140,6 @@ class DepthSlices {
   /// Number of depth buckets: 16 per octave, from 1 mm on.
   static constexpr std::size_t kBuckets = 512;
   static constexpr int kBucketShift = 19;
-  /// Share of the Gaussians in the first slice of n: kFirst, or kFirstOfMany / n if that is less.
-  static constexpr double kFirst = 0.35, kFirstOfMany = 2.4;
 
   /// Bucket of a chunk's nearest key, and the squares that it may reach.
   struct Place {
@@ -182,27 +180,5 @@ class DepthSlices {
   std::size_t candidates_ = 0;
   int count_ = 1, square_ = 1;
 };
-
-namespace detail {
-
-/// Number of depth slices for a frame with at most `candidates` visible Gaussians, drawn by `threads`
-/// threads.
-inline int depth_slices_of(const RenderConfig& config, std::size_t candidates, const Camera& camera,
-                           std::size_t threads) noexcept {
-  if (config.response != Response::ewa || config.compat != Compat::none || config.quality.key_bits < 32)
-    return 1;
-  if (config.tuning.depth_slices != 0) return config.tuning.depth_slices;
-  // With few Gaussians per pixel, projection is a small part of the frame, and slices cannot save much.
-  // Each slice costs its stages some time, more where threads wait for one another.
-  constexpr std::size_t kFew = 131072, kFewPerPixel = 8, kSmall = 128 * 128;
-  const std::size_t pixels =
-      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
-  const bool alone = threads == 1;
-  if (candidates < (alone ? std::min(kFew, kFewPerPixel * pixels) : kFew) || candidates < pixels / 2)
-    return 1;
-  return pixels > kSmall ? 4 : alone ? 12 : 6;
-}
-
-}  // namespace detail
 
 }  // namespace gsnav

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "gsnav/detail/render/draw_meshes.hpp"
+#include "gsnav/detail/render/tuning.hpp"
 #include "gsnav/render/render.hpp"
 
 namespace gsnav {

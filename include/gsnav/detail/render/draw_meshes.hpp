@@ -14,8 +14,8 @@
 #include "gsnav/core/stages.hpp"
 #include "gsnav/detail/image/validate_camera.hpp"
 #include "gsnav/detail/mesh/mesh_shade.hpp"
-#include "gsnav/detail/render/rules.hpp"
 #include "gsnav/detail/render/scratch_memory.hpp"
+#include "gsnav/detail/render/tuning.hpp"
 #include "gsnav/render/config.hpp"
 #include "gsnav/render/frames.hpp"
 

@@ -3,37 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
+#include <iterator>
 
-#include "gsnav/core/backend.hpp"
 #include "gsnav/detail/frame/blend.hpp"
 #include "gsnav/detail/frame/projection_camera.hpp"
 #include "gsnav/math/functions.hpp"
 #include "gsnav/render/config.hpp"
 
-// Settings that each stage of a frame derives from RenderConfig.
+// Rules of the image that each stage of a frame derives from RenderConfig.
 
 namespace gsnav {
-
-/// Width of the tiles that an image is rendered in. On CPUs large images use 32 pixels: their footprints
-/// are large too and then reach fewer tiles. Small ones use 8: each pixel that closes then hides splats
-/// of later slices (OpenSquares).
-template <Backend B>
-int tile_size_of(const RenderConfig& c, int width, int height) noexcept {
-  if (c.tuning.tile_size != 0) return c.tuning.tile_size;
-  constexpr std::int64_t kMostOf8 = 8192, kLeastOf32 = 1000000;
-  const std::int64_t pixels = std::int64_t{width} * height;
-  if (!is_host_backend<B> || c.compat != Compat::none) return 16;
-  return pixels >= kLeastOf32 ? 32 : pixels <= kMostOf8 ? 8 : 16;
-}
-
-/// Number of work items that list n splats or triangles by tiles.
-template <Backend B>
-std::size_t bin_blocks(const B& backend, std::size_t n) noexcept {
-  constexpr std::size_t kFew = 4096;
-  return n < kFew ? 1 : concurrency_of(backend);
-}
 
 /// Smallest log2(alpha) at which a Gaussian is blended. It is at least -126, the limit of exp2 in float,
 /// also in double.
