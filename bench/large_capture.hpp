@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "gsnav/core/rng.hpp"
+#include "gsnav/detail/math/curves.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
 
 // A synthetic outdoor capture, for costs that depend on a scene's extent. It has hilly ground of 170 x
@@ -33,7 +34,7 @@ inline gsnav::GaussianCloud large_capture(std::size_t count) {
     g.mean = {snapped(at.x), snapped(at.y), snapped(at.z)};
     g.quat = s > 1e-9 ? axis_angle(axis * (1 / s), std::atan2(s, dot(z, normal))) : Quatd{};
     g.log_scales = {std::log(sigma), std::log(sigma), std::log(thick)};
-    g.opacity_logit = std::log(opacity / (1 - opacity));
+    g.opacity_logit = logit(opacity);
     builder.add(g);
   };
   // Ground: overlapping disks along the slope.

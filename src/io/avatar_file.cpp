@@ -10,6 +10,7 @@
 #include "gsnav/detail/avatar/smpl_joints.hpp"
 #include "gsnav/detail/avatar/weight_gradients.hpp"
 #include "gsnav/detail/io/npz_file.hpp"
+#include "gsnav/detail/math/curves.hpp"
 #include "gsnav/detail/skin/fk.hpp"
 #include "npz_arrays.hpp"
 
@@ -135,8 +136,7 @@ class AvatarReader {
       raw.shN = shn.data();
       const double* q = &in_.quats.values[4 * i];
       raw.quat = {q[0], q[1], q[2], q[3]};
-      const double o = in_.opacities.values[i];
-      raw.opacity_logit = std::log(o) - std::log1p(-o);
+      raw.opacity_logit = logit_by_logs(in_.opacities.values[i]);
       if (builder.add(raw)) kept_.push_back(i);
     }
     out_.asset.cloud = std::move(builder.cloud());

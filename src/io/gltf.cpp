@@ -16,6 +16,7 @@
 #include "file.hpp"
 #include "gltf_nodes.hpp"
 #include "gsnav/detail/io/spz.hpp"
+#include "gsnav/detail/math/curves.hpp"
 #include "gsnav/detail/scene/edit_cloud.hpp"
 #include "report_sum.hpp"
 
@@ -228,8 +229,7 @@ class SplatReader {
         rest[3 * (b - 5) + k] = static_cast<float>(block[b][3 * i + k]);
       }
     }
-    const double opacity = block[3][i];  // outside of [0, 1]: NaN, so the row is dropped
-    raw.opacity_logit = std::log(opacity / (1 - opacity));
+    raw.opacity_logit = logit(block[3][i]);  // NaN outside of [0, 1], so the row is dropped
     const double* q = &block[1][4 * i];
     raw.quat = {q[3], q[0], q[1], q[2]};
     sink.add(raw);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cloud_fill.hpp"
+#include "gsnav/detail/math/curves.hpp"
 #include "neighbours.hpp"
 #include "ply_body.hpp"
 #include "quantised.hpp"
@@ -80,7 +81,7 @@ Result<LoadedCloud> parse_ply_points(std::span<const std::byte> bytes, const Ply
   std::vector<double> scales = neighbour_distances(points, kNeighbours);
   limit_scales(scales);
   const auto decode = [&](std::size_t first, std::size_t last, CloudSink& sink) -> Status {
-    RawGaussian raw{.quat = {1, 0, 0, 0}, .opacity_logit = std::log(kOpacity / (1 - kOpacity))};
+    RawGaussian raw{.quat = {1, 0, 0, 0}, .opacity_logit = logit(kOpacity)};
     for (std::size_t i = first; i < last; ++i) {
       raw.mean = points[i];
       const double s = std::log(scales[i]);

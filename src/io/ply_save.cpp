@@ -46,13 +46,12 @@ float logit_of(float opacity) {
   constexpr float kOpaque = 18, kClear = -110;
   if (opacity >= 1) return kOpaque;
   if (!(opacity > 0)) return kClear;
-  const double p = opacity;
-  float logit = static_cast<float>(std::log(p / (1.0 - p)));
+  float stored = static_cast<float>(logit(static_cast<double>(opacity)));
   // Rounding must not move a Gaussian below the threshold at which loaders drop it.
   constexpr float kVisible = static_cast<float>(kAlphaMin);
-  const auto back = [&logit] { return static_cast<float>(sigmoid(logit)); };
-  while (opacity >= kVisible && back() < kVisible) logit = std::nextafter(logit, 0.0f);
-  return logit;
+  const auto back = [&stored] { return static_cast<float>(sigmoid(stored)); };
+  while (opacity >= kVisible && back() < kVisible) stored = std::nextafter(stored, 0.0f);
+  return stored;
 }
 
 using Quad = std::array<float, 4>;

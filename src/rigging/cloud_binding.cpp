@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "../avatar/cell_rings.hpp"
+#include "gsnav/detail/math/curves.hpp"
 #include "mesh_weights.hpp"
 
 namespace gsnav {
@@ -144,8 +145,7 @@ Result<BoundCloud> bind_cloud(const GaussianCloud& cloud, const SkinnedMesh& mes
       g.log_scales[static_cast<int>(k)] = std::log(to.scale * static_cast<double>(cloud.scales[k][i]));
       g.sh0[k] = cloud.sh0[3 * i + k];
     }
-    const double o = static_cast<double>(cloud.opacities[i]);
-    g.opacity_logit = std::log(o) - std::log1p(-o);
+    g.opacity_logit = logit_by_logs(static_cast<double>(cloud.opacities[i]));
     g.shN = rest == 0 ? nullptr : cloud.shN.data() + rest * i;
     if (!builder.add(g)) continue;
     out.furthest = max(out.furthest, distance);

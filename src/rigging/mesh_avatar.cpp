@@ -131,7 +131,7 @@ Result<MeshAvatar> make_mesh_avatar(const SkinnedMesh& mesh, const MeshAvatarOpt
   RawGaussian g;
   const double flat = std::log(options.overlap * out.spacing);
   g.log_scales = {flat, flat, std::log(options.thickness * out.spacing)};
-  g.opacity_logit = std::log(options.opacity / (1 - options.opacity));
+  g.opacity_logit = logit(options.opacity);
   for (std::size_t n = 0; n < 30 * options.gaussians; ++n) {
     const detail::MeshSample p = sampler.sample(rng);
     const SurfaceColor color = colors.color(p.triangle, p.at);

@@ -21,4 +21,11 @@ inline double linear_from_srgb(double encoded) noexcept {
 /// Opacity of a logit: 1 / (1 + exp(-x)).
 inline double sigmoid(double x) noexcept { return 1.0 / (1.0 + std::exp(-x)); }
 
+/// Logit of an opacity, the inverse of sigmoid. Infinite at 0 and 1, NaN outside.
+inline double logit(double opacity) noexcept { return std::log(opacity / (1.0 - opacity)); }
+
+/// As logit, by two logarithms. The last bits differ from those of logit. Gaussians of avatars have
+/// these.
+inline double logit_by_logs(double opacity) noexcept { return std::log(opacity) - std::log1p(-opacity); }
+
 }  // namespace gsnav
