@@ -8,12 +8,6 @@
 namespace gsnav::eval::detail {
 namespace {
 
-Mat3d inverse(const Mat3d& m) {
-  const Vec3d a = cross(m.row[1], m.row[2]), b = cross(m.row[2], m.row[0]),
-              c = cross(m.row[0], m.row[1]);
-  return transpose(Mat3d{{a, b, c}}) * (1.0 / dot(m.row[0], a));
-}
-
 /// XYZ with Y = 1 for a chromaticity.
 Vec3d from_chromaticity(double x, double y) { return {x / y, 1.0, (1.0 - x - y) / y}; }
 

@@ -49,11 +49,8 @@ Mat3d squared(const Mat3d& m) {
 }
 
 Affine3<double> inverse_of(const Affine3<double>& m) {
-  const Mat3d& a = m.linear;
-  const Vec3d c0 = cross(a.row[1], a.row[2]), c1 = cross(a.row[2], a.row[0]),
-              c2 = cross(a.row[0], a.row[1]);
-  const Mat3d inverse = transpose(Mat3d{{c0, c1, c2}}) * (1.0 / dot(a.row[0], c0));
-  return {inverse, -(inverse * m.translation)};
+  const Mat3d linear = inverse(m.linear);
+  return {linear, -(linear * m.translation)};
 }
 
 /// Whether two maps are equal up to float32 rounding in the file.

@@ -18,28 +18,17 @@ using detail::Json;
 
 Vec3f vec3_of(const double* p) { return vec_cast<float>(Vec3d{p[0], p[1], p[2]}); }
 
-Mat3d adjugate_transposed(const Mat3d& m) {
-  Mat3d out;
-  const Vec3d r0{m(0, 0), m(0, 1), m(0, 2)}, r1{m(1, 0), m(1, 1), m(1, 2)},
-      r2{m(2, 0), m(2, 1), m(2, 2)};
-  const Vec3d rows[3] = {cross(r1, r2), cross(r2, r0), cross(r0, r1)};
-  for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 3; ++k) out(i, k) = rows[i][k];
-  }
-  return out;
-}
-
 /// Applies a transform to a part. Normals transform by the cofactors, which keeps them perpendicular;
 /// triangles are reversed if the transform mirrors. Returns false if a vertex is then not finite.
 bool transform(TexturedPart& part, const Affine3<double>& a) {
-  const Mat3d cofactors = adjugate_transposed(a.linear) * (determinant(a.linear) < 0 ? -1.0 : 1.0);
+  const Mat3d of_normals = cofactors(a.linear) * (determinant(a.linear) < 0 ? -1.0 : 1.0);
   bool finite = true;
   for (Vec3f& v : part.geometry.vertices) {
     v = vec_cast<float>(a * vec_cast<double>(v));
     finite = finite && is_finite(v);
   }
   for (Vec3f& n : part.normals) {
-    const Vec3d turned = cofactors * vec_cast<double>(n);
+    const Vec3d turned = of_normals * vec_cast<double>(n);
     const double length = norm(turned);
     if (length > 0) n = vec_cast<float>(turned * (1.0 / length));
   }

@@ -26,9 +26,7 @@ class Splat {
     cov(2, 2) += vc;
     const double det = determinant(cov);
     if (!(det > 0) || !is_finite(det)) return false;
-    inv_ = transpose(Mat3d{{cross(cov.row[1], cov.row[2]), cross(cov.row[2], cov.row[0]),
-                            cross(cov.row[0], cov.row[1])}}) *
-           (1.0 / det);
+    inv_ = transpose(cofactors(cov)) * (1.0 / det);
     mean_ = s.mean;
     opacity_ = s.opacity;
     const std::size_t n[3] = {g.nx, g.ny, g.nz};

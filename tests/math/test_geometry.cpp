@@ -90,6 +90,29 @@ TEST_CASE("the nearest point of a segment: no other of 200 is nearer") {
   CHECK(segment_fraction({1, 2, 3}, {1, 2, 3}, {4, 5, 6}) == 0);
 }
 
+TEST_CASE("inverse and cofactors: the product is 1 and det(m), and a lost rank is not finite") {
+  Rng rng(15);
+  int tried = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const Mat3d m{{random_point(rng, 1), random_point(rng, 1), random_point(rng, 1)}};
+    const double det = determinant(m);
+    if (std::abs(det) < 0.01) continue;
+    ++tried;
+    const Mat3d one = m * inverse(m), scaled = m * transpose(cofactors(m)),
+                rough = m * transpose(rough_cofactors(m));
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) {
+        const double expected = r == c ? 1 : 0;
+        REQUIRE(std::abs(one(r, c) - expected) < 1e-12);
+        REQUIRE(std::abs(scaled(r, c) - expected * det) < 1e-14);
+        REQUIRE(std::abs(rough(r, c) - expected * det) < 1e-14);
+      }
+    }
+  }
+  CHECK(tried > 800);
+  CHECK(!is_finite(inverse(Mat3d{{{1, 2, 3}, {2, 4, 6}, {0, 1, 0}}}).row[0]));
+}
+
 TEST_CASE("distance from orthogonal: zero for rotations, the stretch of others, infinite for NaN") {
   Rng rng(14);
   for (int i = 0; i < 1000; ++i) {

@@ -69,6 +69,27 @@ GSNAV_HD L determinant(const Mat3<L>& m) noexcept {
   return dot(m.row[0], cross(m.row[1], m.row[2]));
 }
 
+/// Cofactor matrix: det(m) times the transposed inverse. Each element has an error of at most 1.5 ulp.
+template <class L>
+GSNAV_HD Mat3<L> cofactors(const Mat3<L>& m) noexcept {
+  return {{cross(m.row[1], m.row[2]), cross(m.row[2], m.row[0]), cross(m.row[0], m.row[1])}};
+}
+
+/// Cofactor matrix by plain fma. The error is a rounding of m's greatest elements. That suffices for the
+/// polar factor of a matrix with det > 0.1, but not for needle shapes; use cofactors() for those.
+template <class L>
+GSNAV_HD Mat3<L> rough_cofactors(const Mat3<L>& m) noexcept {
+  return {{rough_cross(m.row[1], m.row[2]), rough_cross(m.row[2], m.row[0]),
+           rough_cross(m.row[0], m.row[1])}};
+}
+
+/// Inverse matrix. Not finite if det(m) is 0.
+template <class L>
+GSNAV_HD Mat3<L> inverse(const Mat3<L>& m) noexcept {
+  const Mat3<L> c = cofactors(m);
+  return transpose(c) * (L(scalar_of<L>(1)) / dot(m.row[0], c.row[0]));
+}
+
 /// Conversion of the elements to type T.
 template <class T, class U>
 GSNAV_HD constexpr Mat3<T> mat_cast(const Mat3<U>& m) noexcept {

@@ -29,15 +29,6 @@ inline constexpr double kMinBlendDeterminant = 0.1;
 
 namespace detail {
 
-/// Cofactor matrix: det(m) times the transposed inverse. The error is a rounding of m's greatest
-/// elements. That suffices for the polar factor of a matrix with det > 0.1, but not for needle shapes;
-/// use cross() for those.
-template <class L>
-GSNAV_HD Mat3<L> cofactors(const Mat3<L>& m) noexcept {
-  return {{rough_cross(m.row[1], m.row[2]), rough_cross(m.row[2], m.row[0]),
-           rough_cross(m.row[0], m.row[1])}};
-}
-
 /// linear * p + translation, as every mode of skinning rounds it.
 template <class L>
 GSNAV_HD Vec3<L> moved(const Mat3<L>& linear, const Vec3<L>& translation, const Vec3<L>& p) noexcept {
@@ -77,7 +68,7 @@ GSNAV_HD ScaledRotation<L> scaled_polar_rotation(const Mat3<L>& m) noexcept {
   using S = scalar_of<L>;
   // Newton's iteration squares the error in each step, so after a step this small only rounding is left.
   const L converged(sizeof(S) > sizeof(float) ? S(1e-9) : S(2e-4));
-  const Mat3<L> c = detail::cofactors(m);
+  const Mat3<L> c = rough_cofactors(m);
   const L det = dot(m.row[0], c.row[0]);
   // m m^T. Its trace is |m|^2, and its principal minors sum to |cofactors|^2.
   L g00 = dot(m.row[0], m.row[0]), g11 = dot(m.row[1], m.row[1]), g22 = dot(m.row[2], m.row[2]);
@@ -168,7 +159,7 @@ GSNAV_HD Skinned<L> skin(Affine3<L> blend, const First& first, const Vec3<L>& me
   using S = scalar_of<L>;
   Skinned<L> out;
   out.mean = detail::moved(blend.linear, blend.translation, mean);
-  const mask_of<L> usable = dot(blend.linear.row[0], detail::cofactors(blend.linear).row[0]) >
+  const mask_of<L> usable = dot(blend.linear.row[0], rough_cofactors(blend.linear).row[0]) >
                             L(static_cast<S>(kMinBlendDeterminant));
   if (!all(usable)) {
     const Mat3<L> greatest = first();
