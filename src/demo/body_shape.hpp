@@ -27,8 +27,7 @@ struct Lobe {
   /// is not null, it gets the outward unit normal there.
   double distance(const Vec3d& p, Vec3d* normal = nullptr) const noexcept {
     const Vec3d ab = b - a, ap = p - a;
-    const double length2 = product(ab, ab);
-    const double t = length2 > 0 ? clamp(product(ap, ab) / length2, 0.0, 1.0) : 0.0;
+    const double t = segment_fraction(product(ap, ab), product(ab, ab));
     const Vec3d r = radii_a + (radii_b - radii_a) * t, off = ap - ab * t;
     const Vec3d v{product(axes.row[0], off), product(axes.row[1], off), product(axes.row[2], off)};
     const Vec3d q{v.x / r.x, v.y / r.y, v.z / r.z}, g{q.x / r.x, q.y / r.y, q.z / r.z};

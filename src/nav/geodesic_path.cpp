@@ -21,7 +21,7 @@ double crossing(const GeodesicSearch::Node& n, const Flat& a, const Flat& b,
   const double rate = cross(e, d);
   const double t = rate != 0 ? clamp(cross(target - n.right, d) / rate, 0.0, 1.0) : 0.0;
   const Flat at = n.right + e * t, whole = b - a;
-  return clamp(dot(at - a, whole) / dot(whole, whole), 0.0, 1.0);
+  return segment_fraction(dot(at - a, whole), dot(whole, whole));
 }
 
 /// Appends the points of (first, last] that a straight line misses, including the last
@@ -32,8 +32,7 @@ void simplify(const std::vector<PathPoint>& p, std::size_t first, std::size_t la
   double error = kHeightError;
   const Vec3d a = p[first].position, b = p[last].position;
   for (std::size_t i = first + 1; i < last; ++i) {
-    const double t = segment_fraction(a, b, p[i].position);
-    const double off = norm(p[i].position - (a + (b - a) * t));
+    const double off = sqrt(segment_distance2(a, b, p[i].position));
     if (off <= error) continue;
     error = off;
     worst = i;

@@ -18,8 +18,8 @@ inline double area_xz(const Vec3d& a, const Vec3d& b, const Vec3d& c) noexcept {
 /// Position of the point of edge a b nearest to p on the ground plane, as a fraction of the edge. 0 for
 /// an edge without length there.
 inline double fraction_xz(const Vec3d& a, const Vec3d& b, const Vec3d& p) noexcept {
-  const double ex = b.x - a.x, ez = b.z - a.z, len2 = ex * ex + ez * ez;
-  return len2 > 0 ? clamp(((p.x - a.x) * ex + (p.z - a.z) * ez) / len2, 0.0, 1.0) : 0.0;
+  const double ex = b.x - a.x, ez = b.z - a.z;
+  return segment_fraction((p.x - a.x) * ex + (p.z - a.z) * ez, ex * ex + ez * ez);
 }
 
 /// That point, on the edge in space.

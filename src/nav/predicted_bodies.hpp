@@ -107,8 +107,7 @@ class PredictedBodies {
     const Ground d0 = Ground{p.x, p.z} - b.disc.at - b.disc.velocity * t0;
     const Ground d1 = Ground{q.x, q.z} - b.disc.at - b.disc.velocity * t1;
     const Ground e = d1 - d0;
-    const double ee = dot(e, e), s = ee > 0 ? clamp(-dot(d0, e) / ee, 0.0, 1.0) : 0.0;
-    if (length(d0 + e * s) > reach) return kNever;
+    if (length(d0 + e * segment_fraction(-dot(d0, e), dot(e, e))) > reach) return kNever;
     const double middle = clamp(tick_, t0, t1);
     const Vec3d m = t1 > t0 ? lerp(p, q, (middle - t0) / (t1 - t0)) : p;
     if (middle > t0) {

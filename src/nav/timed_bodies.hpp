@@ -85,7 +85,7 @@ class TimedBodies {
       const double z = from.position.z - lerp(d.z0, d.z1, from.fraction);
       const double ex = to.position.x - lerp(d.x0, d.x1, to.fraction) - x;
       const double ez = to.position.z - lerp(d.z0, d.z1, to.fraction) - z;
-      const double ee = ex * ex + ez * ez, t = ee > 0 ? clamp(-(x * ex + z * ez) / ee, 0.0, 1.0) : 0.0;
+      const double t = segment_fraction(-(x * ex + z * ez), ex * ex + ez * ez);
       const double nx = x + t * ex, nz = z + t * ez;
       if (nx * nx + nz * nz <= reach * reach) return false;
       from = to;

@@ -44,7 +44,7 @@ Flat UnfoldedMesh::clamped(std::uint32_t face, const Flat& p) const noexcept {
     const Flat &a = edges[f.first + k].at, &b = edges[f.first + (k + 1 < f.count ? k + 1 : 0)].at;
     const Flat side = b - a;
     inside = inside && cross(side, p - a) >= 0;
-    const double t = clamp(dot(p - a, side) / max(dot(side, side), 1e-300), 0.0, 1.0);
+    const double t = segment_fraction(dot(p - a, side), dot(side, side));
     const Flat q = a + side * t;
     if (length(p - q) >= best) continue;
     best = length(p - q);

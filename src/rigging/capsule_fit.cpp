@@ -123,8 +123,7 @@ double capsules_of(const std::vector<Vec3d>& points, double share, int splits, s
 /// Distance of p from the nearest capsule's surface, negative inside.
 double capsules_distance(const std::vector<Capsule<double>>& capsules, const Vec3d& p) noexcept {
   double best = std::numeric_limits<double>::max();
-  for (const Capsule<double>& c : capsules)
-    best = min(best, sqrt(segment_distance2(c.p0, c.p1, p)) - c.radius);
+  for (const Capsule<double>& c : capsules) best = min(best, capsule_distance(c, p));
   return best;
 }
 

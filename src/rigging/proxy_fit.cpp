@@ -53,8 +53,7 @@ void fit_capsules(AvatarAsset& asset, const std::vector<std::vector<Affine3<doub
       const Affine3<double>& g = rest[capsules[c].joint];
       // Subtract the radius, so that wide parts keep their points: distances count from the capsule's
       // given surface.
-      const double d =
-          sqrt(segment_distance2(g * capsules[c].p0, g * capsules[c].p1, p)) - capsules[c].radius;
+      const double d = capsule_distance({g * capsules[c].p0, g * capsules[c].p1, capsules[c].radius}, p);
       if (d < best) {
         best = d;
         to = c;

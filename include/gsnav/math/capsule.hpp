@@ -17,6 +17,11 @@ struct Capsule {
   L radius{};    ///< metres, >= 0
 };
 
+/// Distance of p from the surface of a capsule, metres; negative inside.
+inline double capsule_distance(const Capsule<double>& c, const Vec3<double>& p) noexcept {
+  return sqrt(segment_distance2(c.p0, c.p1, p)) - c.radius;
+}
+
 /// Extends a box to contain a capsule.
 inline void add_capsule(Aabb<double>& box, const Capsule<double>& c) noexcept {
   const Vec3<double> ends[2] = {c.p0, c.p1};

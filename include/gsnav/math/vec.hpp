@@ -124,13 +124,25 @@ GSNAV_HD Vec3<L> lerp(const Vec3<L>& a, const Vec3<L>& b, L t) noexcept {
   return {fma(t, b.x, s * a.x), fma(t, b.y, s * a.y), fma(t, b.z, s * a.z)};
 }
 
+/// Position of the point of a segment that is nearest to a point, as a fraction of the segment. 0 if the
+/// segment has no length.
+/// @param along Dot product of the segment with the vector from its start to the point.
+/// @param length2 Squared length of the segment.
+inline double segment_fraction(double along, double length2) noexcept {
+  return length2 > 0 ? clamp(along / length2, 0.0, 1.0) : 0.0;
+}
 /// Position of the point of the segment from a to b that is nearest to p, as a fraction of the segment.
 /// 0 if a equals b.
 inline double segment_fraction(const Vec3<double>& a, const Vec3<double>& b,
                                const Vec3<double>& p) noexcept {
   const Vec3<double> along = b - a;
-  const double length2 = dot(along, along);
-  return length2 > 0 ? clamp(dot(p - a, along) / length2, 0.0, 1.0) : 0.0;
+  return segment_fraction(dot(p - a, along), dot(along, along));
+}
+/// Squared distance of p from the segment from a to b.
+inline double segment_distance2(const Vec3<double>& a, const Vec3<double>& b,
+                                const Vec3<double>& p) noexcept {
+  const Vec3<double> d = p - (a + (b - a) * segment_fraction(a, b, p));
+  return dot(d, d);
 }
 
 /// Conversion of the components to type T.

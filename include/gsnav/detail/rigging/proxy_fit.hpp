@@ -8,12 +8,6 @@
 
 namespace gsnav {
 
-/// Squared distance from p to the segment a b.
-inline double segment_distance2(const Vec3d& a, const Vec3d& b, const Vec3d& p) noexcept {
-  const Vec3d d = p - (a + (b - a) * segment_fraction(a, b, p));
-  return dot(d, d);
-}
-
 /// Centres of the Gaussians after skinning, in the root frame, metres. `globals` [J] takes joints to the
 /// root frame.
 std::vector<Vec3d> skinned_centers(const AvatarAsset& asset, std::vector<Affine3<double>> globals);
