@@ -11,7 +11,7 @@
 namespace gsnav::flat {
 Vec3d srgb(unsigned hex) noexcept {
   const auto channel = [hex](int shift) {
-    return linear_from_srgb(static_cast<double>((hex >> shift) & 255u) / 255.0);
+    return linear_from_srgb_byte(static_cast<std::uint8_t>((hex >> shift) & 255u));
   };
   return {channel(16), channel(8), channel(0)};
 }

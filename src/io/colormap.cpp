@@ -11,20 +11,15 @@ namespace {
 
 using Rgb8 = std::array<std::uint8_t, 3>;
 
-std::uint8_t srgb_byte(double linear) {
-  const double x = std::fmin(std::fmax(linear, 0.0), 1.0);
-  return to_byte(srgb_from_linear(x));
-}
-
 /// Converts a colour of the Oklab space (lightness, chroma, hue in radians) to sRGB.
 Rgb8 from_oklch(double lightness, double chroma, double hue) {
   const double a = chroma * std::cos(hue), b = chroma * std::sin(hue);
   const double l = std::pow(lightness + 0.3963377774 * a + 0.2158037573 * b, 3);
   const double m = std::pow(lightness - 0.1055613458 * a - 0.0638541728 * b, 3);
   const double s = std::pow(lightness - 0.0894841775 * a - 1.2914855480 * b, 3);
-  return {srgb_byte(4.0767416621 * l - 3.3077115913 * m + 0.2309699292 * s),
-          srgb_byte(-1.2684380046 * l + 2.6097574011 * m - 0.3413193965 * s),
-          srgb_byte(-0.0041960863 * l - 0.7034186147 * m + 1.7076147010 * s)};
+  return {srgb_byte_from_linear(4.0767416621 * l - 3.3077115913 * m + 0.2309699292 * s),
+          srgb_byte_from_linear(-1.2684380046 * l + 2.6097574011 * m - 0.3413193965 * s),
+          srgb_byte_from_linear(-0.0041960863 * l - 0.7034186147 * m + 1.7076147010 * s)};
 }
 
 /// Makes the map: lightness falls evenly from near to far, and the hue goes from yellow through red to

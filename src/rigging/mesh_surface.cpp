@@ -11,10 +11,8 @@
 
 namespace gsnav {
 
-MeshColors::MeshColors(const SkinnedMesh& mesh) : mesh_(mesh) {
-  for (std::size_t k = 0; k < linear_.size(); ++k)
-    linear_[k] = linear_from_srgb(static_cast<double>(k) / 255);
-}
+MeshColors::MeshColors(const SkinnedMesh& mesh)
+    : mesh_(mesh), linear_(linear_from_srgb_bytes<double>()) {}
 
 SurfaceColor MeshColors::color(std::size_t t, const Vec3d& at) const {
   const auto& corners = mesh_.triangles[t];

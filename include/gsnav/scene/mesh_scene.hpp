@@ -19,11 +19,6 @@
 
 namespace gsnav {
 
-/// Linear value, in [0, 1], of an sRGB-encoded byte.
-inline float srgb_decoded(std::uint8_t byte) noexcept {
-  return static_cast<float>(linear_from_srgb(byte / 255.0));
-}
-
 /// A base-colour texture with its mip chain. Each texel of a level is the mean, in linear light, of the
 /// texels that it covers in the finer level.
 class MeshTexture {
@@ -41,7 +36,7 @@ class MeshTexture {
                                                 " bytes: needs four a pixel and sides in [1, 32768]");
     }
     MeshTexture t;
-    for (std::size_t i = 0; i < 256; ++i) t.decode_[i] = srgb_decoded(static_cast<std::uint8_t>(i));
+    t.decode_ = linear_from_srgb_bytes<float>();
     t.width_ = static_cast<int>(width);
     t.height_ = static_cast<int>(height);
     t.texels_ = std::move(rgba);
@@ -81,12 +76,11 @@ class MeshTexture {
           }
         }
         const double n = (y1 - 2 * y) * (x1 - 2 * x);
-        for (std::size_t c = 0; c < 3; ++c) texels_.push_back(encoded(sum[c] / n));
+        for (std::size_t c = 0; c < 3; ++c) texels_.push_back(srgb_byte_from_linear(sum[c] / n));
         texels_.push_back(static_cast<std::uint8_t>(sum[3] / n + 0.5));
       }
     }
   }
-  static std::uint8_t encoded(double linear) noexcept { return to_byte(srgb_from_linear(linear)); }
 
   std::vector<std::uint8_t> texels_;
   std::array<float, 256> decode_{};

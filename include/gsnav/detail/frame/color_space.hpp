@@ -6,26 +6,10 @@
 
 #include "gsnav/core/view.hpp"
 #include "gsnav/detail/frame/splat.hpp"
+#include "gsnav/detail/math/curves.hpp"
 #include "gsnav/frame/gaussians.hpp"
-#include "gsnav/math/functions.hpp"
 
 namespace gsnav {
-
-/// sRGB-encoded value of a linear one. Negative input is treated as 0.
-template <class S>
-GSNAV_HD S srgb_encoded(S linear) noexcept {
-  const S small = S(0.0031308);
-  const S curve = S(1.055) * exp2(log2(max(linear, small)) * S(1 / 2.4)) - S(0.055);
-  return linear > small ? curve : S(12.92) * max(linear, S(0));
-}
-
-/// Linear value of an sRGB-encoded one. Negative input is treated as 0.
-template <class S>
-GSNAV_HD S srgb_decoded(S encoded) noexcept {
-  const S small = S(0.04045);
-  const S curve = exp2(log2((max(encoded, small) + S(0.055)) * S(1 / 1.055)) * S(2.4));
-  return encoded > small ? curve : S(1 / 12.92) * max(encoded, S(0));
-}
 
 /// Converts a colour value from one space to another.
 template <class S>

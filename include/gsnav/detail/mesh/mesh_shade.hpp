@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "gsnav/detail/frame/color_space.hpp"
+#include "gsnav/detail/math/curves.hpp"
 #include "gsnav/detail/mesh/mesh_raster.hpp"
 
 // Shading of visible triangles. Each pixel is shaded once, regardless of how many triangles lie behind
