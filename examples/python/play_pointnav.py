@@ -13,7 +13,7 @@ import sys
 import time
 
 import numpy as np
-from pointnav_policy import ACTIONS, Policy, load, save
+from pointnav_policy import ACTIONS, HIDDEN, Policy, load, save
 from pointnav_worlds import (CHANNELS, HELD_OUT_SEEDS, METRICS, Worlds, device_of, goals, images_of, number,
                              run_program, sensors_of, world_arguments)
 
@@ -44,7 +44,7 @@ def evaluate(args: argparse.Namespace, worlds: Worlds, name: str, policy: Policy
     simulator = worlds.simulator(args, n, sensors_of(args, blind), next_episode, memory=gsnav.ImageMemory.host)
     follower, rng = gsnav.GeodesicFollower(), np.random.default_rng(args.seed)
     seen, ended, start = simulator.reset(), np.zeros(n, np.bool_), np.ones(n, np.bool_)
-    hidden, actions = np.zeros((n, 256), np.float32), np.zeros(n, np.int64)
+    hidden, actions = np.zeros((n, HIDDEN), np.float32), np.zeros(n, np.int64)
     rows: dict[int, np.ndarray] = {}
     shown = time.monotonic()
     while len(rows) < args.episodes:

@@ -15,7 +15,7 @@ import numpy as np
 import torch
 import torch.distributed as dist
 from pointnav_curves import plot
-from pointnav_policy import ACTIONS, load, read_checkpoint
+from pointnav_policy import ACTIONS, HIDDEN, STRIDES, load, read_checkpoint
 from pointnav_worlds import CHANNELS, LEFT, RIGHT, device_of
 from torch import Tensor, nn
 
@@ -63,7 +63,8 @@ class Agent(nn.Module):
         super().__init__()
         self.shape, self.cnn = (channels, size, size), None
         if channels:
-            layers = [nn.Conv2d(channels, 32, 8, 4), nn.Conv2d(32, 64, 4, 2), nn.Conv2d(64, 32, 3, 1)]
+            layers = [nn.Conv2d(channels, 32, 8, STRIDES[0]), nn.Conv2d(32, 64, 4, STRIDES[1]),
+                      nn.Conv2d(64, 32, 3, STRIDES[2])]
             self.cnn = nn.Sequential(*(part for layer in layers for part in (layer, nn.ReLU())), nn.Flatten())
             with torch.no_grad():
                 if channels != 3:
@@ -71,8 +72,8 @@ class Agent(nn.Module):
                 length = self.cnn(torch.zeros(1, *self.shape)).shape[1]
             self.image = nn.Sequential(nn.Linear(length, 256), nn.ReLU())
         self.goal, self.last = nn.Linear(3, 32), nn.Embedding(ACTIONS + 1, 32)
-        self.gru = nn.GRU(320 if channels else 64, 256)
-        self.policy, self.value = nn.Linear(256, ACTIONS), nn.Linear(256, 1)
+        self.gru = nn.GRU(320 if channels else 64, HIDDEN)
+        self.policy, self.value = nn.Linear(HIDDEN, ACTIONS), nn.Linear(HIDDEN, 1)
         with torch.no_grad():
             self.policy.weight.mul_(0.01)
 

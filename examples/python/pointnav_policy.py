@@ -14,6 +14,8 @@ import numpy as np
 Array = np.ndarray[Any, np.dtype[Any]]
 STRIDES = (4, 2, 1)  # of the three convolutions
 ACTIONS = 4  # stop, forward, left, right
+HIDDEN = 256  # numbers of a hidden state
+LEAST_SIZE, LARGEST_SIZE = 36, 4096  # edge of the images, pixels
 
 
 def sigmoid(x: Array) -> Array:
@@ -87,8 +89,8 @@ def load(path: pathlib.Path) -> Policy:
         bad = [name for name, w in weights.items() if not np.isfinite(w).all()]
         if bad:
             raise ValueError(f"{bad[0]} is not finite")
-        if not 36 <= size <= 4096:
-            raise ValueError(f"size {size} is not between 36 and 4096")
+        if not LEAST_SIZE <= size <= LARGEST_SIZE:
+            raise ValueError(f"size {size} is not between {LEAST_SIZE} and {LARGEST_SIZE}")
         return checked(Policy(weights, size))
     except KeyError as e:
         sys.exit(f"{path}: no weights of an agent: {e} is missing")
@@ -116,7 +118,7 @@ def checked(policy: Policy) -> Policy:
     """The policy, if it can act: otherwise a KeyError, IndexError or ValueError."""
     images = np.zeros((1, policy.size, policy.size, policy.channels), np.float32) if policy.channels else None
     start = np.ones(1, np.bool_)
-    log_p, _ = policy.act(images, np.zeros((1, 3)), np.zeros(1, np.int64), start, np.zeros((1, 256), np.float32))
+    log_p, _ = policy.act(images, np.zeros((1, 3)), np.zeros(1, np.int64), start, np.zeros((1, HIDDEN), np.float32))
     if log_p.shape != (1, ACTIONS) or len(policy.weights["last.weight"]) != ACTIONS + 1:
         raise ValueError(f"the agent has {log_p.shape[-1]} actions, not {ACTIONS}")
     return policy

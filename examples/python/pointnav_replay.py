@@ -17,7 +17,7 @@ import matplotlib
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from play_pointnav import WEIGHTS, sensor_of
-from pointnav_policy import Policy, load
+from pointnav_policy import HIDDEN, Policy, load
 from pointnav_worlds import (HELD_OUT_SEEDS, Worlds, device_of, goals, images_of, number, run_program, sensors_of,
                              world_arguments)
 
@@ -42,14 +42,19 @@ class Moment:
     end: gsnav.EpisodeMetrics | None = None
 
 
+def flat_of(episode: int) -> int:
+    """The flat of a held-out episode of play_pointnav.py."""
+    return HELD_OUT_SEEDS[episode % len(HELD_OUT_SEEDS)]
+
+
 def play(args: argparse.Namespace, policy: Policy, number: int) -> tuple[Worlds, gsnav.PointNavEpisode, list[Moment]]:
     """Plays held-out episode `number` of play_pointnav.py, by the most probable actions."""
-    flat, k = HELD_OUT_SEEDS[number % len(HELD_OUT_SEEDS)], number // len(HELD_OUT_SEEDS)
+    flat, k = flat_of(number), number // len(HELD_OUT_SEEDS)
     worlds = Worlds(range(flat, flat + 1), args, k + 1)
     simulator = worlds.simulator(args, 1, [*sensors_of(args, not policy.channels), VIEW],
                                  lambda environment, count: worlds.episodes[k], memory=gsnav.ImageMemory.host)
     seen, start = simulator.reset(), np.ones(1, np.bool_)
-    hidden, action = np.zeros((1, 256), np.float32), np.zeros(1, np.int64)
+    hidden, action = np.zeros((1, HIDDEN), np.float32), np.zeros(1, np.int64)
     moments: list[Moment] = []
     world = simulator.world(0)
     while not moments or moments[-1].end is None:
@@ -157,7 +162,7 @@ def frames(args: argparse.Namespace, policy: Policy) -> Iterator[tuple[Image.Ima
         worlds, episode, moments = play(args, policy, number)
         navmesh, end = worlds.scenes[0].navmesh, moments[-1].end
         assert navmesh is not None and end is not None
-        flat = HELD_OUT_SEEDS[number % len(HELD_OUT_SEEDS)]
+        flat = flat_of(number)
         print(f"episode {number}, flat {flat}: {len(moments) - 1} steps, success {end.success:.0f}, SPL {end.spl:.2f}")
         picture = Picture(navmesh, episode, f"held-out flat {flat}, episode {number}", sees)
         last = len(moments) - 1

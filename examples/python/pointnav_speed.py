@@ -14,15 +14,15 @@ import time
 import numpy as np
 
 import gsnav
-from pointnav_worlds import (TRAIN_SEEDS, Draw, Worlds, device_of, number, run_program, sensor_arguments, sensors_of,
-                             world_arguments)
+from pointnav_worlds import (TRAIN_SEEDS, Draw, Worlds, device_of, flats_argument, number, run_program,
+                             sensor_arguments, sensors_of, world_arguments)
 
 
 def main() -> None:
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     world_arguments(p)
     sensor_arguments(p)
-    p.add_argument("--flats", type=int, default=64, choices=range(1, 65), metavar="1..64", help="number of flats")
+    flats_argument(p, "number of flats")
     p.add_argument("--environments", type=number(int, 1), default=256, help="number of environments")
     p.add_argument("--steps", type=number(int, 1), default=200, help="steps of all environments per run")
     p.add_argument("--runs", type=number(int, 2), default=5, help="number of runs; the first one is not counted")

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from pointnav_policy import ACTIONS
+from pointnav_policy import LARGEST_SIZE, LEAST_SIZE
 
 import gsnav
 
@@ -23,6 +23,7 @@ SENSORS = {"depth": ("depth",), "rgb": ("rgb",), "rgbd": ("rgb", "depth")}  # im
 CHANNELS = {"depth": 1, "rgb": 3, "rgbd": 4}  # numbers per pixel
 TRAIN_SEEDS, HELD_OUT_SEEDS = range(64), range(64, 80)
 MESH_DENSITY = 0.05  # largest density of flats of triangles
+SUCCESS = 2.5  # reward for a success
 METRICS = ("success", "spl", "soft_spl", "collision_rate", "psi", "steps")
 
 
@@ -32,7 +33,7 @@ class Worlds:
     success: reward for a success. penalties: factor on the penalties of collisions with people and nearness to them.
     """
 
-    def __init__(self, seeds: range, args: argparse.Namespace, episodes: int, success: float = 2.5,
+    def __init__(self, seeds: range, args: argparse.Namespace, episodes: int, success: float = SUCCESS,
                  penalties: float = 1.0) -> None:
         self.task = gsnav.TaskConfig.avatar_pointnav() if args.people else gsnav.TaskConfig()
         self.task.reward.success = success
@@ -139,8 +140,9 @@ def world_arguments(p: argparse.ArgumentParser) -> None:
     """Adds the arguments for the worlds and the quality of images."""
     p.add_argument("--device", default="best", help="device of gsnav and torch: best, cuda, cuda:1, cpu, ...")
     p.add_argument("--people", type=number(int, 0, 1000), default=0, help="people in each flat")
-    p.add_argument("--density", type=number(float, 0.05, 20), default=0.3, help="factor on the number of Gaussians. "
-                   "Flats of triangles take 0.05 at most, because it only changes how fine their colours are")
+    p.add_argument("--density", type=number(float, 0.05, 20), default=0.3,
+                   help="factor on the number of Gaussians. Flats of triangles take "
+                   f"{MESH_DENSITY} at most, because it only changes how fine their colours are")
     p.add_argument("--rooms", type=number(int, 1, 1000), default=4, help="rooms of a flat")
     p.add_argument("--worlds", default="gaussians", choices=["gaussians", "meshes", "both"],
                    help="what flats are made of; both: every other flat is a mesh")
@@ -152,7 +154,14 @@ def sensor_arguments(p: argparse.ArgumentParser) -> None:
     """Adds the arguments for the sensor of an agent."""
     p.add_argument("--blind", action="store_true", help="the agent sees no images")
     p.add_argument("--sensor", default="depth", choices=list(CHANNELS), help="what the agent sees")
-    p.add_argument("--size", type=number(int, 36, 4096), default=64, help="edge of the images, pixels, 36 or more")
+    p.add_argument("--size", type=number(int, LEAST_SIZE, LARGEST_SIZE), default=64,
+                   help=f"edge of the images, pixels, {LEAST_SIZE} or more")
+
+
+def flats_argument(p: argparse.ArgumentParser, what: str) -> None:
+    """Adds the argument for the number of flats of the training, with `what` as its help."""
+    most = len(TRAIN_SEEDS)
+    p.add_argument("--flats", type=int, default=most, choices=range(1, most + 1), metavar=f"1..{most}", help=what)
 
 
 def device_of(name: str) -> gsnav.Device:

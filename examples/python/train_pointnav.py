@@ -27,9 +27,9 @@ import numpy as np
 import torch.distributed as dist
 from pointnav_agent import (Agent, Mirror, Reorder, Rows, agreed, begin_with, checkpoint_of, clear, devices_of,
                             hash_of, made_by, pieces, progress, set_determinism, write_log)
-from pointnav_policy import ACTIONS
-from pointnav_worlds import (CHANNELS, METRICS, TRAIN_SEEDS, Draw, Worlds, goals, mixed, number, run_program,
-                             sensor_arguments, sensors_of, world_arguments)
+from pointnav_policy import ACTIONS, HIDDEN
+from pointnav_worlds import (CHANNELS, METRICS, SUCCESS, TRAIN_SEEDS, Draw, Worlds, flats_argument, goals, mixed,
+                             number, run_program, sensor_arguments, sensors_of, world_arguments)
 from torch import Tensor, nn
 from torch.nn.utils.rnn import PackedSequence
 
@@ -63,8 +63,8 @@ class Learner:
         self.simulator = worlds.simulator(args, n, sensors, self.draw, self.rows)
         self.goal, self.start = made(t + 1, n, 3), made(t + 1, n)
         self.action, self.log_p, self.values = made(t, n, dtype=torch.int64), made(t, n), made(t + 1, n)
-        self.last, self.hidden, self.noise = made(t + 1, n, dtype=torch.int64), made(n, 256), made(t + 1, n, ACTIONS)
-        self.first_hidden = made(args.chunks, n, 256)
+        self.last, self.hidden, self.noise = made(t + 1, n, dtype=torch.int64), made(n, HIDDEN), made(t + 1, n, ACTIONS)
+        self.first_hidden = made(args.chunks, n, HIDDEN)
         self.result, self.advantage, self.returns = made(3, t, n), made(t, n), made(t, n)
         self.moments, self.losses = made(3), made(3)
         # On the host: what the simulator returns, and the actions that it takes.
@@ -354,7 +354,7 @@ def arguments() -> argparse.Namespace:
     p.add_argument("--begin-with", type=pathlib.Path, help="take the weights of a checkpoint.pt or FILE.npz")
     p.add_argument("--minutes", type=number(float, 0), default=math.inf, help="end at the first checkpoint after that")
     p.add_argument("--seed", type=number(int, 0, 2**32 - 1), default=1, help="seed of weights, episodes and actions")
-    p.add_argument("--flats", type=int, default=64, choices=range(1, 65), metavar="1..64", help="flats to train in")
+    flats_argument(p, "flats to train in")
     p.add_argument("--episodes-per-flat", type=number(int, 1), default=1000, help="number of episodes to draw from")
     p.add_argument("--environments", type=number(int, 1), default=256, help="environments per rank")
     p.add_argument("--rollout", type=number(int, 1), default=128, help="steps per update")
@@ -368,7 +368,7 @@ def arguments() -> argparse.Namespace:
                    "rollouts of the others. DD-PPO has 0.6; below 1, runs on several ranks are not reproducible")
     p.add_argument("--mirror", action="store_true", help="swap left and right in every other environment")
     p.add_argument("--not-deterministic", action="store_true", help="let PyTorch choose algorithms by speed alone")
-    p.add_argument("--success", type=number(float, 0, 1e6), default=2.5, help="reward for a success")
+    p.add_argument("--success", type=number(float, 0, 1e6), default=SUCCESS, help="reward for a success")
     p.add_argument("--penalties", type=number(float, 0, 1e3), default=1.0, help="factor on the penalties near people")
     world_arguments(p)
     sensor_arguments(p)
