@@ -29,7 +29,7 @@ START = '{"journal": "gsnav.ray", '
 FORMAT = 2
 FIELDS = {"episode", "id", "reward", "metrics", "actions", "crc32"}  # of a line
 SUM = ', "crc32": '
-ACTIONS = set("0123")
+ACTIONS = set(map(str, range(_task.ACTIONS)))
 
 
 def resolved(scene: Any) -> Any:
@@ -136,7 +136,7 @@ def metrics(path: pathlib.Path, lines: Sequence[str], episodes: Sequence[_task.E
     if len(lines) > len(episodes):
         raise InvalidArgument(f"{path}: line {len(episodes) + 2}: there are only {len(episodes)} episodes")
     for i, text in enumerate(lines):
-        episode: Any = getattr(episodes[i], "episode", episodes[i])
+        episode = _task.without_scene(episodes[i])
         try:
             read.append(_metrics_of(text, i, episode.id))
         except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as e:

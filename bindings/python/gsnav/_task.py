@@ -233,6 +233,12 @@ def info_dict(info: StepInfo) -> dict[str, Any]:
     return {name: getattr(info, name) for name in INFO_FIELDS}
 
 
+def without_scene(episode: Episode) -> PointNavEpisode:
+    """The episode, without the number of its scene."""
+    point_nav: PointNavEpisode = getattr(episode, "episode", episode)
+    return point_nav
+
+
 def plain(value: Any) -> Any:
     """A value that JSON does not know, in plain types."""
     if isinstance(value, np.ndarray):

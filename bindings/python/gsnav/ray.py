@@ -81,7 +81,7 @@ class Player:
                     continue
                 (taken, gained, images), rows[e] = zip(*rows[e]), []
                 metrics = infos["final_info"]["metrics"]
-                episode: Any = getattr(episodes[index], "episode", episodes[index])
+                episode = _task.without_scene(episodes[index])
                 done[index] = Rollout(index, episode.id, np.array(taken, np.int8), np.array(gained),
                                       EpisodeMetrics(**{n: metrics[n][e].item() for n in _task.METRIC_FIELDS}),
                                       {k: np.stack([image[k] for image in images]) for k in keep})
