@@ -91,7 +91,7 @@ struct alignas(16) SplatEntry {
 };
 
 /// A slot whose record must be computed in double, from row `row` of an instance.
-struct HighPrecisionSplat {
+struct PreciseSplat {
   std::uint32_t slot, instance, row;
 };
 
@@ -148,7 +148,7 @@ struct DepthBins {
 struct BatchCounters {
   static constexpr std::size_t kLine = 256;
   alignas(kLine) unsigned long long slots;
-  alignas(kLine) unsigned long long high_precision;
+  alignas(kLine) unsigned long long precise;
   alignas(kLine) unsigned long long several;
   alignas(kLine) unsigned long long large;
   alignas(kLine) unsigned long long pairs;
@@ -191,7 +191,7 @@ struct BatchArgs {
   SplatDepth<float>* depths;  ///< Records of all splats, or null: then the few Gaussians that decide a
                               ///< median depth are projected again.
   SplatPerspective<float>* perspectives;  ///< Null for Response::ewa.
-  HighPrecisionSplat* high_precision;
+  PreciseSplat* precise;
   SplatKey* several;
   LargeRow* large;
   /// Shape [tiles << depth_bins.bits]. First the number of pairs; then, once lists have places, the
@@ -212,7 +212,7 @@ struct BatchArgs {
   Pair* pairs;                ///< Lists of all tiles. Unsorted, or sorted after order_lists.
   Pair* pairs_alt;
   BeyondPair* beyond;
-  std::uint32_t slot_capacity, high_precision_capacity, several_capacity, large_capacity, part_capacity;
+  std::uint32_t slot_capacity, precise_capacity, several_capacity, large_capacity, part_capacity;
   std::uint32_t pair_capacity;  ///< Number of `pairs`, if lists are counted first.
   /// Numbers of `beyond` and `pairs_alt`, if lists have reserved space.
   std::uint32_t beyond_capacity, alt_capacity;

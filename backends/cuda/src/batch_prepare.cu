@@ -260,7 +260,7 @@ void CudaBatchRenderer::State::guess_capacities(std::uint64_t gaussians, bool fe
     if (capacity == 0) capacity = n;
   };
   guess(slot_capacity, slots);
-  guess(high_precision_capacity, slots / Policy::kSlotsPerHighPrecision);
+  guess(precise_capacity, slots / Policy::kSlotsPerPrecise);
   guess(large_capacity, slots / Policy::kSlotsPerLarge);
   guess(several_capacity, slots / (few ? Policy::kSlotsPerSeveralOfFew : Policy::kSlotsPerSeveral));
   if (few) {

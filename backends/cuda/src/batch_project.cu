@@ -52,7 +52,7 @@ __device__ void write_record(const BatchArgs& a, const SplatKey& of, std::uint32
 /// Result of projecting a row for one camera.
 struct CameraSplat {
   bool drawn = false;
-  bool high_precision = false;  ///< It needs double: project_high_precision_kernel draws it.
+  bool precise = false;  ///< It needs double: project_precise_kernel draws it.
   std::uint32_t code = 0, camera = 0;
   RowKey<float> key;
   Splat splat;
@@ -137,11 +137,11 @@ class WarpProjection {
     const std::uint32_t row = static_cast<std::uint32_t>(first_ + at);
     CameraSplat projected;
     project_row(exists, index, at, projected);
-    const bool wanted = projected.drawn || projected.high_precision;
+    const bool wanted = projected.drawn || projected.precise;
     const std::uint64_t taken = slots_.take(wanted);
     const std::uint32_t slot =
         wanted && taken < a_.slot_capacity ? static_cast<std::uint32_t>(taken) : kNoSlot;
-    if (projected.high_precision) queue_high_precision({slot, index, row});
+    if (projected.precise) queue_precise({slot, index, row});
     list(projected, slot, index, at);
   }
 
@@ -152,10 +152,9 @@ class WarpProjection {
                           const auto& camera64) {
       const ProjectedRow<float> projected(camera, from, out.key);
       if (!projected.splat.visible) return;
-      out.high_precision = gsnav::detail::needs_double(camera, projected.splat);
-      out.drawn =
-          !out.high_precision && make_splat<GeometryOnly>(camera, camera64(), a_.depths != nullptr,
-                                                          out.key, projected, out.splat);
+      out.precise = gsnav::detail::needs_double(camera, projected.splat);
+      out.drawn = !out.precise && make_splat<GeometryOnly>(camera, camera64(), a_.depths != nullptr,
+                                                           out.key, projected, out.splat);
     };
     if constexpr (PlainRules) {
       const PlainCamera& packed = a_.plain_cameras[index];
@@ -182,11 +181,11 @@ class WarpProjection {
     }
   }
 
-  __device__ void queue_high_precision(const HighPrecisionSplat& splat) const {
-    const unsigned long long place = atomicAdd(&a_.counters->high_precision, 1ull);
+  __device__ void queue_precise(const PreciseSplat& splat) const {
+    const unsigned long long place = atomicAdd(&a_.counters->precise, 1ull);
     if (!Reserved && splat.slot != kNoSlot)
       a_.entries[splat.slot] = {0, 0, 0, kNoSlot};  // Until it has a record.
-    if (place < a_.high_precision_capacity) a_.high_precision[place] = splat;
+    if (place < a_.precise_capacity) a_.precise[place] = splat;
   }
 
   /// Writes the record and the pairs of a visible splat, or queues it for a kernel that finds its tiles.
@@ -265,11 +264,10 @@ __global__ void __launch_bounds__(32 * Policy::kWarps, Policy::kResident)
   warp.mark_rest();
 }
 
-__global__ void __launch_bounds__(Policy::kHighPrecisionThreads)
-    project_high_precision_kernel(const BatchArgs a) {
-  const std::uint32_t n = used(a.counters->high_precision, a.high_precision_capacity);
+__global__ void __launch_bounds__(Policy::kPreciseThreads) project_precise_kernel(const BatchArgs a) {
+  const std::uint32_t n = used(a.counters->precise, a.precise_capacity);
   for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < n; i += gridDim.x * blockDim.x) {
-    const HighPrecisionSplat h = a.high_precision[i];
+    const PreciseSplat h = a.precise[i];
     if (h.slot == kNoSlot) continue;
     const BatchInstance& instance = a.instances[h.instance];
     const ViewedSet<float>& args = instance.args;
@@ -308,7 +306,7 @@ __global__ void __launch_bounds__(Policy::kHighPrecisionThreads)
 }  // namespace
 
 void launch_projection(const BatchArgs& args, int multiprocessors, cudaStream_t stream) {
-  const unsigned blocks = static_cast<unsigned>(multiprocessors) * Policy::kHighPrecisionBlocks;
+  const unsigned blocks = static_cast<unsigned>(multiprocessors) * Policy::kPreciseBlocks;
   const bool geometry_only = args.depths == nullptr && args.perspectives == nullptr;
   const auto project = [&](auto kernel) {
     kernel<<<static_cast<unsigned>(multiprocessors) * Policy::kResident, 32 * Policy::kWarps, 0,
@@ -327,7 +325,7 @@ void launch_projection(const BatchArgs& args, int multiprocessors, cudaStream_t 
     args.list_room != 0 ? of_lists.template operator()<false, true>()
                         : of_lists.template operator()<false, false>();
   }
-  project_high_precision_kernel<<<blocks, Policy::kHighPrecisionThreads, 0, stream>>>(args);
+  project_precise_kernel<<<blocks, Policy::kPreciseThreads, 0, stream>>>(args);
 }
 
 }  // namespace gsnav::cuda

@@ -29,7 +29,7 @@ cuda::BatchCounters counters_of(const cuda::Flight& flight) {
   if (flight.key.regions.sets == nullptr) return *flight.counters;
   cuda::BatchCounters n{};
   n.pairs = flight.region_counters->pairs;
-  n.high_precision = flight.region_counters->precise_rows;
+  n.precise = flight.region_counters->precise_rows;
   n.items = static_cast<std::uint32_t>(flight.region_counters->groups);
   return n;
 }
@@ -60,7 +60,7 @@ void CudaBatchRenderer::State::size_scratch() {
   args.entries =
       with_room(entries, counted ? std::min<std::uint64_t>(slot_capacity, entry_capacity) : 0);
   args.sources = exactly(sources, slot_capacity);
-  args.high_precision = exactly(high_precision, high_precision_capacity);
+  args.precise = exactly(precise, precise_capacity);
   args.several = exactly(several, several_capacity);
   args.large = exactly(large, large_capacity);
   // Both kinds of counters are in one block, so that one operation clears them.
@@ -93,7 +93,7 @@ void CudaBatchRenderer::State::size_scratch() {
   raster.depths = {args.depths, records_depths ? slot_capacity : 0};
   raster.perspectives = {args.perspectives, perspective ? slot_capacity : 0};
   args.slot_capacity = slot_capacity;
-  args.high_precision_capacity = high_precision_capacity;
+  args.precise_capacity = precise_capacity;
   args.several_capacity = several_capacity;
   args.large_capacity = large_capacity;
   args.pair_capacity = pair_capacity;
@@ -101,7 +101,7 @@ void CudaBatchRenderer::State::size_scratch() {
   args.alt_capacity = alt_capacity;
   stats.scratch_bytes =
       inputs.capacity_bytes() + items.capacity_bytes() + records.capacity_bytes() +
-      entries.capacity_bytes() + sources.capacity_bytes() + high_precision.capacity_bytes() +
+      entries.capacity_bytes() + sources.capacity_bytes() + precise.capacity_bytes() +
       several.capacity_bytes() + large.capacity_bytes() + parts.capacity_bytes() +
       long_parts.capacity_bytes() + zeroed.capacity_bytes() + tile_counts.capacity_bytes() +
       tile_begins.capacity_bytes() + tile_shifts.capacity_bytes() + tile_order.capacity_bytes() +
@@ -232,12 +232,12 @@ bool CudaBatchRenderer::State::fit_capacities(const cuda::Flight& flight) {
   };
   if (flight.key.regions.sets != nullptr) {
     fit(regions.pair_capacity, flight.key.regions.pair_capacity, n.pairs);
-    fit(regions.precise_capacity, flight.key.regions.precise_capacity, n.high_precision);
+    fit(regions.precise_capacity, flight.key.regions.precise_capacity, n.precise);
     fit(regions.group_capacity, flight.key.regions.group_capacity, n.items);
     return had;
   }
   fit(slot_capacity, was.slot_capacity, n.slots);
-  fit(high_precision_capacity, was.high_precision_capacity, n.high_precision);
+  fit(precise_capacity, was.precise_capacity, n.precise);
   fit(several_capacity, was.several_capacity, n.several);
   fit(large_capacity, was.large_capacity, n.large);
   if (was.depth_bins.many()) {

@@ -205,7 +205,7 @@ struct CudaBatchRenderer::State {
         long_parts(b),
         depths(b),
         perspectives(b),
-        high_precision(b),
+        precise(b),
         parts(b),
         pairs(b),
         pairs_alt(b),
@@ -304,7 +304,7 @@ struct CudaBatchRenderer::State {
   Array<std::uint32_t> sources, zeroed, tile_counts, tile_begins, tile_order, long_parts;
   Array<SplatDepth<float>> depths;
   Array<SplatPerspective<float>> perspectives;
-  Array<cuda::HighPrecisionSplat> high_precision;
+  Array<cuda::PreciseSplat> precise;
   Array<cuda::ListPart> parts;
   Array<cuda::Pair> pairs, pairs_alt;
   Array<cuda::BeyondPair> beyond;
@@ -319,7 +319,7 @@ struct CudaBatchRenderer::State {
   std::uint64_t entry_capacity = 0;  ///< Largest number of slots that the call may take.
   bool recordable = true;
   bool prepared = false;  ///< True if `args`, `raster` and `meshes` belong to the last call.
-  std::uint32_t slot_capacity = 0, high_precision_capacity = 0, several_capacity = 0, large_capacity = 0,
+  std::uint32_t slot_capacity = 0, precise_capacity = 0, several_capacity = 0, large_capacity = 0,
                 pair_capacity = 0, beyond_capacity = 0, alt_capacity = 0;
   std::uint32_t list_room = 0,
                 room_tiles = 0;  ///< Space of lists that are not counted first, and the number of tiles

@@ -30,7 +30,7 @@ struct Batch {
 /// First estimates of capacities, and the space reserved for lists.
 struct Capacity {
   static constexpr std::uint64_t kGaussiansPerSlot = 4, kLeastSlots = 1u << 16, kMostSlots = 1u << 26;
-  static constexpr std::uint32_t kSlotsPerHighPrecision = 32, kSlotsPerLarge = 32, kSlotsPerSeveral = 16,
+  static constexpr std::uint32_t kSlotsPerPrecise = 32, kSlotsPerLarge = 32, kSlotsPerSeveral = 16,
                                  kSlotsPerSeveralOfFew = 4, kSlotsPerBeyond = 16, kPairsPerSlot = 2;
   static constexpr std::uint64_t kRoomStep = 32;  ///< The space of a list is a multiple of this number
                                                   ///< of pairs.
@@ -50,7 +50,7 @@ struct Cull {
 
 struct Project {
   static constexpr unsigned kWarps = 4, kResident = 5;
-  static constexpr unsigned kHighPrecisionThreads = 128, kHighPrecisionBlocks = 8;
+  static constexpr unsigned kPreciseThreads = 128, kPreciseBlocks = 8;
   /// Number of slots that a warp takes at a time. Few cameras provide fewer warps with work, so slabs
   /// are smaller.
   static constexpr std::uint32_t kFewCameras = 8, kSlab = 256, kSlabOfFew = 64;
