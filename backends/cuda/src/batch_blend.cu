@@ -22,7 +22,8 @@ constexpr std::uint32_t kNothing = kChunk;  ///< Index of a staged splat that co
 static_assert(kThreads == policy::Order::kThreads && 4 * kBlock * kBlock == 32 * kPixels &&
               kOrderBatch % kChunk == 0);
 
-static_assert((kChunk + 1) * sizeof(StagedSplat) <= kOrderLent && kOrderLent <= 0xffff);
+static_assert((kChunk + 1) * sizeof(StagedSplat) <= policy::Order::kLentBytes &&
+              policy::Order::kLentBytes <= 0xffff);
 
 struct BlendShared {
   alignas(16) OrderShared order;

@@ -15,7 +15,6 @@ inline constexpr int kOrderThreads = policy::Order::kThreads, kOrderItems = poli
 inline constexpr int kOrderBinBits = policy::Order::kBinBits, kOrderBins = 1 << kOrderBinBits;
 /// Levels for the key and the rank.
 inline constexpr int kOrderLevels = 2 * ((32 + kOrderBinBits - 1) / kOrderBinBits);
-inline constexpr std::size_t kOrderLent = 12800;  ///< Bytes of shared memory that a caller lends.
 
 /// A batch is scattered into this number of buckets by key. Splats that share a bucket are ordered
 /// afterwards.
@@ -37,10 +36,10 @@ struct OrderShared {
     std::uint32_t keys[kOrderBatch];
     std::uint32_t ranks[kOrderBatch];  ///< Valid where keys are equal.
   };
-  static_assert(sizeof(Sorting) <= kOrderLent);
+  static_assert(sizeof(Sorting) <= policy::Order::kLentBytes);
   union {
     Sorting sorting;
-    unsigned char lent[kOrderLent];  ///< Memory for the caller between calls.
+    unsigned char lent[policy::Order::kLentBytes];  ///< Memory for the caller between calls.
   };
   std::uint32_t slots[kOrderBatch];                    ///< The sorted batch.
   std::uint32_t begins[kOrderLevels][kOrderBins + 1];  ///< Begins of bins, as indices of pairs.

@@ -82,6 +82,7 @@ struct Order {
   static constexpr int kTieRounds = 12;    ///< Largest number of passes that swap neighbours of equal
                                            ///< depth.
   static constexpr unsigned kPartBlocks = 8, kLongBlocks = 6, kListBlocks = 16;
+  static constexpr std::size_t kLentBytes = 12800;  ///< Shared memory for the caller between calls.
 };
 
 struct Blend {
