@@ -109,11 +109,13 @@ TEST_CASE("cuda batch: meshes alone, meshes that come and go, and rules that bat
     const Batch again = draw_batch(cuda, renderer, {arrays.set()}, cameras, {}, kAll, true, all);
     check_same(again.frames, singly(cuda, {arrays.set()}, cameras, {}, {}, kAll, all));
   }
-  for (const int rule : {0, 1, 2}) {
+  for (const bool compat : {false, true}) {
     RenderConfig config;
-    if (rule == 0) config.composite = Composite::hard_depth;
-    if (rule == 1) config.response = Response::ray;
-    if (rule == 2) config.compat = Compat::inria;
+    if (compat) {
+      config.compat = Compat::inria;
+    } else {
+      config.response = Response::ray;
+    }
     CudaBatchRenderer other(cuda, config);
     Buffer<float, CudaBackend> rgb(cuda);
     rgb.resize_discard(3 * 97 * 64);
@@ -128,6 +130,56 @@ TEST_CASE("cuda batch: meshes alone, meshes that come and go, and rules that bat
     const Status s = other.render(sets, one, to);
     CHECK(s.code() == Errc::unsupported);
     CHECK(s.message().find("cameras[0]: meshes") != std::string::npos);
+  }
+}
+
+TEST_CASE("cuda batch: Composite::hard_depth") {
+  if (no_gpu("cuda batches with Composite::hard_depth")) return;
+  CudaBackend cuda;
+  const GaussianCloud scattered = random_cloud(6, {.count = 2000});
+  const GaussianArrays<CudaBackend> arrays(cuda, scattered);
+  const Meshes meshes(cuda);
+  const std::vector<Camera> cameras = ring_of(many_cameras());
+  const std::vector<MeshFrame> all(cameras.size(), MeshFrame{meshes.both});
+  for (int i = 0; i < 4; ++i) {
+    CAPTURE(i);
+    RenderConfig config;
+    config.composite = Composite::hard_depth;
+    config.background = {0.2, 0.4, 0.9};
+    if (i % 2 == 1) config.quality = Quality::fast();
+    GaussianSet set = arrays.set();
+    if (i >= 2) set.color_space = config.blend_space = ColorSpace::linear;
+    CudaBatchRenderer renderer(cuda, config);
+    CHECK(CudaBatchRenderer::supports(config, std::vector{set}, all[0]).ok());
+    const std::vector<Camera> few(cameras.begin(), cameras.begin() + 2);
+    for (const std::vector<Camera>& seen : {few, cameras}) {
+      const std::vector<MeshFrame> of_seen(seen.size(), all[0]);
+      const Frames<float> expected = singly(cuda, {set}, seen, {}, config, kAll, of_seen);
+      for (const unsigned outputs : {kAll, kMedianOnly, unsigned{kMedianDepth}, unsigned{kRgb}}) {
+        CAPTURE(outputs);
+        const Batch got = draw_batch(cuda, renderer, {set}, seen, {}, outputs, true, of_seen);
+        check_same(got.frames, singly(cuda, {set}, seen, {}, config, outputs, of_seen));
+        std::size_t wrong = 0;
+        for (std::size_t k = 0; k < got.rgb8.size(); ++k)
+          wrong += got.rgb8[k] != to_byte(expected.rgb[k]);
+        CHECK(wrong == 0);
+      }
+    }
+    // Cameras without meshes have another rule.
+    std::vector<MeshFrame> some = all;
+    some[1] = {};
+    std::vector<BatchCamera> mixed;
+    for (std::size_t c = 0; c < cameras.size(); ++c) mixed.push_back({cameras[c], {}, some[c]});
+    BatchImages to;
+    Buffer<float, CudaBackend> depth(cuda);
+    depth.resize_discard(cameras.size() *
+                         static_cast<std::size_t>(cameras[0].width * cameras[0].height));
+    to.floats.median_depth = depth.data();
+    const Status refused = renderer.render(std::vector{set}, mixed, to);
+    CHECK(refused.code() == Errc::unsupported);
+    CHECK(refused.message().find("cameras[1]: with Composite::hard_depth") != std::string::npos);
+    const Batch without = draw_batch(cuda, renderer, {set}, cameras, {}, kAll);
+    check_same(without.frames, singly(cuda, {set}, cameras, {}, config, kAll));
   }
 }
 

@@ -24,8 +24,6 @@ Status supports_meshes(const RenderConfig& config, const MeshFrame& meshes) {
     return Status(Errc::unsupported, std::string("meshes: ") + why);
   };
   if (meshes.instances.empty()) return {};
-  if (config.composite != Composite::merged)
-    return refused("RenderConfig.composite must be Composite::merged");
   if (config.response != Response::ewa) return refused("RenderConfig.response must be Response::ewa");
   if (config.compat != Compat::none) return refused("RenderConfig.compat must be Compat::none");
   if (any_seen_through(meshes.instances))
@@ -81,6 +79,11 @@ Status check_batch(std::span<const GaussianSet> sets, std::span<const BatchCamer
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     const Camera& camera = cameras[c].camera;
     if (Status s = in("cameras", c, validate(camera)); !s) return s;
+    if (config.composite == Composite::hard_depth &&
+        cameras[c].meshes.instances.empty() != cameras[0].meshes.instances.empty()) {
+      return in("cameras", c,
+                {Errc::unsupported, "with Composite::hard_depth, all cameras have meshes or none has"});
+    }
     if (camera.width != cameras[0].camera.width || camera.height != cameras[0].camera.height) {
       return in("cameras", c,
                 {Errc::invalid_argument, "its size is not that of cameras[0]; a batch has one size"});

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <utility>
 
 #include "batch_state.cuh"
 #include "gsnav/backends/cuda/device.cuh"
@@ -17,6 +18,13 @@ using Policy = cuda::policy::Mesh;
 std::uint32_t chunks_of(std::size_t n) {
   return static_cast<std::uint32_t>((n + kMeshChunk - 1) / kMeshChunk);
 }
+
+/// Converts an image to 8 bits.
+struct BytesOfImage {
+  const float* from;
+  std::uint8_t* to;
+  GSNAV_HD void operator()(std::size_t i) const noexcept { to[i] = to_byte(from[i]); }
+};
 
 }  // namespace
 
@@ -104,6 +112,8 @@ Status CudaBatchRenderer::State::place_meshes(std::span<const BatchCamera> camer
   cuda::Flight& flight = flights[calls % cuda::policy::Batch::kInFlight];
   flight.mesh_triangles = 0;
   meshes.waves.clear();
+  meshes.layer = {};
+  meshes.hard_depth = {};
   flight.has_meshes = std::any_of(cameras.begin(), cameras.end(),
                                   [](const BatchCamera& c) { return !c.meshes.instances.empty(); });
   if (!flight.has_meshes) return {};
@@ -116,13 +126,46 @@ Status CudaBatchRenderer::State::place_meshes(std::span<const BatchCamera> camer
   const bool color = raster.images.rgb != nullptr || rgb8 != nullptr;
   meshes.depth.resize_discard(args.cameras * pixels);
   meshes.color.resize_discard(color ? args.cameras * 3 * pixels : 0);
-  raster.mesh = {meshes.depth.data(), color ? meshes.color.data() : nullptr, {}};
-  raster.exp2_method = Exp2::degree5;  // The same as in other frames with meshes.
-  if (triangle_capacity == 0) {        // An estimate, as for slots.
+  meshes.layer = {meshes.depth.data(), color ? meshes.color.data() : nullptr, {}};
+  if (config.composite == Composite::hard_depth) {
+    separate_gaussians();
+  } else {
+    raster.mesh = meshes.layer;
+    raster.exp2_method = Exp2::degree5;  // The same as in other frames with meshes.
+  }
+  if (triangle_capacity == 0) {  // An estimate, as for slots.
     triangle_capacity = static_cast<std::uint32_t>(
         std::clamp<std::uint64_t>(most_triangles / 2, Policy::kLeastTriangles, Policy::kMostTriangles));
   }
   return {};
+}
+
+void CudaBatchRenderer::State::separate_gaussians() {
+  const std::size_t pixels = args.cameras * static_cast<std::size_t>(args.grid.width) *
+                             static_cast<std::size_t>(args.grid.height);
+  FrameImages<float>& alone = raster.images;
+  meshes.hard_depth = {alone, nullptr, nullptr, meshes.layer, raster.background};
+  meshes.hard_depth_bytes = std::exchange(rgb8, nullptr);
+  const bool missing_color = meshes.hard_depth_bytes != nullptr && alone.rgb == nullptr;
+  meshes.gaussians.resize_discard((missing_color ? 5 : 2) * pixels);
+  if (alone.alpha == nullptr) alone.alpha = meshes.gaussians.data();
+  if (alone.expected_depth == nullptr) alone.expected_depth = meshes.gaussians.data() + pixels;
+  if (missing_color) alone.rgb = meshes.gaussians.data() + 2 * pixels;
+  meshes.hard_depth.images.rgb = alone.rgb;
+  meshes.hard_depth.alpha = alone.alpha;
+  meshes.hard_depth.expected = alone.expected_depth;
+  raster.background = {};
+  raster.rules = blend_rules<float>(config, alone);
+}
+
+void CudaBatchRenderer::State::composite_hard_depth() {
+  const std::size_t pixels = args.cameras * static_cast<std::size_t>(args.grid.width) *
+                             static_cast<std::size_t>(args.grid.height);
+  backend.parallel_for(pixels, meshes.hard_depth);
+  if (meshes.hard_depth_bytes != nullptr) {
+    backend.parallel_for(3 * pixels,
+                         BytesOfImage{meshes.hard_depth.images.rgb, meshes.hard_depth_bytes});
+  }
 }
 
 void CudaBatchRenderer::State::size_layers() {
@@ -181,10 +224,10 @@ void CudaBatchRenderer::State::enqueue_layers(const cuda::Flight& flight) {
     wave.large = meshes.large.data();
     wave.depth = meshes.depth.data() + w.first_camera * pixels;
     wave.color =
-        raster.mesh.color == nullptr ? nullptr : meshes.color.data() + 3 * w.first_camera * pixels;
+        meshes.layer.color == nullptr ? nullptr : meshes.color.data() + 3 * w.first_camera * pixels;
     cuda::launch_mesh_wave(setup, width, height, wave, multiprocessors, stream);
   }
-  if (raster.mesh.color != nullptr && config.blend_space == ColorSpace::linear) {
+  if (meshes.layer.color != nullptr && config.blend_space == ColorSpace::linear) {
     backend.parallel_for(meshes.color.size(), DecodeImage<float>{meshes.color.data()});
   }
   backend.copy(flight.mesh_counters, meshes.counters.data(), sizeof(cuda::MeshCounters),

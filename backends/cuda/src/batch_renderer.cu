@@ -179,6 +179,7 @@ Status CudaBatchRenderer::State::launch() {
   } else {
     enqueue(flight);
   }
+  if (!meshes.hard_depth.mesh.empty()) composite_hard_depth();
   if (e == cudaSuccess) e = cudaGetLastError();
   if (e == cudaSuccess) e = cudaEventRecord(flight.done, backend.stream());
   if (e == cudaSuccess) return {};

@@ -9,6 +9,7 @@
 #include "batch_region_arrays.cuh"
 #include "gsnav/backends/cuda/batch.hpp"
 #include "gsnav/core/buffer.hpp"
+#include "gsnav/detail/frame/composite.hpp"
 #include "mesh.cuh"
 
 // State that a CudaBatchRenderer keeps between calls.
@@ -118,12 +119,13 @@ struct BatchMeshes {
         large(b),
         counters(b),
         depth(b),
-        color(b) {}
+        color(b),
+        gaussians(b) {}
   std::size_t bytes() const noexcept {
     return inputs.capacity_bytes() + vertices.capacity_bytes() + counts.capacity_bytes() +
            offsets.capacity_bytes() + camera_begins.capacity_bytes() + triangles.capacity_bytes() +
            pixels.capacity_bytes() + large.capacity_bytes() + counters.capacity_bytes() +
-           depth.capacity_bytes() + color.capacity_bytes();
+           depth.capacity_bytes() + color.capacity_bytes() + gaussians.capacity_bytes();
   }
 
   Array<unsigned char> inputs;
@@ -135,8 +137,12 @@ struct BatchMeshes {
   Array<unsigned long long> large;
   Array<MeshCounters> counters;
   Array<float> depth, color;  ///< Shapes [cameras][height][width] and [cameras][height][width][3].
+  Array<float> gaussians;     ///< Composite::hard_depth: images of Gaussians that are not asked for.
 
   // State of the current call.
+  MeshLayer<float> layer;
+  HardDepthPixel<float> hard_depth;          ///< Without `mesh`: the frame is not Composite::hard_depth.
+  std::uint8_t* hard_depth_bytes = nullptr;  ///< Its 8-bit image, or null.
   std::vector<MeshWaveSize> waves;
   std::vector<MeshPlacement> placements;
   std::vector<MeshPlace> places;
@@ -261,6 +267,10 @@ struct CudaBatchRenderer::State {
   void size_regions();
   /// Writes the meshes that the prepared cameras see into the call's pinned memory.
   Status place_meshes(std::span<const BatchCamera> cameras);
+  /// Draws Gaussians into images of their own, for Composite::hard_depth.
+  void separate_gaussians();
+  /// Composites them with the layer of meshes.
+  void composite_hard_depth();
   // Steps of place_meshes().
   Status list_meshes(std::span<const BatchCamera> cameras, std::uint64_t& most_triangles);
   void write_mesh_inputs(std::span<const BatchCamera> cameras);

@@ -67,9 +67,10 @@ struct BatchStats {
 /// the images. Tiles are 8 or 16 pixels wide, depending on the number of cameras.
 ///
 /// Meshes are drawn into a layer per camera, and the batch is then blended over it. If any camera of a
-/// call has meshes, `fast` uses the exponential of `exact` for all its cameras. `supports` tells which
-/// frames can be part of a batch, and `capacity` how many fit into one call. `render` rejects other
-/// frames as unsupported.
+/// call has meshes, `fast` uses the exponential of `exact` for all its cameras. With
+/// Composite::hard_depth, the batch is drawn without meshes, and then each pixel takes one of both.
+/// There, all cameras of a call have meshes or none has. `supports` tells which frames can be part of a
+/// batch, and `capacity` how many fit into one call. `render` rejects other frames as unsupported.
 class CudaBatchRenderer {
  public:
   /// Type of a camera of a batch.
@@ -86,8 +87,7 @@ class CudaBatchRenderer {
 
   /// Checks whether a frame with these sets and meshes can be part of a batch.
   /// @return unsupported, with the reason, if a set has another colour space than the frame or more than
-  /// 2^32 Gaussians, or, with meshes, for Composite::hard_depth, a Response other than ewa, a Compat, or
-  /// MeshAlpha::blend.
+  /// 2^32 Gaussians, or, with meshes, for a Response other than ewa, a Compat, or MeshAlpha::blend.
   static Status supports(const RenderConfig& config, std::span<const GaussianSet> sets,
                          const MeshFrame& meshes = {});
 
