@@ -24,7 +24,6 @@ struct RowPixels {
   bool precise;  ///< Its record may need double.
 };
 
-/// Conservative: from the largest axis, without a covariance.
 __device__ inline RowPixels pixels_of(const BatchArgs& a, const RegionArgs& r, const PlainCamera& p,
                                       const RegionView& v, const RowKey<float>& key,
                                       std::uint32_t word) {
@@ -32,26 +31,17 @@ __device__ inline RowPixels pixels_of(const BatchArgs& a, const RegionArgs& r, c
   const Vec3<float>& d = key.delta;
   const float x = ::fmaf(c.rotation[0], d.x, ::fmaf(c.rotation[1], d.y, c.rotation[2] * d.z));
   const float y = ::fmaf(c.rotation[3], d.x, ::fmaf(c.rotation[4], d.y, c.rotation[5] * d.z));
-  const float inv_z = reciprocal_near(key.z * v.inverse_scale);
-  const float u = x * inv_z, w = y * inv_z;
-  const float scale = scale_of(word) * inv_z, radius2 = radius2_of(r, word);
-  const float sx = c.fx * scale, sy = c.fy * scale;
-  const auto half = [&](float s, float tangent, float limit2) {
-    const float variance = ::fmaf(s * s, 1.0f + ::fminf(tangent * tangent, limit2), c.eps2d);
-    return sqrt_above(radius2 * variance) * ::fmaf(s, 2e-6f, 1.0005f);
-  };
-  // |d| <= z (1 + |u| + |w|): a bound of rounding errors.
-  const float margin = ::fmaf(::fabsf(u) + ::fabsf(w), v.rounding, 0.02f + v.rounding);
-  const float hx = half(sx, u, v.limit2_x) + margin, hy = half(sy, w, v.limit2_y) + margin;
-  const float mx = ::fmaf(c.fx, u, c.cx + 0.5f), my = ::fmaf(c.fy, w, c.cy + 0.5f);
+  const RoughFootprint f = rough_footprint(v.rough, c, {x, y, key.z * v.rough.inverse_scale},
+                                           scale_of(word), radius2_of(r, word));
   const float width = static_cast<float>(a.grid.width), height = static_cast<float>(a.grid.height);
   const auto pixel = [](float at, float size) {
     return static_cast<int>(::fminf(::fmaxf(at, 0.0f), size));
   };
-  const float out_x = ::fmaxf(::fabsf(mx - 0.5f * width), 0.5f * width);
-  const float out_y = ::fmaxf(::fabsf(my - 0.5f * height), 0.5f * height);
-  return {pixel(mx - hx, width), pixel(mx + hx, width) - 1, pixel(my - hy, height),
-          pixel(my + hy, height) - 1, out_x + out_y > v.precise_limit};
+  const float out_x = ::fmaxf(::fabsf(f.mean_x - 0.5f * width), 0.5f * width);
+  const float out_y = ::fmaxf(::fabsf(f.mean_y - 0.5f * height), 0.5f * height);
+  return {pixel(f.mean_x - f.half_width, width), pixel(f.mean_x + f.half_width, width) - 1,
+          pixel(f.mean_y - f.half_height, height), pixel(f.mean_y + f.half_height, height) - 1,
+          out_x + out_y > v.precise_limit};
 }
 
 /// A row's place in the image, kept between counting and placing: its key, or 0 if it is not in view,

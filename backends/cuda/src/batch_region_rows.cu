@@ -25,7 +25,7 @@ __global__ void __launch_bounds__(Policy::kRowThreads)
   const RegionSet set = r.sets[last_start(
       0u, a.set_count, [&](std::uint32_t i) { return r.sets[i].first_group <= group; })];
   const std::uint32_t local = group - set.first_group;
-  RowGroup out{{0, 0, 0}, -1, {0, 0, 0}, 0};
+  RowGroup out{{{0, 0, 0}, {0, 0, 0}, -1}, 0};
   if (local < set.groups && set.instances != 0) {
     const ViewedSet<float>& args = a.instances[set.first_instance].args;
     const std::size_t row = std::size_t{local} * 32 + lane;
@@ -45,34 +45,13 @@ __global__ void __launch_bounds__(Policy::kRowThreads)
     for (int k = 0; k < 3; ++k) {
       const float low = warp_reduced(shown ? from.mean[k] : 3e38f, smaller);
       const float high = warp_reduced(shown ? from.mean[k] : -3e38f, larger);
-      out.center[k] = 0.5f * low + 0.5f * high;
-      out.half[k] = (0.5f * high - 0.5f * low) * 1.00001f;
+      out.box.center[k] = 0.5f * low + 0.5f * high;
+      out.box.half[k] = (0.5f * high - 0.5f * low) * 1.00001f;
     }
-    out.reach = warp_reduced(shown ? scale_of(word) * sqrt_above(radius2_of(r, word)) : -1.0f, larger);
+    out.box.reach =
+        warp_reduced(shown ? scale_of(word) * sqrt_above(radius2_of(r, word)) : -1.0f, larger);
   }
   if (lane == 0) r.bounds[group] = out;
-}
-
-/// Whether the group may have visible rows, and a bound of its depth.
-__device__ bool group_in_view(const RegionView& v, const RowGroup& g, const float (&offset)[3],
-                              float& depth) {
-  float c[3], size = 0;
-  for (int k = 0; k < 3; ++k) {
-    c[k] = g.center[k] + offset[k];
-    size += ::fabsf(c[k]) + g.half[k] + ::fabsf(offset[k]);
-  }
-  const auto largest = [&](const float(&n)[3]) {
-    float sum = 0;
-    for (int k = 0; k < 3; ++k) sum = ::fmaf(n[k], c[k], ::fmaf(::fabsf(n[k]), g.half[k], sum));
-    return sum;
-  };
-  bool in_view = largest(v.axis) + ::fmaf(size, 2e-6f, 1e-5f) > v.nearest;
-#pragma unroll
-  for (int i = 0; i < 4; ++i) {
-    in_view = in_view && largest(v.plane[i]) + ::fmaf(v.wide[i], g.reach, v.slack[i] * size) >= 0;
-  }
-  depth = ::fmaf(v.axis[0], c[0], ::fmaf(v.axis[1], c[1], v.axis[2] * c[2]));
-  return in_view;
 }
 
 __global__ void __launch_bounds__(Policy::kCullThreads)
@@ -91,7 +70,9 @@ __global__ void __launch_bounds__(Policy::kCullThreads)
     const RegionView& view = r.views[index];
     float depth = 0;
     std::uint32_t mask = 0;
-    if (exists && bounds.reach >= 0 && group_in_view(view, bounds, r.cameras[index].key.offset, depth)) {
+    const float(&offset)[3] = r.cameras[index].key.offset;
+    if (exists && bounds.box.reach >= 0 &&
+        may_be_visible(view.rough, bounds.box, {offset[0], offset[1], offset[2]}, depth)) {
       const ViewedSet<float>& args = a.instances[index].args;
       const std::size_t chunk = local / (kProjectChunk / 32);
       if (args.selection.may_be_seen(chunk))
@@ -99,7 +80,7 @@ __global__ void __launch_bounds__(Policy::kCullThreads)
     }
     const unsigned votes = __ballot_sync(kAll, mask != 0);
     if (votes == 0) continue;
-    std::uint32_t octaves = mask != 0 ? __float_as_uint(::fmaxf(depth, view.nearest)) >> 20 : 0u;
+    std::uint32_t octaves = mask != 0 ? __float_as_uint(::fmaxf(depth, view.rough.nearest)) >> 20 : 0u;
     for (int step = 16; step > 0; step /= 2) octaves += __shfl_xor_sync(kAll, octaves, step);
     std::uint32_t place = 0;
     const std::uint32_t count = static_cast<std::uint32_t>(__popc(votes));

@@ -58,37 +58,25 @@ __device__ inline bool project_source(const BatchArgs& a, const RegionArgs& r,
   return make_splat<true>(camera, camera_of(packed.mean), false, key, projected, splat);
 }
 
-/// Pairs of pixels of the tile that a splat may cover: the edges of its ellipse in each row of pixels.
-/// Conservative: the ellipse is enlarged by more than the rounding of this function and of the pixel
-/// test.
+/// Pairs of pixels of the tile that a splat may cover, as FootprintRows.
 __device__ inline std::uint32_t covered_pairs(const Splat& splat, int tile_x, int tile_y,
                                               float log2_alpha_min) {
-  const SplatGeometry<float>& g = splat.geometry;
   const int x0 = max(splat.bounds.x0 - tile_x, 0), x1 = min(splat.bounds.x1 - tile_x, kRegionTile) - 1;
   const int y0 = max(splat.bounds.y0 - tile_y, 0), y1 = min(splat.bounds.y1 - tile_y, kRegionTile) - 1;
   if (x0 > x1 || y0 > y1) return 0;
-  const FootprintEllipse<float, true> e(g);
-  const float size =
-      ::fmaf(g.a + ::fabsf(g.k) + g.b, 256.0f, ::fabsf(g.w1) + ::fabsf(g.w2) + ::fabsf(e.pulled));
-  const float r =
-      ::fmaf(size, 4e-6f, 1.001f * sqrt_above(::fmaxf(g.log2_opacity - log2_alpha_min, 0.0f)));
-  const float r2 = r * r * e.inv_aa, fall = e.beta2 * e.inv_aa;
-  const float left = g.ref_x + e.mean_x - 0.5f - static_cast<float>(tile_x),
-              down = static_cast<float>(tile_y) + 0.5f - g.ref_y - e.mean_y;
-  const float pad =
-      ::fmaf(::fabsf(e.mean_x) + ::fabsf(e.slope) * (::fabsf(e.mean_y) + 256.0f), 4e-6f, 2e-3f);
+  constexpr float kFar = 4 * policy::Regions::kSide;
+  const FootprintRows rows(splat.geometry, log2_alpha_min, static_cast<float>(tile_x),
+                           static_cast<float>(tile_y), kFar);
   std::uint32_t mask = 0;
 #pragma unroll
   for (int pair = 0; pair < 4; ++pair) {
     float low = 1e9f, high = -1e9f;
 #pragma unroll
     for (int k = 0; k < 2; ++k) {
-      const float y = down + static_cast<float>(2 * pair + k);
-      const float room = ::fmaf(-fall * y, y, r2);
-      const float center = ::fmaf(-e.slope, y, left), half = sqrt_above(room) + pad;
-      if (room >= 0) {
-        low = ::fminf(low, center - half);
-        high = ::fmaxf(high, center + half);
+      float left, right;
+      if (rows.columns(static_cast<float>(2 * pair + k), left, right)) {
+        low = ::fminf(low, left);
+        high = ::fmaxf(high, right);
       }
     }
     const int first = max(static_cast<int>(::fminf(::fmaxf(low + 1.0f, 0.0f), 9.0f)), x0);

@@ -29,26 +29,10 @@ cuda::RegionView region_view(const cuda::BatchInstance& instance, const Gaussian
                              double radius2) {
   const ProjectionCamera<double>& c = instance.args.camera64;
   cuda::RegionView v{};
-  const double fixed = std::sqrt(c.eps2d * radius2) + 0.05;
-  const ImageAxis axes[2] = {c.image_axis(0), c.image_axis(1)};
-  for (int i = 0; i < 4; ++i) {
-    const ImageAxis& axis = axes[i / 2];
-    const ImageSide<double> side = i % 2 == 0 ? axis.first_side(fixed) : axis.last_side(fixed);
-    for (int k = 0; k < 3; ++k)
-      v.plane[i][k] =
-          static_cast<float>(side.across * axis.direction[k] + side.ahead * c.rotation(2, k));
-    v.wide[i] = static_cast<float>(1.05 * std::abs(axis.f) * axis.slant());
-    v.slack[i] = static_cast<float>(1e-5 * (std::abs(axis.f) + std::abs(side.ahead) + axis.extent));
-  }
-  for (int k = 0; k < 3; ++k) v.axis[k] = static_cast<float>(c.rotation(2, k));
-  v.nearest = static_cast<float>(c.near_plane / c.scale * (1 - 1e-6));
-  v.limit2_x = static_cast<float>(axes[0].limit * axes[0].limit * 1.00001);
-  v.limit2_y = static_cast<float>(axes[1].limit * axes[1].limit * 1.00001);
-  v.inverse_scale = static_cast<float>(1 / c.scale);
+  v.rough = RoughView::of(c, radius2);
   v.near_sigma = instance.args.camera.near_sigma;
   v.precise_limit = static_cast<float>(0.5 * (c.width + c.height) +
                                        (detail::kFloatOffset - 0.5) / whitened_per_pixel(set) - 2);
-  v.rounding = static_cast<float>((std::abs(c.fx) + std::abs(c.fy)) * 4e-6);
   v.camera = instance.camera;
   return v;
 }

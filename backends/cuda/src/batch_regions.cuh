@@ -3,6 +3,7 @@
 
 #include "batch_splat.cuh"
 #include "batch_tiles.cuh"
+#include "gsnav/detail/frame/rough_bounds.hpp"
 
 // Data of calls that draw small images by lists of regions (docs/notes/cuda.md, "Small images"). Each
 // region of 16 x 16 pixels has a list of rows, sorted into bins of depth. A warp draws a tile of 8 x 8
@@ -16,23 +17,18 @@ struct RegionSet {
   std::uint32_t first_group, groups, first_instance, instances;
 };
 
-/// 32 rows: the box of their means, and the largest radius of a footprint in asset units. `reach` is
-/// negative if no row can be visible.
+/// 32 rows: bounds of their footprints.
 struct alignas(16) RowGroup {
-  float center[3], reach, half[3], unused;
+  RoughBox box;
+  float unused;
 };
 
-/// Limits of an instance's view: four planes through the camera, near the edges of its image.
+/// An instance, seen by its camera.
 struct alignas(16) RegionView {
-  float plane[4][3];         ///< Left, right, top, bottom, in pixels: positive inside.
-  float wide[4];             ///< Pixels times depth per unit of reach.
-  float slack[4];            ///< Pixels times depth per unit of distance: bound of rounding errors.
-  float axis[3], nearest;    ///< View axis and near plane, in asset units.
-  float limit2_x, limit2_y;  ///< Squares of the limits of x/z and y/z in the Jacobian.
-  float inverse_scale, near_sigma;
+  RoughView rough;
+  float near_sigma;
   float precise_limit;  ///< A row may need double if |dx| + |dy| exceeds this, pixels. (dx, dy) is its
                         ///< centre minus that of the image.
-  float rounding;       ///< Pixels.
   std::uint32_t first_row;      ///< Number of the set's first row among the rows of the call.
   std::uint32_t first_in_view;  ///< Index of its first place in `in_view`.
   std::uint32_t camera;

@@ -6,6 +6,8 @@ DETERMINANT = "tests/hard_cases/test_determinant.cpp"
 EXPONENT = "tests/hard_cases/test_exponent.cpp"
 FILTER = "tests/hard_cases/test_filter.cpp"
 RESPONSE = "tests/hard_cases/test_response.cpp"
+ROUGH = "tests/hard_cases/test_rough_bounds.cpp"
+ROUGH_CASE = "N65_cull_invariance of rough bounds: no pixel that passes the test is outside"
 FOOTPRINT = "tests/hard_cases/test_footprint.cpp"
 
 FAULTS = [
@@ -112,4 +114,14 @@ FAULTS = [
           "tests/hard_cases/test_near.cpp", "N17_camera_inside_splat"),
     fault("behind_kept", "beyond_near_plane", "return z > F(near_plane);", "return abs(z) > F(near_plane);",
           "tests/hard_cases/test_order.cpp", "N24_neg_zero_depth", on=EVERY),
+    fault("rough_without_blur", "rough_footprint",
+          "lens.eps2d)", "0.0f)", ROUGH, ROUGH_CASE),
+    fault("rough_off_axis", "rough_footprint",
+          "1.0f + min(tangent * tangent, limit2)", "1.0f", ROUGH, ROUGH_CASE),
+    fault("rough_box_is_a_point", "RoughView",
+          "v.wide[i] = static_cast<float>(1.05 * abs(axis.f) * axis.slant());", "v.wide[i] = 0;", ROUGH,
+          ROUGH_CASE),
+    fault("footprint_rows_without_pad", "FootprintRows",
+          "pad_ = fma(abs(e.mean_x) + abs(e.slope) * (abs(e.mean_y) + far), 4e-6f, 2e-3f);", "pad_ = -0.5f;", ROUGH,
+          ROUGH_CASE),
 ]

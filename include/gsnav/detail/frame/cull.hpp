@@ -32,9 +32,8 @@ struct ChunkInView {
     return dot(direction, center) + abs(direction.x) * half.x + abs(direction.y) * half.y +
            abs(direction.z) * half.z;
   }
-  /// The function of a side of the image, as a direction.
   GSNAV_HD Vec3d across(const ImageAxis& axis, const ImageSide<double>& side) const noexcept {
-    return axis.direction * side.across + camera.rotation.row[2] * side.ahead;
+    return axis.normal(side, camera.rotation.row[2]);
   }
   GSNAV_HD double z_max() const noexcept { return largest(camera.rotation.row[2]) + slack; }
   GSNAV_HD double z_min() const noexcept {

@@ -138,4 +138,38 @@ class FootprintStrips {
   mask_of<L> negative_k_{};
 };
 
+/// Columns that the ellipse of a splat's footprint covers in single rows of pixels, from a corner on.
+/// The result contains all pixels that pass the pixel test, because the ellipse is enlarged by more than
+/// the rounding of both computations.
+class FootprintRows {
+ public:
+  /// @param x,y the corner, pixels
+  /// @param far bound of the distance of pixels from the reference pixel, along each image axis
+  GSNAV_HD FootprintRows(const SplatGeometry<float>& g, float log2_alpha_min, float x, float y,
+                         float far) noexcept {
+    const FootprintEllipse<float, true> e(g);
+    const float size = fma(g.a + abs(g.k) + g.b, far, abs(g.w1) + abs(g.w2) + abs(e.pulled));
+    const float r = fma(size, 4e-6f, 1.001f * sqrt_above(max(g.log2_opacity - log2_alpha_min, 0.0f)));
+    r2_ = r * r * e.inv_aa;
+    fall_ = e.beta2 * e.inv_aa;
+    slope_ = e.slope;
+    left_ = g.ref_x + e.mean_x - 0.5f - x;
+    down_ = y + 0.5f - g.ref_y - e.mean_y;
+    pad_ = fma(abs(e.mean_x) + abs(e.slope) * (abs(e.mean_y) + far), 4e-6f, 2e-3f);
+  }
+
+  /// Range [left, right] of columns that the row covers, counted from the corner. Returns false if it
+  /// covers none.
+  GSNAV_HD bool columns(float row, float& left, float& right) const noexcept {
+    const float y = down_ + row, room = fma(-fall_ * y, y, r2_);
+    const float center = fma(-slope_, y, left_), half = sqrt_above(room) + pad_;
+    left = center - half;
+    right = center + half;
+    return room >= 0;
+  }
+
+ private:
+  float r2_, fall_, slope_, left_, down_, pad_;
+};
+
 }  // namespace gsnav

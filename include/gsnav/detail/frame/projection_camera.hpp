@@ -66,6 +66,10 @@ struct ImageAxis {
   GSNAV_HD ImageSide<double> last_side(double margin) const noexcept {
     return ImageSide<double>::last(f, c, extent, margin);
   }
+  /// The function of a side, as a direction in the asset frame.
+  GSNAV_HD Vec3d normal(const ImageSide<double>& side, const Vec3d& view_axis) const noexcept {
+    return direction * side.across + view_axis * side.ahead;
+  }
 };
 
 /// A camera in the frame of one set, so that Gaussians need not be transformed to the world. With
