@@ -54,6 +54,22 @@ void check_some(CudaBackend& cuda, const Batch& got, const std::vector<GaussianS
   check_same(of_cameras(got.frames, numbers), singly(cuda, sets, some, of_some, config, outputs));
 }
 
+/// Random unit quaternions in four planes, by which SH bands are turned.
+Buffer<float, CudaBackend> rotations_of(CudaBackend& cuda, std::size_t count) {
+  Rng rng(31);
+  std::vector<float> planes(4 * count);
+  for (std::size_t i = 0; i < count; ++i) {
+    double parts[4], sum = 0;
+    for (double& p : parts) p = rng.normal();
+    for (const double p : parts) sum += p * p;
+    for (std::size_t k = 0; k < 4; ++k)
+      planes[k * count + i] = static_cast<float>(parts[k] / std::sqrt(sum));
+  }
+  Buffer<float, CudaBackend> out(cuda);
+  out.upload(planes.data(), planes.size());
+  return out;
+}
+
 constexpr unsigned kSmallOutputs[] = {kMedianDepth, kRgb, kMedianOnly};
 
 }  // namespace
@@ -64,7 +80,7 @@ TEST_CASE("cuda batch regions: several scenes, placed, in lists of each camera's
   const int count = is_emulated() ? 1200 : 9000;
   GaussianCloud a = random_cloud(1, {.count = count, .needle = 0.3});
   GaussianCloud b = random_cloud(2, {.count = count / 3, .sh_degree = 1, .scale = 0.2});
-  const GaussianCloud c = random_cloud(3, {.count = 700, .sh_degree = 0, .scale = 0.02});
+  const GaussianCloud c = random_cloud(3, {.count = 700, .sh_degree = 0, .scale = 0.02, .mip = true});
   sort_spatially(a);
   sort_spatially(b);
   compact_sh(b);
@@ -72,7 +88,11 @@ TEST_CASE("cuda batch regions: several scenes, placed, in lists of each camera's
   Similarity placed;
   placed.translation = {0.4, -0.2, 0.3};
   placed.scale = 0.7;
-  const std::vector<GaussianSet> sets{on_a.set(), on_b.set(), on_c.set(placed)};
+  std::vector<GaussianSet> sets{on_a.set(), on_b.set(), on_c.set(placed)};
+  const Buffer<float, CudaBackend> turned = rotations_of(cuda, b.size());
+  for (std::size_t k = 0; k < 4; ++k)
+    sets[1].gaussians.color.rotations.data[k] = turned.data() + k * b.size();
+  sets[1].gaussians.color.rotations.size = b.size();
   Lists lists;
   for (std::uint32_t i = 0; i < kCameras; ++i) {
     lists.push_back(i % 4 == 0   ? std::vector<std::uint32_t>{2, 0}
@@ -312,8 +332,9 @@ TEST_CASE("cuda batch regions: calls that they cannot draw are drawn by tiles, a
   CudaBackend cuda;
   // Splats as wide as the image: each row is in every region.
   const GaussianCloud wide = random_cloud(4, {.count = is_emulated() ? 300 : 40000, .scale = 2});
-  const GaussianCloud filtered = random_cloud(5, {.count = 300, .mip = true});
-  const GaussianArrays<CudaBackend> arrays(cuda, wide), on_mip(cuda, filtered);
+  const GaussianCloud far_apart = random_cloud(5, {.count = 300, .extent = 200});
+  REQUIRE(!far_apart.origin_ids.empty());
+  const GaussianArrays<CudaBackend> arrays(cuda, wide), of_origins(cuda, far_apart);
   const std::vector<Camera> cameras = ring(kCameras, 48, 48);
   CudaBatchRenderer renderer(cuda);
   renderer.set_least_of_regions(cuda::policy::Regions::kLeastCameras, 0);
@@ -325,8 +346,9 @@ TEST_CASE("cuda batch regions: calls that they cannot draw are drawn by tiles, a
   check_same(first.frames, second.frames);
   const std::vector<Camera> few(cameras.begin(), cameras.begin() + 20);
   CHECK(!draw_batch(cuda, renderer, {arrays.set()}, few, {}, kMedianDepth, false).stats.by_regions);
-  CHECK(!draw_batch(cuda, renderer, {on_mip.set()}, cameras, {}, kMedianDepth, false).stats.by_regions);
-  CHECK(!draw_batch(cuda, renderer, {on_mip.set()}, cameras, {}, kAll, false).stats.by_regions);
+  CHECK(!draw_batch(cuda, renderer, {of_origins.set()}, cameras, {}, kMedianDepth, false)
+             .stats.by_regions);
+  CHECK(!draw_batch(cuda, renderer, {of_origins.set()}, cameras, {}, kAll, false).stats.by_regions);
   const Batch empty = draw_batch(cuda, renderer, {}, cameras, {}, kMedianDepth, false);
   CHECK(!empty.stats.by_regions);
   CHECK(std::all_of(empty.frames.median_depth.begin(), empty.frames.median_depth.end(),

@@ -20,8 +20,10 @@ double whitened_per_pixel(const GaussianSet& set) {
 }
 
 bool fits_regions(const GaussianSet& set, const Camera& camera) {
+  const ShapeRows& rows = set.gaussians.shape;
   // Lengths of the image alone never ask for double.
-  return cuda::has_plain_rows(set) && set.selection.drawn_chunks.empty() &&
+  return rows.encoding() == ShapeEncoding::ellipsoids && rows.origin_ids.empty() &&
+         set.selection.drawn_chunks.empty() &&
          whitened_per_pixel(set) * (camera.width + camera.height) * 1.01 < detail::kFloatLength;
 }
 
@@ -31,6 +33,9 @@ cuda::RegionView region_view(const cuda::BatchInstance& instance, const Gaussian
   cuda::RegionView v{};
   v.rough = RoughView::of(c, radius2);
   v.near_sigma = instance.args.camera.near_sigma;
+  v.base_eps2d = instance.args.camera.base_eps2d;
+  v.min_compensation = instance.args.camera.min_compensation;
+  v.mip = instance.args.camera.mip;
   v.precise_limit = static_cast<float>(0.5 * (c.width + c.height) +
                                        (detail::kFloatOffset - 0.5) / whitened_per_pixel(set) - 2);
   v.camera = instance.camera;

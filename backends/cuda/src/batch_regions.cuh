@@ -26,7 +26,9 @@ struct alignas(16) RowGroup {
 /// An instance, seen by its camera.
 struct alignas(16) RegionView {
   RoughView rough;
-  float near_sigma;
+  // Of ProjectionCamera.
+  float near_sigma, base_eps2d, min_compensation;
+  bool mip;
   float precise_limit;  ///< A row may need double if |dx| + |dy| exceeds this, pixels. (dx, dy) is its
                         ///< centre minus that of the image.
   std::uint32_t first_row;      ///< Number of the set's first row among the rows of the call.
@@ -172,6 +174,9 @@ __device__ inline ProjectionCamera<float> region_camera(const BatchArgs& a, cons
   ProjectionCamera<float> c = camera_of(a, p.axes);
   c.near_plane = p.key.near_plane;
   c.near_sigma = v.near_sigma;
+  c.base_eps2d = v.base_eps2d;
+  c.min_compensation = v.min_compensation;
+  c.mip = v.mip;
   return c;
 }
 
