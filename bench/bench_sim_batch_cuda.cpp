@@ -30,8 +30,8 @@ using namespace gsnav;
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kFlats = 4, kEnvironments = 256, kJudged = 4;
-enum Profile : std::int64_t { kFast, kVisible, kLod };
-const char* const kProfiles[] = {"fast", "fast with visible sets", "lod"};
+enum Profile : std::int64_t { kFast, kVisible, kLod, kBodies };
+const char* const kProfiles[] = {"fast", "fast with visible sets", "lod", "fast with levels of bodies"};
 
 std::vector<SensorSpec> sensors(int side, bool rgb) {
   std::vector<SensorSpec> all = rgbd_sensors(side, side);
@@ -186,7 +186,7 @@ void step_batch_cuda(benchmark::State& state) {
   config.images = ImageMemory::backend;
   config.render.quality = Quality::fast();
   config.visible_sets = profile == kVisible;
-  if (profile == kLod) config.lod = LodChoice{};
+  if (profile == kLod || profile == kBodies) config.lod = LodChoice{.bodies_only = profile == kBodies};
   config.pose_slots = kEnvironments / kFlats;
   if (people) config.task = TaskConfig::avatar_pointnav();
   const auto episode_of = [&](std::size_t e, std::size_t count) -> Result<BatchEpisode> {
@@ -239,6 +239,7 @@ void step_batch_cuda(benchmark::State& state) {
 BENCHMARK(step_batch_cuda)
     ->ArgNames({"side", "rgb", "people", "profile"})
     ->ArgsProduct({{64, 128, 256}, {0, 1}, {0, 5}, {kFast, kVisible, kLod}})
+    ->ArgsProduct({{64, 128, 256}, {0, 1}, {5}, {kBodies}})
     ->Iterations(100)
     ->UseManualTime()
     ->Unit(benchmark::kMillisecond);

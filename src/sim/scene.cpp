@@ -54,8 +54,9 @@ Status validate_detail(const SimulatorScene& scene, const DetailChoice& choice) 
       return Status(Errc::invalid_argument, "SimulatorConfig." + field + ": SimulatorScene.assets[" +
                                                 std::to_string(i) + "]." + what);
     };
-    if (a.packed != nullptr && (choice.lod || choice.visible_sets)) {
-      return bad(choice.lod ? "lod" : "visible_sets", "packed: this needs Gaussians in `cloud`");
+    const bool trees = choice.has_trees();
+    if (a.packed != nullptr && (trees || choice.visible_sets)) {
+      return bad(trees ? "lod" : "visible_sets", "packed: this needs Gaussians in `cloud`");
     }
     if (choice.visible_sets &&
         (a.visible == nullptr || a.visible->cloud_chunks != a.cloud->view().chunk_count())) {
@@ -63,7 +64,7 @@ Status validate_detail(const SimulatorScene& scene, const DetailChoice& choice) 
                  std::string("visible is ") +
                      (a.visible == nullptr ? "null: build_visible_sets makes it" : "of another cloud"));
     }
-    if (!choice.lod) continue;
+    if (!trees) continue;
     if (a.lod != nullptr && a.lod->cloud_chunks() == a.cloud->view().chunk_count()) continue;
     return bad("lod", std::string("lod is ") +
                           (a.lod == nullptr ? "null: build_lod makes it" : "of another cloud"));

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "gsnav/backends/openmp.hpp"
+#include "gsnav/detail/avatar/skinned_crowd.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 #include "gsnav/sim/basic_batch.hpp"
@@ -95,6 +96,42 @@ TEST_CASE("a simulator with levels of detail sees what the cut of its cell draws
   CHECK(same_bits(obs["rgb"], frames.rgb));
   // A spectator at the same place too.
   CHECK(same_bits((*sim.render(camera))->rgb, frames.rgb));
+}
+
+TEST_CASE("LodChoice::bodies_only: assets without levels are drawn whole, bodies by their levels") {
+  OpenMPBackend backend(2);
+  SimulatorScene scene = peopled_scene(6000);
+  give_body_levels(scene);
+  SimulatorConfig config;
+  config.sensors = rgbd_sensors(40, 56);
+  config.lod = LodChoice{};
+  CHECK(!make_simulator(backend, scene, config).ok());
+  config.lod->bodies_only = true;
+  auto sim = make_simulator(backend, scene, config).value();
+  const auto obs = sim.reset(to_kitchen()).value();
+
+  SceneOnBackend<OpenMPBackend> by_hand(backend, std::make_shared<const SimulatorScene>(scene));
+  REQUIRE(by_hand.pose(0, sim.clock()).ok());
+  const Camera camera = sensor_camera(config.sensors[0], sim.agent().position, sim.agent().rotation());
+  std::vector<GaussianSet> sets(by_hand.sets(0).begin(), by_hand.sets(0).end());
+  SkinnedCrowd<OpenMPBackend> crowd(backend);
+  std::size_t coarse_bodies = 0;
+  for (const AvatarActor& a : scene.avatars)
+    crowd.add(std::make_shared<const AvatarArrays<OpenMPBackend>>(backend, a.asset(), true));
+  REQUIRE(crowd.pose(scene.avatars, sim.clock()).ok());
+  for (std::size_t i = 0; i < scene.avatars.size(); ++i) {
+    const std::size_t level = level_of_body(*scene.avatars[i].asset(), crowd.set(i).world_from_asset,
+                                            crowd.bounds(i), camera, *config.lod);
+    sets[1 + i] = filtered_for_photo(crowd.set(i, level), *config.lod);
+    coarse_bodies += level > 0 ? 1 : 0;
+  }
+  CHECK(coarse_bodies > 0);
+  RenderConfig rules = lod_config({});
+  rules.outputs = kRgb | kMedianDepth;
+  BasicRenderer<float, OpenMPBackend> renderer(backend, rules);
+  const auto frames = renderer.render(sets, std::span(&camera, 1)).value();
+  CHECK(same_bits(obs["rgb"], frames.rgb));
+  CHECK(same_bits(obs["depth"], frames.median_depth));
 }
 
 TEST_CASE(

@@ -78,6 +78,8 @@ void bind_render_settings(nb::module_& m) {
       .field("hysteresis", &L::hysteresis,
              "Hysteresis against flicker, in [0, 1). Simulators ignore it.")
       .field("photo", &L::photo, "Samples per pixel side of the reference image, 1 to 16.")
+      .field("bodies_only", &L::bodies_only,
+             "Draw levels of bodies, but assets whole. Assets then need no levels.")
       .done();
   using D = DetailChoice;
   Struct<D>(m, "DetailChoice", "Which part of a scene's assets is drawn.")

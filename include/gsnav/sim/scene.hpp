@@ -61,6 +61,9 @@ struct SimulatorScene {
 struct DetailChoice {
   std::optional<LodChoice> lod{};  ///< Level of detail. Empty: the assets as they are.
   bool visible_sets = false;       ///< Draw only the Gaussians that are visible from the camera's cell.
+
+  /// Whether assets are drawn by their trees of levels.
+  bool has_trees() const noexcept { return lod && !lod->bodies_only; }
 };
 
 /// Checks that a scene is complete enough to simulate.

@@ -19,6 +19,9 @@ struct LodChoice {
   double hysteresis = 0.1;
   /// The reference image, O_photo(k): the mean of k x k samples in each pixel. k is in [1, 16].
   int photo = 4;
+  /// True: simulators and renderers of scenes draw the levels of bodies, but assets whole. Assets then need
+  /// no levels. LodCut ignores it.
+  bool bodies_only = false;
 };
 
 /// Returns invalid_argument naming the field that is out of range, or ok.

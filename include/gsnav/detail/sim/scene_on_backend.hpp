@@ -33,17 +33,18 @@ class SceneOnBackend {
     if (choice.lod) levels_.choice = *choice.lod;
     if (!scene_->assets.empty()) lod_ = choice.lod;
     for (const SceneAsset& a : scene_->assets) {
-      arrays_.push_back(arrays_of(a, choice.lod ? nullptr : a.bands.get()));
+      const bool trees = choice.has_trees();
+      arrays_.push_back(arrays_of(a, trees ? nullptr : a.bands.get()));
       sets_.push_back(arrays_.back().set(a.world_from_asset));
       if (!choice.lod && !choice.visible_sets) continue;
-      levels_.assets.push_back({choice.lod ? a.lod.get() : nullptr, a.cloud.get(), a.world_from_asset});
+      levels_.assets.push_back({trees ? a.lod.get() : nullptr, a.cloud.get(), a.world_from_asset});
       if (choice.visible_sets) levels_.assets.back().visible = a.visible.get();
       if constexpr (!is_host_backend<B>) {
         if (choice.visible_sets) {
           visible_.emplace_back(backend).upload(a.visible->bits.data(), a.visible->bits.size());
           levels_.assets.back().visible_there = visible_.back().data();
         }
-        if (!choice.lod) continue;
+        if (!trees) continue;
         levels_.assets.back().cloud_there = sets_.back().gaussians;
         if (a.lod->merged.size() == 0) continue;
         levels_.assets.back().merged_there =
