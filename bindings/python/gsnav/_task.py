@@ -235,8 +235,7 @@ def info_dict(info: StepInfo) -> dict[str, Any]:
 
 def without_scene(episode: Episode) -> PointNavEpisode:
     """The episode, without the number of its scene."""
-    point_nav: PointNavEpisode = getattr(episode, "episode", episode)
-    return point_nav
+    return episode.episode if isinstance(episode, BatchEpisode) else episode
 
 
 def plain(value: Any) -> Any:
