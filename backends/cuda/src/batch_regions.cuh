@@ -26,7 +26,7 @@ struct alignas(16) RowGroup {
 /// An instance, seen by its camera.
 struct alignas(16) RegionView {
   RoughView rough;
-  // Of ProjectionCamera.
+  // Members of ProjectionCamera:
   float near_sigma, base_eps2d, min_compensation;
   bool mip;
   float precise_limit;  ///< A row may need double if |dx| + |dy| exceeds this, pixels. (dx, dy) is its

@@ -31,8 +31,8 @@ struct SimulatorConfig {
   /// comes from the first asset of the scene; any value other than the default or that one is an error.
   RenderConfig render{};
   /// Render the assets at a level of detail that depends on the distance (profile `lod`,
-  /// docs/concepts/scene.md). Implies Exponential::fast. Every asset needs a tree (SceneAsset::lod), unless
-  /// LodChoice::bodies_only is set. There is no hysteresis: an image depends only on its camera.
+  /// docs/concepts/scene.md). Implies Exponential::fast. Every asset needs a tree (SceneAsset::lod),
+  /// unless LodChoice::bodies_only is set. There is no hysteresis: an image depends only on its camera.
   std::optional<LodChoice> lod{};
   /// Render only the Gaussians that are visible from the camera's cell (VisibleSets), with the rules of
   /// the profile `fast`. Every asset needs visible sets (SceneAsset::visible). From positions outside

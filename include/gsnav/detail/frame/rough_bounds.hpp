@@ -17,8 +17,8 @@ struct RoughBox {
                 ///< can be visible.
 };
 
-/// A camera as seen from a set: four planes through it, near the edges of the image, and what bounds of
-/// single rows need. Lengths are in asset units.
+/// A camera as seen from a set: four planes through it near the edges of the image, and constants for
+/// bounds of single rows. Lengths are in asset units.
 struct RoughView {
   Vec3<float> plane[4];      ///< Left, right, top, bottom. Pixels times depth: positive inside.
   float wide[4];             ///< Pixels times depth per unit of reach.

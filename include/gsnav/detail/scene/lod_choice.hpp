@@ -19,8 +19,8 @@ struct LodChoice {
   double hysteresis = 0.1;
   /// The reference image, O_photo(k): the mean of k x k samples in each pixel. k is in [1, 16].
   int photo = 4;
-  /// True: simulators and renderers of scenes draw the levels of bodies, but assets whole. Assets then need
-  /// no levels. LodCut ignores it.
+  /// True: simulators and renderers of scenes draw the levels of bodies, but assets whole. Assets then
+  /// need no levels. LodCut ignores it.
   bool bodies_only = false;
 };
 
