@@ -7,15 +7,12 @@
 #include <vector>
 
 #include "gsnav/detail/core/field_check.hpp"
+#include "gsnav/detail/math/angles.hpp"
 #include "gsnav/math/quat.hpp"
 
 namespace gsnav {
 
 namespace {
-
-double wrapped(double angle) noexcept { return std::remainder(angle, 6.283185307179586); }
-
-double heading_of(const Vec3d& d) noexcept { return std::atan2(-d.x, -d.z); }
 
 bool flat(const Vec3d& d) noexcept { return std::hypot(d.x, d.z) < 0.01; }
 

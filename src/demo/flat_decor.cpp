@@ -4,11 +4,11 @@
 #include <cmath>
 
 #include "flat_parts.hpp"
+#include "gsnav/detail/math/angles.hpp"
 
 namespace gsnav::flat {
 namespace {
 
-constexpr double kTwoPi = 6.283185307179586;
 const unsigned kBookColors[] = {0x8c2f39, 0x2f4858, 0xd9b26f, 0x3f6f5f, 0xe8e0cf, 0x6b4a33, 0xc8553d,
                                 0x40627c, 0x9aa67a, 0x54364f, 0xd07a45, 0x23395b, 0xb7a99a, 0x7b8f3c};
 

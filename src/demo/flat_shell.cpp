@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "flat_parts.hpp"
+#include "gsnav/detail/math/angles.hpp"
 
 namespace gsnav::flat {
 namespace {
@@ -204,10 +205,9 @@ void curtain(Painter& p, double x0, double x1, const Vec3d& cloth) {
   const double w = x1 - x0;
   p.patch(
       [=](double s, double t) {
-        return Vec3d{x0 + w * s, 0.03 + 2.42 * t,
-                     0.085 + 0.028 * std::sin(6.283185307179586 * w * 9 * s)};
+        return Vec3d{x0 + w * s, 0.03 + 2.42 * t, 0.085 + 0.028 * std::sin(kTwoPi * w * 9 * s)};
       },
-      [=](double s, double) { return cloth * (0.86 + 0.14 * std::sin(6.283185307179586 * w * 9 * s)); },
+      [=](double s, double) { return cloth * (0.86 + 0.14 * std::sin(kTwoPi * w * 9 * s)); },
       {0.024, 0.08}, 24, 1);
 }
 

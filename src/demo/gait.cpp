@@ -8,19 +8,19 @@
 #include <vector>
 
 #include "gsnav/detail/core/field_check.hpp"
+#include "gsnav/detail/math/angles.hpp"
 
 namespace gsnav {
 
 namespace {
 
-constexpr double kTau = 6.283185307179586;
 // How far the pelvis moves in a walk, metres: to each side, and up and down.
 constexpr double kSway = 0.018, kBob = 0.020;
 constexpr double kStand = 0.012;  // keeps knees from locking, metres
 
-Quatd about_x(double degrees) noexcept { return axis_angle(Vec3d{1, 0, 0}, degrees * kTau / 360); }
-Quatd about_y(double degrees) noexcept { return axis_angle(Vec3d{0, 1, 0}, degrees * kTau / 360); }
-Quatd about_z(double degrees) noexcept { return axis_angle(Vec3d{0, 0, 1}, degrees * kTau / 360); }
+Quatd about_x(double degrees) noexcept { return axis_angle(Vec3d{1, 0, 0}, degrees * kTwoPi / 360); }
+Quatd about_y(double degrees) noexcept { return axis_angle(Vec3d{0, 1, 0}, degrees * kTwoPi / 360); }
+Quatd about_z(double degrees) noexcept { return axis_angle(Vec3d{0, 0, 1}, degrees * kTwoPi / 360); }
 
 double smooth(double u) noexcept {
   u = clamp(u, 0.0, 1.0);
@@ -123,7 +123,7 @@ void WalkMotion::pose(const Steps& steps, double walking, double time, const std
     set[joint] = 1;
   };
   give(at(kPelvis), b.rotation);
-  const double c = std::cos(kTau * phase), breath = std::sin(1.5 * time);
+  const double c = std::cos(kTwoPi * phase), breath = std::sin(1.5 * time);
   const double lean = -4.0 * walking + 0.4 * breath;
   Quatd chest = b.rotation;
   for (int k = 0; k < 3; ++k) {
@@ -175,7 +175,7 @@ void WalkMotion::prepare() {
     const Vec3d arm = rest(first + 6) - rest(first + 5);
     // Rotation from the bind pose to an arm that hangs 8 degrees away from the body.
     const double s = side == 0 ? 1.0 : -1.0,
-                 hang = -(82.0 - std::atan2(-arm.y, abs(arm.x)) * 360 / kTau);
+                 hang = -(82.0 - std::atan2(-arm.y, abs(arm.x)) * 360 / kTwoPi);
     arms_[side] = {about_z(0.12 * s * hang), about_z(s * hang), about_z(-2.0 * s), about_x(4.0)};
     const Vec3d ankle = rest(first + 2), ball = rest(first + 3);
     // Pivots of the foot: the joint of the toes, so that the toes stay flat on the floor, and the edge
@@ -217,11 +217,11 @@ void WalkMotion::prepare() {
 WalkMotion::Body WalkMotion::body(double phase, double walking, double drop) const {
   Body b;
   const double mid = 0.5 * options_.duty;  // phase at which the right leg is upright
-  b.roll = 3.0 * walking * std::cos(kTau * (phase - mid));
+  b.roll = 3.0 * walking * std::cos(kTwoPi * (phase - mid));
   b.rotation =
-      about_y(6.0 * walking * std::cos(kTau * phase)) * about_z(b.roll) * about_x(-2.0 * walking);
-  const double bob = kBob * walking * std::cos(2 * kTau * (phase - mid + 0.03));
-  b.pelvis = rest(kPelvis) + Vec3d{kSway * walking * std::cos(kTau * (phase - mid)),
+      about_y(6.0 * walking * std::cos(kTwoPi * phase)) * about_z(b.roll) * about_x(-2.0 * walking);
+  const double bob = kBob * walking * std::cos(2 * kTwoPi * (phase - mid + 0.03));
+  b.pelvis = rest(kPelvis) + Vec3d{kSway * walking * std::cos(kTwoPi * (phase - mid)),
                                    bob - kStand - walking * (drop - kStand), 0};
   return b;
 }
@@ -273,7 +273,7 @@ WalkMotion::Foot WalkMotion::foot(int side, const Steps& s, double walking) cons
     f.pitch = off * h00 + (off - off0) * (span / h) * h10 + on * h01;
     f.toe = max(-f.pitch, 0.0) * (1 - smooth(u));
   }
-  const double turn = std::sin(kTau * (s.turn_cycles + 0.5 * side));
+  const double turn = std::sin(kTwoPi * (s.turn_cycles + 0.5 * side));
   f.ankle.y += 0.04 * s.turning * max(turn, 0.0);
   return f;
 }

@@ -16,6 +16,7 @@
 #include "gsnav/avatar/asset.hpp"
 #include "gsnav/core/rng.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/detail/math/angles.hpp"
 #include "gsnav/frame/sh.hpp"
 #include "humanoid_body.hpp"
 
@@ -55,8 +56,7 @@ std::vector<SurfacePoint> sample_surface(const BodyShape& shape, const HumanoidO
     const auto at = std::upper_bound(sum.begin(), sum.end(), rng.uniform() * sum.back());
     const std::size_t i = min(static_cast<std::size_t>(at - sum.begin()) - 1, shape.lobes.size() - 1);
     const Lobe& l = shape.lobes[i];
-    const double z = rng.uniform(-1, 1), angle = rng.uniform(0, 6.283185307179586),
-                 q = std::sqrt(1 - z * z);
+    const double z = rng.uniform(-1, 1), angle = rng.uniform(0, kTwoPi), q = std::sqrt(1 - z * z);
     const Vec3d unit{q * std::cos(angle), z, q * std::sin(angle)};
     // The round ends get a share of the points in proportion to their length.
     const double straight = norm(l.b - l.a), ends = l.radii_a.y + l.radii_b.y;

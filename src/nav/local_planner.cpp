@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "gsnav/detail/math/angles.hpp"
 #include "half_planes.hpp"
 #include "navmesh_impl.hpp"
 #include "predicted_bodies.hpp"
@@ -94,7 +95,7 @@ class VelocitySearch {
   static constexpr double kOutWeight = 2.0, kInTick = 1000.0, kNever = 1e30;
 
   static Ground around(double ahead, int k, int count, double speed) noexcept {
-    constexpr double kTurn = 6.283185307179586;
+    constexpr double kTurn = kTwoPi;
     const double a = ahead + k * (kTurn / count);
     return {speed * std::cos(a), speed * std::sin(a)};
   }

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "gsnav/detail/math/angles.hpp"
+
 namespace gsnav {
 
 namespace {
@@ -286,7 +288,7 @@ Status ClipWalk::lead(const Skeleton& skeleton, Vec3d ahead) {
     return {Errc::invalid_argument,
             "ClipWalk: the feet lead " + std::to_string(stride) + " m in a cycle"};
 
-  const Quatd turn = axis_angle(Vec3d{0, 1, 0}, -std::atan2(-total.x, -total.z));
+  const Quatd turn = axis_angle(Vec3d{0, 1, 0}, -heading_of(total));
   const Mat3d turned = rotation_matrix(turn);
   way_.assign(1, 0.0);
   std::vector<double> sides{0.0};

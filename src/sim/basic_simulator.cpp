@@ -3,6 +3,8 @@
 
 #include <string_view>
 
+#include "gsnav/detail/math/angles.hpp"
+
 namespace gsnav {
 namespace {
 
@@ -21,7 +23,7 @@ std::uint64_t noise_seed(std::uint64_t seed, const WorldState& state) noexcept {
 }
 
 Quatd goal_rotation(const PointNavEpisode& episode) noexcept {
-  return yaw_rotation(Rng(hash(episode.id, kBasis)).uniform(0.0, 6.283185307179586));
+  return yaw_rotation(Rng(hash(episode.id, kBasis)).uniform(0.0, kTwoPi));
 }
 
 }  // namespace gsnav

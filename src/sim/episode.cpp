@@ -2,11 +2,11 @@
 #include "gsnav/detail/sim/episode.hpp"
 
 #include "gsnav/detail/core/field_check.hpp"
+#include "gsnav/detail/math/angles.hpp"
 
 namespace gsnav {
 namespace {
 
-constexpr double kTwoPi = 6.283185307179586;
 constexpr double kMaxEpisodes = 1e7;  // of one call
 
 /// Islands with a radius of at least `least_radius`.

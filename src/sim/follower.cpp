@@ -5,8 +5,9 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
-#include <numbers>
 #include <vector>
+
+#include "gsnav/detail/math/angles.hpp"
 
 namespace gsnav {
 namespace {
@@ -46,7 +47,7 @@ Guide guide(const NavMesh& mesh, const Vec3d& from, const Vec3d& goal, double be
   for (const Vec3d& p : path->points) {
     const Vec3d d = p - from;
     if (std::hypot(d.x, d.z) < 0.05) continue;  // A corner that was just passed gives no direction.
-    g.bearing = std::atan2(-d.x, -d.z);
+    g.bearing = heading_of(d);
     break;
   }
   return g;
@@ -59,7 +60,7 @@ class Lookahead {
         bodies_(bodies),
         horizon_(horizon),
         comfort_(comfort),
-        turn_(world.config().turn_angle * std::numbers::pi / 180.0),
+        turn_(radians(world.config().turn_angle)),
         reach_(0.95 * world.config().success_distance) {}
 
   Outlook play(const Plan& plan) const {
@@ -76,7 +77,7 @@ class Lookahead {
       if (i == 0) out.first = a;
       Vec3d displacement{};
       if (a == Action::move_forward) {
-        displacement = Vec3d{-std::sin(yaw), 0.0, -std::cos(yaw)} * c.forward_step;
+        displacement = along_heading(yaw) * c.forward_step;
       } else {
         yaw += a == Action::turn_left ? turn_ : -turn_;
       }
@@ -103,7 +104,7 @@ class Lookahead {
         return out;
       }
     }
-    const double turns_left = abs(std::remainder(way.bearing - yaw, 2 * std::numbers::pi)) / turn_;
+    const double turns_left = abs(wrapped(way.bearing - yaw)) / turn_;
     out.cost = out.charge + way.left + 0.6 * c.forward_step * turns_left;
     return out;
   }
@@ -120,7 +121,7 @@ class Lookahead {
   }
 
   Action steer(const Guide& way, double yaw) const noexcept {
-    const double error = std::remainder(way.bearing - yaw, 2 * std::numbers::pi);
+    const double error = wrapped(way.bearing - yaw);
     if (abs(error) <= 0.5 * turn_ + 1e-9) return Action::move_forward;
     return error > 0 ? Action::turn_left : Action::turn_right;
   }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "gsnav/detail/core/field_check.hpp"
+#include "gsnav/detail/math/angles.hpp"
 
 namespace gsnav {
 namespace {
@@ -30,7 +31,7 @@ Result<GreedyGeodesicFollower> GreedyGeodesicFollower::make(const NavMesh& mesh,
 }
 
 void GreedyGeodesicFollower::act(AgentPose& agent, Action action) const {
-  const double turn = task_.turn_angle * std::numbers::pi / 180.0;
+  const double turn = radians(task_.turn_angle);
   if (action == Action::turn_left) agent.yaw += turn;
   if (action == Action::turn_right) agent.yaw -= turn;
   if (action != Action::move_forward) return;
@@ -55,7 +56,7 @@ Result<Action> GreedyGeodesicFollower::next(const AgentPose& pose) {
     pending_.pop_back();
     return a;
   }
-  const double turn = task_.turn_angle * std::numbers::pi / 180.0;
+  const double turn = radians(task_.turn_angle);
   double best = -std::numeric_limits<double>::infinity();
   int turns = 0;
   for (int k = 0; k * turn <= std::numbers::pi + 1e-9; ++k) {

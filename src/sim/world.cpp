@@ -6,18 +6,16 @@
 #include <string>
 #include <utility>
 
+#include "gsnav/detail/math/angles.hpp"
 #include "gsnav/detail/sim/proximity.hpp"
 
 namespace gsnav {
 namespace {
 
-double wrapped(double angle) noexcept { return std::remainder(angle, 2 * std::numbers::pi); }
-
 /// Heading of a rotation: the direction of the rotated -Z on the ground plane.
 double yaw_of(Quatd q) noexcept {
   normalize(q);  // Values in files are rounded. A zero quaternion counts as no rotation.
-  const Vec3d f = rotate(q, Vec3d{0, 0, -1});
-  return std::atan2(-f.x, -f.z);
+  return heading_of(rotate(q, Vec3d{0, 0, -1}));
 }
 
 /// Tolerance for episodes from files: their points lie on the surface except for rounding.
@@ -144,16 +142,16 @@ Result<World::Motion> World::motion_of(Action action) const {
       m.chord = config_.forward_step / config_.substeps;
       break;
     case Action::turn_left:
-      m.first_turn = config_.turn_angle * std::numbers::pi / 180.0;
+      m.first_turn = radians(config_.turn_angle);
       break;
     case Action::turn_right:
-      m.first_turn = -config_.turn_angle * std::numbers::pi / 180.0;
+      m.first_turn = -radians(config_.turn_angle);
       break;
     case Action::look_up:
-      m.tilt = config_.tilt_angle * std::numbers::pi / 180.0;
+      m.tilt = radians(config_.tilt_angle);
       break;
     case Action::look_down:
-      m.tilt = -config_.tilt_angle * std::numbers::pi / 180.0;
+      m.tilt = -radians(config_.tilt_angle);
       break;
     default:
       return {Errc::invalid_argument,
@@ -317,8 +315,7 @@ Result<StepInfo> World::probe(Action action) const {
 
 PointGoal World::point_goal() const noexcept {
   const Vec3d d = s_.episode.goal_position - s_.agent.position;
-  const double bearing = std::atan2(-d.x, -d.z);
-  const double angle = wrapped(bearing - s_.agent.yaw);
+  const double angle = wrapped(heading_of(d) - s_.agent.yaw);
   return {std::hypot(d.x, d.z), angle > -std::numbers::pi ? angle : std::numbers::pi};
 }
 

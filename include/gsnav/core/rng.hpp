@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "gsnav/detail/math/angles.hpp"
 #include "gsnav/math/functions.hpp"
 
 namespace gsnav {
@@ -34,7 +35,7 @@ class Rng {
   /// Standard normal number (Box-Muller; each call uses two uniform numbers).
   double normal() noexcept {
     const double u = 1.0 - uniform(), v = uniform();
-    return sqrt(-2.0 * ::log(u)) * cos(6.283185307179586 * v);
+    return sqrt(-2.0 * ::log(u)) * cos(kTwoPi * v);
   }
 
  private:

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "gsnav/detail/math/angles.hpp"
 #include "gsnav/detail/nav/step.hpp"
 #include "gsnav/detail/sim/episode.hpp"
 #include "gsnav/detail/sim/task.hpp"
@@ -26,7 +27,7 @@ struct AgentPose {
   /// Orientation of the body in the world, without pitch.
   Quatd rotation() const noexcept { return yaw_rotation(yaw); }
   /// Unit vector that the body faces, on the ground plane.
-  Vec3d forward() const noexcept { return {-std::sin(yaw), 0.0, -std::cos(yaw)}; }
+  Vec3d forward() const noexcept { return along_heading(yaw); }
 };
 
 /// Outcome of one action.

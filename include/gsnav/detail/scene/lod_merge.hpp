@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "gsnav/detail/math/angles.hpp"
 #include "gsnav/math/mat.hpp"
 #include "gsnav/math/vec.hpp"
 
@@ -147,7 +148,6 @@ inline double density_product(const LodGaussian& a, const LodGaussian& b, double
   const double q = (d.x * (cxx * d.x + 2 * (cxy * d.y + cxz * d.z)) + d.y * (cyy * d.y + 2 * cyz * d.z) +
                     d.z * czz * d.z) /
                    det;
-  constexpr double kTwoPi = 6.283185307179586;
   return std::exp(-0.5 * q) / (kTwoPi * std::sqrt(kTwoPi * det));
 }
 
