@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The search over windows on surfaces made by hand, against paths over points on their edges, which know
-// neither windows nor unfolded faces. Needs few files of the library, so that faults can be planted in
+// neither windows nor unfolded faces. Needs few files of the library, so that faults can be seeded in
 // them.
 #include <doctest/doctest.h>
 
