@@ -163,6 +163,7 @@ struct HardDepthPixel {
         image[pixel] = covered ? S(1) : (lost ? S(0) : a);
       } else {
         // hard_depth has one depth per pixel, which goes to all depth images.
+        static_assert((O & kAnyDepth) != 0, "a new image needs a rule here");
         image[pixel] = lost ? (covered ? z : S(0)) : d;
       }
     });

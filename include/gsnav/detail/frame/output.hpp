@@ -44,7 +44,7 @@ inline constexpr ImageKind<S> kImages[] = {
 };
 inline constexpr std::size_t kImageCount = std::size(kImages<float>);
 inline constexpr unsigned kAllOutputs = (1u << kImageCount) - 1;
-inline constexpr unsigned kAnyDepth = kAllOutputs & ~(kRgb | kAlpha);
+inline constexpr unsigned kAnyDepth = kMedianDepth | kExpectedDepth | kAccumulatedDepth | kFirstHitDepth;
 
 constexpr std::size_t channels_of(Output output) noexcept {
   std::size_t i = 0;
