@@ -32,7 +32,7 @@ __global__ void __launch_bounds__(Policy::kRowThreads)
     const bool exists = row < args.gaussians.size();
     const LaneRow from = read_row<true>(args.gaussians.shape, row);
     const float scale = max(max(from.scales.x, from.scales.y), from.scales.z);
-    const float excess = log2(max(from.opacity, 1.2e-38f)) - a.log2_alpha_min;
+    const float excess = opacity_excess(log2_of_opacity(from.opacity), a.log2_alpha_min);
     const float radius2 = footprint_radius2(excess) * 1.0001f;
     const std::uint32_t word = exists ? row_word(r, scale, radius2) : kHidden;
     const std::size_t at = std::size_t{group} * 32 + lane;

@@ -149,7 +149,8 @@ class FootprintRows {
                          float far) noexcept {
     const FootprintEllipse<float, true> e(g);
     const float size = fma(g.a + abs(g.k) + g.b, far, abs(g.w1) + abs(g.w2) + abs(e.pulled));
-    const float r = fma(size, 4e-6f, 1.001f * sqrt_above(max(g.log2_opacity - log2_alpha_min, 0.0f)));
+    const float r =
+        fma(size, 4e-6f, 1.001f * sqrt_above(max(opacity_excess(g.log2_opacity, log2_alpha_min), 0.0f)));
     r2_ = r * r * e.inv_aa;
     fall_ = e.beta2 * e.inv_aa;
     slope_ = e.slope;
