@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "gsnav/detail/avatar/blend_pose.hpp"
 #include "gsnav/detail/core/field_check.hpp"
 
 namespace gsnav {
@@ -173,10 +174,7 @@ Similarity AvatarActor::placement(double t, LocalPose& pose, const std::vector<c
   const Similarity from = placement_at(blend_begin(), pose, needed),
                    to = placement_at(0.0, next, needed);
   const double u = (t - blend_begin()) / options_.loop_blend;
-  for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
-    pose.rotations[j] = slerp(pose.rotations[j], next.rotations[j], u);
-    pose.translations[j] = lerp(pose.translations[j], next.translations[j], u);
-  }
+  blend_joints(pose, next, u, pose);
   return {slerp(from.rotation, to.rotation, u), lerp(from.translation, to.translation, u), from.scale};
 }
 

@@ -14,6 +14,20 @@
 
 namespace gsnav {
 
+namespace {
+
+/// Joint j between keys a and b of a clip. Its translation does not move if there is one for all keys.
+void blend_keys(const MotionClip& clip, std::size_t a, std::size_t b, std::size_t j, double u,
+                LocalPose& out) {
+  const std::size_t n = clip.joints;
+  out.rotations[j] = slerp(clip.rotations[a * n + j], clip.rotations[b * n + j], u);
+  out.translations[j] = clip.translations.size() != n
+                            ? lerp(clip.translations[a * n + j], clip.translations[b * n + j], u)
+                            : clip.translations[j];
+}
+
+}  // namespace
+
 void MotionSource::pose_of(const MotionInput& input, [[maybe_unused]] const std::vector<char>& needed,
                            LocalPose& out) const {
   pose(input, out);
@@ -78,14 +92,11 @@ void MotionClip::pose_of(const MotionInput& input, const std::vector<char>& need
   }
   out.rotations.resize(joints);
   out.translations.resize(joints);
-  const bool moving = translations.size() != joints;
   for (std::size_t j = 0; j < joints; ++j) {
-    if (!needed.empty() && needed[j] == 0) continue;
-    out.rotations[j] = slerp(rotations[a * joints + j], rotations[b * joints + j], u);
-    out.translations[j] =
-        moving ? lerp(translations[a * joints + j], translations[b * joints + j], u) : translations[j];
+    if (needed.empty() || needed[j] != 0) blend_keys(*this, a, b, j, u, out);
   }
   out.root = {};
+  const bool moving = translations.size() != joints;
   if (!root_translation.empty()) {
     const Vec3d travel =
         end == ClipEnd::loop_forward ? root_translation[last] - root_translation[0] : Vec3d{};
@@ -129,15 +140,9 @@ double smooth_wrap_time(const Skeleton& skeleton, const MotionClip& clip, bool f
   std::vector<Vec3d> before(clip.joints);
   double fastest = 0.0;
   constexpr int kSteps = 16;
-  const bool moving = clip.translations.size() != clip.joints;
   for (int k = 0; k <= kSteps; ++k) {
     const double u = static_cast<double>(k) / kSteps;
-    for (std::size_t j = 0; j < clip.joints; ++j) {
-      pose.rotations[j] = slerp(clip.rotations[last * clip.joints + j], clip.rotations[j], u);
-      pose.translations[j] =
-          moving ? lerp(clip.translations[last * clip.joints + j], clip.translations[j], u)
-                 : clip.translations[j];
-    }
+    for (std::size_t j = 0; j < clip.joints; ++j) blend_keys(clip, last, 0, j, u, pose);
     forward_kinematics(skeleton, pose, globals);
     Vec3d root{};
     if (!clip.root_translation.empty() && !forward)

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "gsnav/detail/avatar/blend_pose.hpp"
 #include "gsnav/detail/math/angles.hpp"
 
 namespace gsnav {
@@ -17,10 +18,7 @@ namespace {
 void blend(const LocalPose& a, const LocalPose& b, double u, LocalPose& out) {
   out.rotations.resize(a.rotations.size());
   out.translations.resize(a.translations.size());
-  for (std::size_t j = 0; j < a.rotations.size(); ++j) {
-    out.rotations[j] = slerp(a.rotations[j], b.rotations[j], u);
-    out.translations[j] = lerp(a.translations[j], b.translations[j], u);
-  }
+  blend_joints(a, b, u, out);
   out.root = lerp(a.root, b.root, u);
 }
 

@@ -77,10 +77,10 @@ FAULTS = [
     fault("nlerp", "slerp", "  if (c > S(0.9999999)) {\n", "  if (c > S(-2)) {\n",
           POSE_TEST, "N60_slerp_vs_lerp", why="the same path at another speed"),
     fault("slerp_the_long_way", "slerp", SHORT, "", POSE_TEST, "N60_slerp_vs_lerp"),
-    fault("matrices_mixed", "pose_of",
-          "out.rotations[j] = slerp(rotations[a * joints + j], rotations[b * joints + j], u);",
-          "out.rotations[j] = quat_from_matrix(rotation_matrix(rotations[a * joints + j]) * (1 - u) +\n"
-          "                                          rotation_matrix(rotations[b * joints + j]) * u);",
+    fault("matrices_mixed", "blend_keys",
+          "out.rotations[j] = slerp(clip.rotations[a * n + j], clip.rotations[b * n + j], u);",
+          "out.rotations[j] = quat_from_matrix(rotation_matrix(clip.rotations[a * n + j]) * (1 - u) +\n"
+          "                                          rotation_matrix(clip.rotations[b * n + j]) * u);",
           POSE_TEST, "N60_slerp_vs_lerp"),
     fault("mirrored_joint_taken", "clip_from_matrices", "!(determinant(m.linear) > kMinBlendDeterminant)",
           "!(abs(determinant(m.linear)) > kMinBlendDeterminant)",
