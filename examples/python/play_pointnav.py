@@ -13,8 +13,8 @@ import sys
 import time
 
 import numpy as np
-from pointnav_policy import ACTIONS, HIDDEN, Policy, load, save
-from pointnav_worlds import (CHANNELS, HELD_OUT_SEEDS, METRICS, Worlds, device_of, goals, images_of, number,
+from pointnav_policy import ACTIONS, CHANNELS, HIDDEN, Policy, load, save
+from pointnav_worlds import (HELD_OUT_SEEDS, METRICS, Worlds, device_of, goals, images_of, number,
                              run_program, sensors_of, world_arguments)
 
 import gsnav

@@ -15,8 +15,8 @@ import numpy as np
 import torch
 import torch.distributed as dist
 from pointnav_curves import plot
-from pointnav_policy import ACTIONS, HIDDEN, STRIDES, load, read_checkpoint
-from pointnav_worlds import CHANNELS, LEFT, RIGHT, device_of
+from pointnav_policy import ACTIONS, CHANNELS, HIDDEN, STRIDES, load, read_checkpoint
+from pointnav_worlds import LEFT, RIGHT, device_of
 from torch import Tensor, nn
 
 import gsnav
@@ -171,7 +171,8 @@ def set_determinism(on: bool) -> None:
 
 def made_by(device: torch.device) -> str:
     """Versions and device. The bits of a run depend on them and on its arguments."""
-    name = torch.cuda.get_device_name(device) if device.type == "cuda" else "a CPU"
+    threads = torch.get_num_threads()
+    name = torch.cuda.get_device_name(device) if device.type == "cuda" else f"a CPU, {threads} threads of torch"
     return f"gsnav {gsnav.__version__} and torch {torch.__version__} on {name}"
 
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 import os
 import pathlib
 import sys
-import zipfile
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 Array = np.ndarray[Any, np.dtype[Any]]
 STRIDES = (4, 2, 1)  # of the three convolutions
 ACTIONS = 4  # stop, forward, left, right
+CHANNELS = {"depth": 1, "rgb": 3, "rgbd": 4}  # numbers per pixel of an agent's sensor
 HIDDEN = 256  # numbers of a hidden state
 LEAST_SIZE, LARGEST_SIZE = 36, 4096  # edge of the images, pixels
 
@@ -94,7 +94,7 @@ def load(path: pathlib.Path) -> Policy:
         return checked(Policy(weights, size))
     except KeyError as e:
         sys.exit(f"{path}: no weights of an agent: {e} is missing")
-    except (OSError, EOFError, ValueError, TypeError, IndexError, zipfile.BadZipFile) as e:
+    except Exception as e:  # numpy and zipfile document no types for damaged files
         sys.exit(f"{path}: no weights of an agent: {e}")
 
 
@@ -116,6 +116,8 @@ def read_checkpoint(path: pathlib.Path) -> dict[str, Any]:
 
 def checked(policy: Policy) -> Policy:
     """The policy, if it can act: otherwise a KeyError, IndexError or ValueError."""
+    if policy.channels not in (0, *CHANNELS.values()):
+        raise ValueError(f"images of {policy.channels} channels are those of no sensor")
     images = np.zeros((1, policy.size, policy.size, policy.channels), np.float32) if policy.channels else None
     start = np.ones(1, np.bool_)
     log_p, _ = policy.act(images, np.zeros((1, 3)), np.zeros(1, np.int64), start, np.zeros((1, HIDDEN), np.float32))

@@ -11,11 +11,15 @@ import copy
 import dataclasses
 import os
 import pathlib
+import sys
 from collections.abc import Iterator
 
-import matplotlib
+try:
+    import matplotlib
+    from PIL import Image, ImageDraw, ImageFont
+except ImportError:
+    sys.exit("pointnav_replay.py needs matplotlib: pip install matplotlib")
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
 from play_pointnav import WEIGHTS, sensor_of
 from pointnav_policy import HIDDEN, Policy, load
 from pointnav_worlds import (HELD_OUT_SEEDS, Worlds, device_of, goals, images_of, number, run_program, sensors_of,

@@ -14,13 +14,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from pointnav_policy import LARGEST_SIZE, LEAST_SIZE
+from pointnav_policy import CHANNELS, LARGEST_SIZE, LEAST_SIZE
 
 import gsnav
 
 LEFT, RIGHT = int(gsnav.Action.turn_left), int(gsnav.Action.turn_right)
 SENSORS = {"depth": ("depth",), "rgb": ("rgb",), "rgbd": ("rgb", "depth")}  # images of an agent's sensor, in order
-CHANNELS = {"depth": 1, "rgb": 3, "rgbd": 4}  # numbers per pixel
 TRAIN_SEEDS, HELD_OUT_SEEDS = range(64), range(64, 80)
 MESH_DENSITY = 0.05  # largest density of flats of triangles
 SUCCESS = 2.5  # reward for a success
@@ -129,11 +128,18 @@ def number(kind: type, least: float, most: float = math.inf) -> Callable[[str], 
 
 
 def run_program(main: Callable[[], None]) -> None:
-    """Runs main(). Errors of gsnav and of files end the program with a line."""
+    """Runs main(). Errors of gsnav and of files, too little memory and Ctrl-C end the program with a line."""
+    name = os.path.basename(sys.argv[0])
     try:
         main()
-    except (gsnav.Error, OSError) as e:
-        sys.exit(f"{os.path.basename(sys.argv[0])}: {e}")
+    except (gsnav.Error, OSError, MemoryError) as e:
+        sys.exit(f"{name}: {e}")
+    except RuntimeError as e:  # of PyTorch
+        if "memory" not in str(e):
+            raise
+        sys.exit(f"{name}: {str(e).splitlines()[0]}")
+    except KeyboardInterrupt:
+        sys.exit(f"{name}: stopped")
 
 
 def world_arguments(p: argparse.ArgumentParser) -> None:

@@ -27,8 +27,8 @@ import numpy as np
 import torch.distributed as dist
 from pointnav_agent import (Agent, Mirror, Reorder, Rows, agreed, begin_with, checkpoint_of, clear, devices_of,
                             hash_of, made_by, pieces, progress, set_determinism, write_log)
-from pointnav_policy import ACTIONS, HIDDEN
-from pointnav_worlds import (CHANNELS, METRICS, SUCCESS, TRAIN_SEEDS, Draw, Worlds, flats_argument, goals, mixed,
+from pointnav_policy import ACTIONS, CHANNELS, HIDDEN
+from pointnav_worlds import (METRICS, SUCCESS, TRAIN_SEEDS, Draw, Worlds, flats_argument, goals, mixed,
                              number, run_program, sensor_arguments, sensors_of, world_arguments)
 from torch import Tensor, nn
 from torch.nn.utils.rnn import PackedSequence
