@@ -29,6 +29,30 @@ def test_errors_say_what_to_do(tmp_path):
     assert "there are" in play("--device", "tpu").stderr
 
 
+def test_a_damaged_file_of_weights_ends_with_a_line(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    from pointnav_policy import load
+
+    whole, path, rng = (FOLDER / "pointnav_depth.npz").read_bytes(), tmp_path / "agent.npz", np.random.default_rng(3)
+    ended = 0
+    for _ in range(120):
+        content = bytearray(whole)
+        content[int(rng.integers(len(content)))] ^= 1 << int(rng.integers(8))
+        path.write_bytes(content)
+        try:
+            load(path)  # some bits do not matter
+        except SystemExit as e:
+            assert str(path) in str(e)
+            ended += 1
+    assert ended > 60
+    with np.load(FOLDER / "pointnav_depth.npz") as file:
+        weights = {name: file[name] for name in file.files}
+    weights["cnn.0.weight"] = np.repeat(weights["cnn.0.weight"], 2, 1)
+    np.savez(path, **weights)
+    run = play("--weights", path)
+    assert run.returncode != 0 and "2 channels" in run.stderr and "Traceback" not in run.stderr
+
+
 def test_a_replay_shows_the_path_step_by_step(tmp_path):
     pytest.importorskip("matplotlib")
     from PIL import Image, ImageSequence

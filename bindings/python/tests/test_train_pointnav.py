@@ -83,6 +83,33 @@ def test_ranks_end_together(tmp_path):
     assert len(rows(tmp_path)) == 2
 
 
+def test_a_rollout_ends_early_once_enough_other_ranks_are_done(tmp_path):
+    program = tmp_path / "straggle.py"
+    program.write_text(f"import sys\nsys.path.insert(0, {str(FOLDER)!r})\n"
+                       "import torch, train_pointnav\n"
+                       "from pointnav_agent import Agent\n"
+                       "from pointnav_worlds import Worlds\n"
+                       "args = train_pointnav.arguments()\n"
+                       "args.torch_device = torch.device('cpu')\n"
+                       "learner = train_pointnav.Learner(args, Agent(64, 1), Worlds(range(2), args, 10))\n"
+                       "class Store:\n"
+                       "    def add(self, name, n):\n"
+                       "        return 1  # of two ranks is done\n"
+                       "learner.ranks, learner.store = 2, Store()\n"
+                       "learner.noise = torch.rand(33, 8, 4)[:, :4].contiguous()\n"
+                       "learner.begin()\n"
+                       "learner.collect()\n"
+                       "assert learner.used == 8, learner.used  # a quarter of 32\n"
+                       "reward, done, valid = learner.host_result\n"
+                       "assert valid[:8].any() and not valid[8:].any() and not reward[8:].any()\n"
+                       "assert not learner.host_start[9:].any()\n"
+                       "learner.estimate(0)\n"
+                       "assert not learner.advantage[8:].any()\n")
+    words = [*TINY, "--rollout", "32", "--environments", "4", "--cut-off", "0.5", "--out", tmp_path]
+    run = subprocess.run([sys.executable, program, *words], env=ONE_THREAD, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+
+
 def test_rank_0_decides_for_all(tmp_path):
     program = tmp_path / "decide.py"
     program.write_text("import sys, torch, torch.distributed as dist\n"
@@ -104,6 +131,33 @@ def test_two_ranks_that_were_stopped_go_on_with_the_same_bits(tmp_path):
     assert trained(tmp_path / "parts", ranks=2, updates=4, every=2) == whole
     assert trained(tmp_path / "parts", ranks=2, updates=4, every=2) == whole  # nothing is left to do
     assert rows(tmp_path / "parts") == rows(tmp_path / "whole")
+
+
+def processes_of(folder):
+    """Numbers of the processes whose command names the folder, but not torchrun's."""
+    found = []
+    for entry in pathlib.Path("/proc").iterdir():
+        try:
+            words = (entry / "cmdline").read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if str(folder).encode() in words and b"torch.distributed.run" not in words:
+            found.append(int(entry.name))
+    return sorted(found)
+
+
+@pytest.mark.skipif(not pathlib.Path("/proc/self/cmdline").exists(), reason="finds the ranks by /proc")
+def test_two_ranks_of_which_one_is_killed_go_on_with_the_same_bits(tmp_path):
+    whole = trained(tmp_path / "whole", ranks=2, updates=6, every=2)
+    killed = tmp_path / "killed"
+    run = subprocess.Popen(command(killed, ranks=2, updates=6, every=2), env=ONE_THREAD, stdout=subprocess.DEVNULL,
+                           stderr=subprocess.DEVNULL)
+    while not (killed / "checkpoint.pt").exists() and run.poll() is None:
+        time.sleep(0.001)
+    os.kill(processes_of(killed)[-1], signal.SIGKILL)
+    assert run.wait() != 0  # torchrun ends the other rank
+    assert torch.load(killed / "checkpoint.pt", weights_only=True)["update"] < 6
+    assert trained(killed, ranks=2, updates=6, every=2) == whole
 
 
 def test_errors_say_what_to_do(first, tmp_path):
