@@ -134,7 +134,7 @@ def test_two_ranks_that_were_stopped_go_on_with_the_same_bits(tmp_path):
 
 
 def processes_of(folder):
-    """Numbers of the processes whose command names the folder, but not torchrun's."""
+    """Numbers of the processes whose command names the folder, without torchrun."""
     found = []
     for entry in pathlib.Path("/proc").iterdir():
         try:
