@@ -95,8 +95,7 @@ class VelocitySearch {
   static constexpr double kOutWeight = 2.0, kInTick = 1000.0, kNever = 1e30;
 
   static Ground around(double ahead, int k, int count, double speed) noexcept {
-    constexpr double kTurn = kTwoPi;
-    const double a = ahead + k * (kTurn / count);
+    const double a = ahead + k * (kTwoPi / count);
     return {speed * std::cos(a), speed * std::sin(a)};
   }
   double off(const Ground& v) const noexcept {

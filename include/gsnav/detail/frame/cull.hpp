@@ -32,6 +32,7 @@ struct ChunkInView {
     return dot(direction, center) + abs(direction.x) * half.x + abs(direction.y) * half.y +
            abs(direction.z) * half.z;
   }
+  /// The function of a side of the image, as a direction.
   GSNAV_HD Vec3d across(const ImageAxis& axis, const ImageSide<double>& side) const noexcept {
     return axis.normal(side, camera.rotation.row[2]);
   }

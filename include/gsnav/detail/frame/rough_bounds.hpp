@@ -72,12 +72,14 @@ GSNAV_HD bool may_be_visible(const RoughView& v, const RoughBox& box, const Vec3
   return visible;
 }
 
-/// Pixels that a footprint may cover, as real numbers.
+/// Bounds of a footprint, in pixels.
 struct RoughFootprint {
   float mean_x, mean_y;  ///< Half a pixel to the right of and below the mean.
   float half_width, half_height;
 };
 
+/// Pixels that a footprint may cover, as a centre and half sizes. Never less than those of `project`.
+/// @param v the camera of the footprint's set
 /// @param lens focal lengths fx, fy, principal point cx, cy (pixels) and the dilation eps2d (px^2)
 /// @param point mean in camera axes, asset units
 /// @param scale largest standard deviation
