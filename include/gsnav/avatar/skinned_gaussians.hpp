@@ -205,7 +205,10 @@ class SkinnedGaussians {
     world_ = actor.joint_globals(t, matrices_);
     bounds_now_ = bounds_.at(matrices_);
     wanted_ = wanted(set_of(0), bounds_now_);
-    if (wanted_ != 0) actor.to_joint_matrices(matrices_);
+    if (wanted_ == 0) return {};
+    actor.to_joint_matrices(matrices_);
+    host_joints_.clear();
+    for (const auto& m : matrices_) host_joints_.push_back(affine_cast<float>(m));
     return {};
   }
   /// Calls f with the arguments of each level that is to be skinned. Allocates its arrays first.
@@ -233,8 +236,6 @@ class SkinnedGaussians {
       set_dual_joints(matrices_);
       return skin_gaussians<float>(*backend_, args);
     }
-    host_joints_.clear();
-    for (const auto& m : matrices_) host_joints_.push_back(affine_cast<float>(m));
     joints_.upload(host_joints_.data(), host_joints_.size());
     args.joints = std::as_const(joints_).view();
     return skin_gaussians<float>(*backend_, args);

@@ -21,9 +21,9 @@ class SkinningBatch {
   explicit SkinningBatch(B& backend) : backend_(&backend), joints_(backend) {}
 
   /// Adds the joints of an actor. The jobs that are added afterwards read them.
-  void add_joints(const std::vector<Affine3<double>>& matrices) {
+  void add_joints(const std::vector<Affine3<float>>& matrices) {
     first_ = host_joints_.size();
-    for (const auto& m : matrices) host_joints_.push_back(affine_cast<float>(m));
+    host_joints_.insert(host_joints_.end(), matrices.begin(), matrices.end());
   }
   /// Adds Gaussians that follow the joints added last. `args` may leave out `joints`.
   void add(const SkinningArgs<float>& args) {
@@ -127,7 +127,7 @@ class SkinnedCrowd {
       if (a.wanted_ == 0) continue;
       a.for_each_wanted([](const auto&) {});  // allocates
       if (a.asset()->skinning == Skinning::dual_quaternion) a.set_dual_joints(a.matrices_);
-      batch.add_joints(a.matrices_);
+      batch.add_joints(a.host_joints_);
       a.for_each_wanted([&](const SkinningArgs<float>& args) { batch.add(args); });
     }
   }
