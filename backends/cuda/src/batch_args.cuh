@@ -240,6 +240,16 @@ __device__ inline SplatBounds bounds_of(std::uint32_t x, std::uint32_t y) {
           static_cast<std::int32_t>(x >> 16), static_cast<std::int32_t>(y >> 16)};
 }
 
+/// Range of a tile's list in BatchArgs::pairs. All walks over the list start from it.
+struct PairRange {
+  std::uint32_t begin, end;
+  __device__ std::uint32_t size() const { return end - begin; }
+};
+__device__ inline PairRange pairs_of(const BatchArgs& a, std::uint32_t tile) {
+  const std::uint32_t begin = a.tile_begins[tile];
+  return {begin, begin + a.tile_counts[tile]};
+}
+
 /// The instance of a camera that a source belongs to.
 __device__ inline const BatchInstance& instance_of(const BatchArgs& a, std::uint32_t camera,
                                                    std::uint32_t source) {

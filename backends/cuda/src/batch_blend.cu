@@ -140,7 +140,7 @@ __global__ void __launch_bounds__(kThreads, Mesh ? Policy::kResidentWithMesh : P
   BlendState<float, kBlendedDepth<D>> state[kPixels];
   std::uint32_t median[kPixels];
   const float px = static_cast<float>(x) + 0.5f;
-  float py[kPixels];
+  float py[kPixels], mesh[kPixels]{}, far = 0;
   bool inside[kPixels];
   for (int k = 0; k < kPixels; ++k) {
     median[k] = kNoSlot;
@@ -154,7 +154,6 @@ __global__ void __launch_bounds__(kThreads, Mesh ? Policy::kResidentWithMesh : P
     const std::size_t line = camera * height + static_cast<std::size_t>(y + k * kRowsApart);
     return line * width + static_cast<std::size_t>(x);
   };
-  float mesh[kPixels]{}, far = 0;
   if constexpr (Mesh) {
     std::size_t pixel[kPixels];
     for (int k = 0; k < kPixels; ++k) pixel[k] = pixel_of(k);
@@ -166,11 +165,12 @@ __global__ void __launch_bounds__(kThreads, Mesh ? Policy::kResidentWithMesh : P
                                        *reinterpret_cast<const StagedSplat*>(s.order.lent + place), px,
                                        py, mesh, state, median);
   };
-  TileOrder order(a, ordered, camera);
+  const PairRange list = pairs_of(a, ordered);
+  TileOrder order(list, ordered, camera);
   unsigned open = __ballot_sync(kAll, is_open());
   bool all_closed = false;
-  const Pair* const pairs = a.pairs + a.tile_begins[ordered];
-  std::uint32_t n = in_order ? a.tile_counts[ordered] : order.next(s.order, a);
+  const Pair* const pairs = a.pairs + list.begin;
+  std::uint32_t n = in_order ? list.size() : order.next(s.order, a);
   for (; n != 0; n = in_order || all_closed ? 0 : order.next(s.order, a)) {
     for (std::uint32_t first = 0; first < n && !all_closed; first += kChunk) {
       const std::uint32_t staged = min(kChunk, n - first);
@@ -181,9 +181,9 @@ __global__ void __launch_bounds__(kThreads, Mesh ? Policy::kResidentWithMesh : P
         unsigned quarters = 0;
         for (unsigned q = 0; q < 4; ++q) quarters |= (open >> 8 * q & 0xffu) != 0 ? 1u << q : 0u;
         const std::uint32_t length = list_blocks(s, staged, bit, quarters);
-        const std::uint16_t* const list = s.lists[4 * warp + quarter];
+        const std::uint16_t* const places = s.lists[4 * warp + quarter];
         for (std::uint32_t i = 0; i < length; i += kListStep) {
-          blend_listed(list + i, blend);
+          blend_listed(places + i, blend);
           if (i % Policy::kUntilClosed == Policy::kUntilClosed - kListStep &&
               __all_sync(kAll, !is_open()))
             break;

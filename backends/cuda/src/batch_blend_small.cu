@@ -151,7 +151,7 @@ __global__ void __launch_bounds__(2 * kThreads, Policy::kResident)
   float mesh[1]{}, far = 0;
   if constexpr (Mesh) far = load_mesh(b, pixel, {inside}, mesh);
 
-  const std::uint32_t begin = a.tile_begins[ordered], end = begin + a.tile_counts[ordered];
+  const auto [begin, end] = pairs_of(a, ordered);
   bool open = __any_sync(kAll, state[0].open(rules));
   if (draws && lane == 0) s.open[0][warp] = s.open[1][warp] = open;
   __syncthreads();

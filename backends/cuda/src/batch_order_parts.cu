@@ -220,9 +220,10 @@ __global__ void __launch_bounds__(kThreads) order_long_kernel(const BatchArgs a)
 __global__ void __launch_bounds__(kThreads) order_lists_kernel(const BatchArgs a) {
   const std::uint32_t tiles = static_cast<std::uint32_t>(a.grid.count());
   for (std::uint32_t i = blockIdx.x * kWarps + threadIdx.x / 32; i < a.tiles; i += gridDim.x * kWarps) {
-    const std::uint32_t tile = a.tile_order[i], camera = tile / tiles, n = a.tile_counts[tile];
-    const std::uint32_t begin = a.tile_begins[tile];
-    const ListPart list{tile, 0, begin, begin + n};
+    const std::uint32_t tile = a.tile_order[i], camera = tile / tiles;
+    const PairRange pairs = pairs_of(a, tile);
+    const std::uint32_t n = pairs.size();
+    const ListPart list{tile, 0, pairs.begin, pairs.end};
     if (n > a.list_room || n > Policy::kOfWarp<8>) continue;
     if (n <= Policy::kOfWarp<2>) {
       order_part<2>(a, list, camera);

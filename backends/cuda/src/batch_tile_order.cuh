@@ -8,8 +8,8 @@ namespace gsnav::cuda {
 /// Reads a tile's list from front to back, up to kOrderBatch splats at a time.
 class TileOrder {
  public:
-  __device__ TileOrder(const BatchArgs& a, std::uint32_t tile, std::uint32_t camera)
-      : tile_(tile), camera_(camera), begin_(a.tile_begins[tile]), end_(begin_ + a.tile_counts[tile]) {}
+  __device__ TileOrder(const PairRange& list, std::uint32_t tile, std::uint32_t camera)
+      : tile_(tile), camera_(camera), begin_(list.begin), end_(list.end) {}
   __device__ TileOrder(const ListPart& part, std::uint32_t camera)
       : tile_(part.tile), camera_(camera), begin_(part.begin), end_(part.end), bin_(part.bin) {}
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Blending a pixel's stack, and its depths."""
-from . import EVERY, fault
+from . import BACKENDS, EVERY, fault
 
 STACK_TEST = "tests/hard_cases/test_stack.cpp"
 DEPTH_TEST = "tests/hard_cases/test_depth.cpp"
@@ -80,9 +80,18 @@ FAULTS = [
           "select(before > L(scalar_of<L>(0.51)), met, last)",
           DEPTH_TEST, "N45_depth_definitions", on=("openmp", "cuda tiles", "cuda regions"),
           why="who looks for a number does not use the rule above"),
-    fault("first_of_a_list_left_out", "PixelWalk", "begin = args.tile_offsets[tile];",
-          "begin = args.tile_offsets[tile] + 1;",
-          PANE_TEST, "N71_panes_between_layers*", on=EVERY, why="the nearest splat of each tile"),
+    fault("first_of_a_list_left_out", "splats_of", "return {tile_offsets[tile], tile_offsets[tile + 1]};",
+          "return {tile_offsets[tile] + 1, tile_offsets[tile + 1]};",
+          STACK_TEST, "N41_single_opaque", on=BACKENDS, why="the nearest splat of each tile"),
+    fault("first_of_a_list_left_out_with_panes", "splats_of", "return {tile_offsets[tile], tile_offsets[tile + 1]};",
+          "return {tile_offsets[tile] + 1, tile_offsets[tile + 1]};",
+          PANE_TEST, "N71_panes_between_layers*", on=BACKENDS),
+    fault("first_of_a_list_left_out_in_batches", "pairs_of", "return {begin, begin + a.tile_counts[tile]};",
+          "return {begin + (a.tile_counts[tile] != 0 ? 1u : 0u), begin + a.tile_counts[tile]};",
+          STACK_TEST, "N41_single_opaque", on=("cuda tiles",)),
+    fault("first_of_a_regions_list_left_out", "TileReader::begin", "next_ = restart_ = held_ =",
+          "next_ = 1; restart_ = held_ =",
+          STACK_TEST, "N41_single_opaque", on=("cuda regions",)),
     fault("behind_by_the_centre", "behind", "return d.z - d.reach > depth;", "return d.z > depth;",
           MESH_TEST, "N50_mesh_straddle_cloud", on=EVERY, why="a splat that reaches through a mesh is before it"),
     fault("lists_filled_up_with_a_splat", "blend_list", "list[i] = kNothing;", "list[i] = list[0];",

@@ -31,6 +31,11 @@ GSNAV_HD constexpr std::size_t blend_state_values(DepthMode mode) noexcept {
   return bytes / sizeof(float);
 }
 
+/// Range of a tile's splats in RasterArgs::tile_splats, front to back.
+struct SplatRange {
+  std::uint64_t begin, end;
+};
+
 /// Arguments of blending the tiles of one camera.
 template <class S>
 struct RasterArgs {
@@ -52,6 +57,10 @@ struct RasterArgs {
   GSNAV_HD DepthMode depth_mode() const noexcept { return images.depth_mode(); }
   /// True if the response is not Response::ewa, or the stop is exclusive.
   bool general() const noexcept { return !perspectives.empty() || rules.exclusive_stop; }
+  /// The splats of a tile. All walks over them start from it.
+  GSNAV_HD SplatRange splats_of(std::size_t tile) const noexcept {
+    return {tile_offsets[tile], tile_offsets[tile + 1]};
+  }
   GSNAV_HD SplatRecords<S> records(std::size_t splat) const noexcept {
     return {geometry.data + splat, colors.empty() ? nullptr : colors.data + splat,
             depths.empty() ? nullptr : depths.data + splat,
@@ -139,24 +148,22 @@ GSNAV_HD void write_pixel(const RasterArgs<S>& args, std::size_t pixel,
 /// A pixel and the splats of its tile. Kernels with one work item per pixel start from it.
 template <class S>
 struct PixelWalk {
-  S px, py;                  ///< pixel centre
-  std::uint64_t begin, end;  ///< range of its tile's splats in RasterArgs::tile_splats
+  S px, py;           ///< pixel centre
+  SplatRange splats;  ///< of its tile
 
   GSNAV_HD PixelWalk(const RasterArgs<S>& args, std::size_t pixel) noexcept {
     const std::size_t width = static_cast<std::size_t>(args.grid.width);
     const int x = static_cast<int>(pixel % width), y = static_cast<int>(pixel / width);
-    const std::size_t tile = args.grid.tile_of(x, y);
     px = S(x) + S(0.5);
     py = S(y) + S(0.5);
-    begin = args.tile_offsets[tile];
-    end = args.tile_offsets[tile + 1];
+    splats = args.splats_of(args.grid.tile_of(x, y));
   }
 
   /// Calls blend(records) for each splat of the list, front to back, until the pixel is closed.
   template <class State, class F>
   GSNAV_HD void for_each_splat(const RasterArgs<S>& args, const State& state,
                                const F& blend) const noexcept {
-    for (std::uint64_t i = begin; i < end && state.open(args.rules); ++i) {
+    for (std::uint64_t i = splats.begin; i < splats.end && state.open(args.rules); ++i) {
       blend(args.records(args.tile_splats[i]));
     }
   }

@@ -51,7 +51,7 @@ class TileBlender {
 
   void blend() noexcept {
     const TileProgress<float>& progress = args_.progress;
-    const std::uint64_t begin = args_.tile_offsets[tile_], end = args_.tile_offsets[tile_ + 1];
+    const auto [begin, end] = args_.splats_of(tile_);
     if (Mesh || progress.first) {  // frames with meshes have one slice
       pixels_.open_all();
     } else {

@@ -30,7 +30,8 @@ struct WeighTile {
     const auto [left, top, right, bottom] = grid.pixels_of(tile);
     std::array<BlendState<float, DepthMode::none>, kSide * kSide> pixels{};
     int open = (right - left) * (bottom - top);
-    for (std::uint64_t i = args.tile_offsets[tile]; i < args.tile_offsets[tile + 1] && open > 0; ++i) {
+    const SplatRange splats = args.splats_of(tile);
+    for (std::uint64_t i = splats.begin; i < splats.end && open > 0; ++i) {
       const std::uint32_t slot = args.tile_splats[i];
       const SplatRecords<float> splat{args.geometry.data + slot, nullptr, nullptr, nullptr};
       const SplatBounds& b = bounds[slot];
