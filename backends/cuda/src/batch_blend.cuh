@@ -108,18 +108,10 @@ __device__ void write(const BlendArgs& b, std::size_t pixel,
     state = {blended, {__uint_as_float(median)}};
   }
   if constexpr (Mesh) close_by_mesh<Color>(state, b.raster.rules, b.raster.mesh, pixel);
-  state = finished(b.raster.rules, state);
-  for_each_image<D>(b.raster.images, [&]<Output O>(float* image) {
-    if constexpr (O == kRgb) {
-      if (b.rgb == nullptr && b.rgb8 == nullptr) return;
-      const Vec3<float> color = pixel_value<O>(b.raster, state);
-      for (int c = 0; c < 3; ++c) {
-        if (b.rgb != nullptr) b.rgb[3 * pixel + c] = color[c];
-        if (b.rgb8 != nullptr) b.rgb8[3 * pixel + c] = to_byte(color[c]);
-      }
-    } else {
-      if (image != nullptr) image[pixel] = pixel_value<O>(b.raster, state);
-    }
+  write_pixel(b.raster, pixel, state, [&](const Vec3<float>& color) {
+    if (b.rgb != nullptr) store_color(b.rgb, pixel, color);
+    if (b.rgb8 == nullptr) return;
+    for (int c = 0; c < 3; ++c) b.rgb8[3 * pixel + c] = to_byte(color[c]);
   });
 }
 

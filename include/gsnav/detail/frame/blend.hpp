@@ -127,22 +127,34 @@ GSNAV_HD auto pixel_value(const RasterArgs<S>& args, const State& state) noexcep
   }
 }
 
+/// Stores the colour of a pixel in an image with three values per pixel.
+template <class S>
+GSNAV_HD void store_color(S* image, std::size_t pixel, const Vec3<S>& value) noexcept {
+  image[3 * pixel] = value.x;
+  image[3 * pixel + 1] = value.y;
+  image[3 * pixel + 2] = value.z;
+}
+
 /// Writes a finished pixel to all requested images.
-template <class S, DepthMode D>
-GSNAV_HD void write_pixel(const RasterArgs<S>& args, std::size_t pixel,
-                          const BlendState<S, D>& blended) noexcept {
+/// @param store called with the colour, if it is requested, instead of store_color()
+template <class S, DepthMode D, class Store>
+GSNAV_HD void write_pixel(const RasterArgs<S>& args, std::size_t pixel, const BlendState<S, D>& blended,
+                          const Store& store) noexcept {
   const BlendState<S, D> state = finished(args.rules, blended);
   for_each_image<D>(args.images, [&]<Output O>(S* image) GSNAV_INLINED {
     if (image == nullptr) return;
-    const auto value = pixel_value<O>(args, state);
     if constexpr (O == kRgb) {
-      image[3 * pixel] = value.x;
-      image[3 * pixel + 1] = value.y;
-      image[3 * pixel + 2] = value.z;
+      store(pixel_value<O>(args, state));
     } else {
-      image[pixel] = value;
+      image[pixel] = pixel_value<O>(args, state);
     }
   });
+}
+template <class S, DepthMode D>
+GSNAV_HD void write_pixel(const RasterArgs<S>& args, std::size_t pixel,
+                          const BlendState<S, D>& blended) noexcept {
+  write_pixel(args, pixel, blended,
+              [&](const Vec3<S>& color) GSNAV_INLINED { store_color(args.images.rgb, pixel, color); });
 }
 
 /// A pixel and the splats of its tile. Kernels with one work item per pixel start from it.
