@@ -118,21 +118,20 @@ __device__ void write(const BlendArgs& b, std::size_t pixel,
 /// Variants that RasterArgs selects at run time and that the inner loop must know at compile time.
 enum class Form { standard, exclusive_stop, perspective };
 
-/// Blends a splat into K pixels of a column. `mesh` has the depths of their meshes. See median_of for
-/// `median`.
+/// Blends a splat into K pixels of a column. `mesh` has the depths of their meshes. `number` is what
+/// `median` keeps (median_of): the splat's slot, or, if no record of the slot is read, any other number.
 template <bool Color, DepthMode D, Exp2 M, Form F, bool Mesh, int K>
-__device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>& rules,
-                                    const StagedSplat& from, float px, const float (&py)[K],
+__device__ inline void blend_column(const BatchArgs& a, const BlendRules<float>& rules,
+                                    const SplatGeometry<float>& geometry, const SplatColor<float>& color,
+                                    std::uint32_t number, float px, const float (&py)[K],
                                     const float (&mesh)[K],
                                     BlendState<float, kBlendedDepth<D>> (&state)[K],
                                     std::uint32_t (&median)[K]) {
-  const SplatGeometry<float> geometry = geometry_of(from);
-  const SplatColor<float> color = from.color;
-  const std::uint32_t slot =
-      __float_as_uint(color.pad);  // 0 for the splat that covers nothing. Any slot would do.
-  const SplatDepth<float>* const depth = kBlendedDepth<D> == DepthMode::all ? a.depths + slot : nullptr;
+  const SplatDepth<float>* const depth =
+      kBlendedDepth<D> == DepthMode::all ? a.depths + number : nullptr;
   constexpr bool kAlongRays = F == Form::perspective;
-  const SplatPerspective<float>* const perspective = kAlongRays ? a.perspectives + slot : nullptr;
+  const SplatPerspective<float>* const perspective = kAlongRays ? a.perspectives + number : nullptr;
+#pragma unroll
   for (int k = 0; k < K; ++k) {
     const float exponent = splat_exponent(kAlongRays, geometry, perspective, px, py[k]);
     // Decide once. Separate comparisons and selections took a third of the loop.
@@ -140,15 +139,29 @@ __device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>&
     float alpha = alpha_in_footprint<M>(rules, exponent);
     if constexpr (Mesh) {
       if (drawn) {
-        alpha = alpha_before_mesh(alpha, a.depths[slot], mesh[k], px, py[k]);
+        alpha = alpha_before_mesh(alpha, a.depths[number], mesh[k], px, py[k]);
         drawn = alpha > 0;
       }
     }
     if constexpr (D == DepthMode::median)
-      median[k] = last_above_half(state[k].transmittance, slot, median[k]);
+      median[k] = last_above_half(state[k].transmittance, number, median[k]);
     blend_drawn<Color, kBlendedDepth<D>, F != Form::standard>(state[k], rules, drawn, alpha, &color,
                                                               depth, px, py[k]);
   }
+}
+
+/// blend_column for a splat in shared memory.
+template <bool Color, DepthMode D, Exp2 M, Form F, bool Mesh, int K>
+__device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>& rules,
+                                    const StagedSplat& from, float px, const float (&py)[K],
+                                    const float (&mesh)[K],
+                                    BlendState<float, kBlendedDepth<D>> (&state)[K],
+                                    std::uint32_t (&median)[K]) {
+  const SplatColor<float> color = from.color;
+  const std::uint32_t slot =
+      __float_as_uint(color.pad);  // 0 for the splat that covers nothing. Any slot would do.
+  blend_column<Color, D, M, F, Mesh>(a, rules, geometry_of(from), color, slot, px, py, mesh, state,
+                                     median);
 }
 
 inline constexpr std::uint32_t kListStep = 4;  ///< Number of list entries read at a time.
@@ -164,7 +177,7 @@ __device__ inline void blend_listed(const std::uint16_t* list, const F& blend) {
   blend(places.y >> 16);
 }
 
-/// Slot of the median Gaussian: the last one that blend_staged met while the transmittance was above
+/// Number of the median Gaussian: the last one that blend_column met while the transmittance was above
 /// 1/2.
 template <class State>
 __device__ inline std::uint32_t median_of(const State& state, std::uint32_t last) {

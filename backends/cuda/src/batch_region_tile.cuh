@@ -269,7 +269,6 @@ class TileWarp {
   }
 
   __device__ void blend_splat_at(std::uint32_t i, std::uint32_t (&last)[2]) {
-    const BlendRules<float>& rules = b_.raster.rules;
     const float4 g0 = s_.geometry[0][i], g1 = s_.geometry[1][i];
     const SplatGeometry<float> geometry{g0.x, g0.y, g0.z, g0.w, g1.x, g1.y, g1.z, g1.w};
     SplatColor<float> color;
@@ -277,18 +276,9 @@ class TileWarp {
       const float4 c = s_.colors[i];
       color = {c.x, c.y, c.z, 0};
     }
-#pragma unroll
-    for (int k = 0; k < 2; ++k) {
-      const float exponent = splat_exponent<float, float>(false, geometry, nullptr, px_, py_[k]);
-      const bool drawn = in_footprint(rules, exponent) && state_[k].open(rules);
-      const float alpha = alpha_in_footprint<M>(rules, exponent);
-      if constexpr (D == DepthMode::median) {
-        last[k] = last_above_half(state_[k].transmittance, i, last[k]);
-      }
-      blend_drawn<Color, kBlendedDepth<D>, false>(state_[k], rules, drawn, alpha, &color,
-                                                  static_cast<const SplatDepth<float>*>(nullptr), px_,
-                                                  py_[k]);
-    }
+    const float no_mesh[2]{};
+    blend_column<Color, D, M, Form::standard, false>(a_, b_.raster.rules, geometry, color, i, px_, py_,
+                                                     no_mesh, state_, last);
   }
 
   __device__ void finish() {
