@@ -49,7 +49,6 @@ struct PlainCamera {
 };
 static_assert(sizeof(PlainCamera) == 256);
 
-inline constexpr std::uint32_t kPartsPerChunk = kProjectChunk / kChunkPart;
 /// With at most this number of instances, a warp tests several parts at once, one (part, instance) pair
 /// per lane.
 inline constexpr std::uint32_t kFewInstances = 32 / kPartsPerChunk;

@@ -13,15 +13,9 @@ constexpr unsigned kThreads = policy::Cull::kThreads, kWarps = kThreads / 32;
 /// Whether part `part` of the chunk may have visible Gaussians, by the bounds of the part, or by those
 /// of the chunk if parts have none.
 __device__ bool part_is_candidate(const ViewedSet<float>& args, std::size_t chunk, unsigned part) {
+  if (!part_has_rows(args, chunk, part)) return false;
   const GaussianRows& gs = args.gaussians;
-  const std::size_t at = chunk * kPartsPerChunk + part;
-  if (at * kChunkPart >= gs.size() || !args.selection.may_be_seen(chunk) ||
-      !args.seen_rows(chunk).any_of_part(part)) {
-    return false;
-  }
-  if (gs.chunk_bounds.empty()) return true;
-  return may_be_visible(args.camera64,
-                        gs.part_bounds.empty() ? gs.chunk_bounds[chunk] : gs.part_bounds[at]);
+  return gs.chunk_bounds.empty() || may_be_visible(args.camera64, bounds_of_part(gs, chunk, part));
 }
 
 /// Mask of the parts of a chunk that the lane's instance may see, one bit per part; 0 unless
@@ -31,11 +25,7 @@ __device__ bool part_is_candidate(const ViewedSet<float>& args, std::size_t chun
 __device__ unsigned parts_in_view(const BatchInstance* instances, std::size_t chunk, bool candidate) {
   const unsigned lane = threadIdx.x % 32;
   const GaussianRows& gs = instances[0].args.gaussians;
-  const std::size_t rows = gs.size() - chunk * kProjectChunk;
-  const unsigned all =
-      (1u << (rows < kProjectChunk ? (rows + kChunkPart - 1) / kChunkPart : kPartsPerChunk)) - 1;
-  unsigned parts = candidate ? all : 0;
-  if (candidate) parts &= instances[lane].args.seen_rows(chunk).parts();
+  unsigned parts = candidate ? parts_with_rows(instances[lane].args, chunk) : 0;
   unsigned edges =
       __ballot_sync(kAll, candidate && !gs.part_bounds.empty() &&
                               !lies_in_view(instances[lane].args.camera64, gs.chunk_bounds[chunk]));

@@ -140,7 +140,7 @@ std::size_t CudaBatchRenderer::capacity(std::span<const GaussianSet> sets,
   for (; count < most && items <= cuda::kMostItems; ++count) {
     cuda::for_each_set(cameras[count], sets.size(), [&](std::uint32_t s) {
       if (s < sets.size() && instances[s]++ % 32 == 0)
-        items += std::uint64_t{sets[s].drawn_chunk_count()} * cuda::kPartsPerChunk;
+        items += std::uint64_t{sets[s].drawn_chunk_count()} * kPartsPerChunk;
     });
   }
   return std::max<std::size_t>(1, items <= cuda::kMostItems ? count : count - 1);

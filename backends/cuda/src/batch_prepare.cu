@@ -213,7 +213,7 @@ bool CudaBatchRenderer::State::plan_units(std::span<const GaussianSet> sets,
     u = {args.units, set_begins[s], set_begins[s + 1] - set_begins[s],
          static_cast<std::uint32_t>(sets[s].drawn_chunk_count())};
     if (u.instances == 0) continue;
-    item_capacity += std::uint64_t{u.words()} * u.chunks * cuda::kPartsPerChunk;
+    item_capacity += std::uint64_t{u.words()} * u.chunks * kPartsPerChunk;
     args.units += u.units();
   }
   return item_capacity <= cuda::kMostItems;

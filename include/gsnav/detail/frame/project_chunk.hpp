@@ -16,6 +16,8 @@
 
 namespace gsnav {
 
+inline constexpr std::uint32_t kPartsPerChunk = kProjectChunk / kChunkPart;
+
 /// One set of Gaussians as seen by one camera: the input of projection.
 template <class S>
 struct ViewedSet {
@@ -97,25 +99,46 @@ GSNAV_HD bool chunk_is_candidate(const ViewedSet<S>& args, std::size_t c) noexce
   return args.selection.may_be_seen(id) && (bounds.empty() || may_be_visible(args.camera64, bounds[id]));
 }
 
+/// True if part p of chunk `id` has a row that may be seen (seen_rows), whatever its bounds.
+template <class S>
+GSNAV_HD bool part_has_rows(const ViewedSet<S>& args, std::size_t id, std::size_t p) noexcept {
+  return id * kProjectChunk + p * kChunkPart < args.gaussians.size() && args.selection.may_be_seen(id) &&
+         args.seen_rows(id).any_of_part(p);
+}
+/// The parts of chunk `id`, which may be seen, for which part_has_rows() is true. Bit p is part p.
+template <class S>
+GSNAV_HD std::uint32_t parts_with_rows(const ViewedSet<S>& args, std::size_t id) noexcept {
+  static_assert(kPartsPerChunk < 32);
+  const std::size_t rows = args.gaussians.size() - id * kProjectChunk;
+  const std::uint32_t all =
+      (1u << (rows < kProjectChunk ? (rows + kChunkPart - 1) / kChunkPart : kPartsPerChunk)) - 1;
+  return all & args.seen_rows(id).parts();
+}
+
+/// Bounds of part p of chunk `id`: its own, or those of the chunk if parts have none. Chunks must have
+/// bounds.
+GSNAV_HD const ChunkBounds& bounds_of_part(const GaussianRows& gs, std::size_t id,
+                                           std::size_t p) noexcept {
+  return gs.part_bounds.empty() ? gs.chunk_bounds[id] : gs.part_bounds[id * kPartsPerChunk + p];
+}
+
 /// Parts of chunk c that may have visible Gaussians. Bit p stands for the kChunkPart rows from p *
 /// kChunkPart on. Conservative: the bit of a part with a visible Gaussian is always set. Returns 0 if
-/// chunk_is_candidate() is false; bits of parts without any row in seen_rows() are 0.
+/// chunk_is_candidate() is false; bits of parts for which part_has_rows() is false are 0.
 template <class S>
 GSNAV_HD std::uint32_t candidate_parts(const ViewedSet<S>& args, std::size_t c) noexcept {
-  static_assert(kProjectChunk / kChunkPart <= 32);
   const GaussianRows& gs = args.gaussians;
   const std::size_t id = args.selection.chunk_id(c);
   if (!args.selection.may_be_seen(id)) return 0;
-  constexpr std::size_t kParts = kProjectChunk / kChunkPart;
-  const std::uint32_t parts = args.seen_rows(id).parts();
+  const std::uint32_t parts = parts_with_rows(args, id);
   if (gs.chunk_bounds.empty()) return parts;
   const double s_max = detail::ChunkInView(args.camera64, gs.chunk_bounds[id]).s_max();
   if (!may_be_visible(args.camera64, gs.chunk_bounds[id], s_max)) return 0;
   if (gs.part_bounds.empty() || lies_in_view(args.camera64, gs.chunk_bounds[id])) return parts;
   std::uint32_t in_view = 0;
-  for (std::size_t p = 0; p < kParts && id * kParts + p < gs.part_bounds.size; ++p) {
+  for (std::size_t p = 0; p < kPartsPerChunk; ++p) {
     if ((parts >> p & 1u) == 0) continue;
-    if (may_be_visible(args.camera64, gs.part_bounds[id * kParts + p], s_max)) in_view |= 1u << p;
+    if (may_be_visible(args.camera64, bounds_of_part(gs, id, p), s_max)) in_view |= 1u << p;
   }
   return in_view;
 }
