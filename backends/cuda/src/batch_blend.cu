@@ -88,7 +88,6 @@ __device__ std::uint32_t list_blocks(BlendShared& s, std::uint32_t n, unsigned b
   std::uint16_t(*const lists)[kChunk + kListStep] = s.lists + threadIdx.x / 32 * 4;
   std::uint32_t length[4] = {0, 0, 0, 0};
   const auto place = [](std::uint32_t i) { return static_cast<std::uint16_t>(i * sizeof(StagedSplat)); };
-  const auto bit_of = [](unsigned q) { return 1u << (q % 2 + q / 2 * 4); };
   unsigned open_bits = 0;
 #pragma unroll
   for (unsigned q = 0; q < 4; ++q) open_bits |= (open >> q & 1u) != 0 ? bit_of(q) : 0u;
@@ -105,7 +104,7 @@ __device__ std::uint32_t list_blocks(BlendShared& s, std::uint32_t n, unsigned b
     }
   }
   const std::uint32_t longest = max(max(length[0], length[1]), max(length[2], length[3]));
-  const std::uint32_t end = (longest + kListStep - 1) / kListStep * kListStep;
+  const std::uint32_t end = whole_steps(longest);
 #pragma unroll
   for (unsigned q = 0; q < 4; ++q) {
     for (std::uint32_t i = length[q] + lane; i < end; i += 32) lists[q][i] = place(kNothing);

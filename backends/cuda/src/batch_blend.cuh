@@ -32,13 +32,16 @@ __device__ inline StagedSplat staged(const SplatRecord& r, std::uint32_t slot) {
 }
 __device__ inline StagedSplat staged_nothing() {
   StagedSplat nothing{};
-  nothing.geometry[1].w = -1e30f;  // log2 of the opacity.
+  nothing.geometry[1].w = kNothingDrawn<float>;  // log2 of the opacity.
   return nothing;
 }
 __device__ inline SplatGeometry<float> geometry_of(const StagedSplat& s) {
   const float4 g0 = s.geometry[0], g1 = s.geometry[1];
   return {g0.x, g0.y, g0.z, g0.w, g1.x, g1.y, g1.z, g1.w};
 }
+
+/// Bit of a block in a mask of ReachedBlocks, among 2 x 2 neighbours of which the first has bit 0.
+__device__ constexpr unsigned bit_of(unsigned block) { return 1u << (block / 2 * 4 + block % 2); }
 
 /// Blocks of the tile at (x, y) that a footprint may reach.
 struct ReachedBlocks {
@@ -165,6 +168,11 @@ __device__ inline void blend_staged(const BatchArgs& a, const BlendRules<float>&
 }
 
 inline constexpr std::uint32_t kListStep = 4;  ///< Number of list entries read at a time.
+
+/// Length of a list of n entries, filled up to whole steps.
+__device__ constexpr std::uint32_t whole_steps(std::uint32_t n) {
+  return (n + kListStep - 1) / kListStep * kListStep;
+}
 
 /// Calls blend(place) for kListStep entries of `list`, in order. `list` must be aligned to them.
 template <class F>

@@ -81,7 +81,7 @@ class Stager {
     }
 #pragma unroll
     for (unsigned block = 0; block < kWarps; ++block) {
-      const std::uint32_t end = (length[block] + kListStep - 1) / kListStep * kListStep;
+      const std::uint32_t end = whole_steps(length[block]);
       if (length[block] + lane < end) to.lists[block][warp][length[block] + lane] = place(kChunk);
       if (lane == block) to.lengths[block][warp] = end;
     }
@@ -90,10 +90,6 @@ class Stager {
   }
 
  private:
-  /// Bit of a block in a mask of ReachedBlocks.
-  __device__ static constexpr unsigned bit_of(unsigned block) {
-    return 1u << (block / 2 * 4 + block % 2);
-  }
   /// Index of the thread's splat `j` in a chunk.
   __device__ std::uint32_t place_of(std::uint32_t j) const {
     return thread_ / 32 * kOfWarp + j * 32 + thread_ % 32;

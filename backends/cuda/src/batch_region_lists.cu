@@ -250,7 +250,7 @@ __global__ void __launch_bounds__(Policy::kPreciseThreads)
     }
     if (!drawn) {
       splat.geometry = {};
-      splat.geometry.log2_opacity = -1e30f;
+      splat.geometry.log2_opacity = kNothingDrawn<float>;
     }
     r.precise_records[i] = splat.geometry;
   }

@@ -56,7 +56,7 @@ class TileWarp {
         reader_(b.batch, r, s.reader) {
     if (lane_ == 0) {
       s_.geometry[0][kStaged] = {0, 0, 0, 0};
-      s_.geometry[1][kStaged] = {0, 0, 0, -1e30f};
+      s_.geometry[1][kStaged] = {0, 0, 0, kNothingDrawn<float>};
       if (Color) s_.colors[kStaged] = {0, 0, 0, 0};
       s_.sources[kStaged] = 0;
     }

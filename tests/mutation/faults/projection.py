@@ -105,7 +105,7 @@ FAULTS = [
           "    slope_u = L(S(0)) * inv;\n",
           RESPONSE, "N02_exact_ray_grid"),
     fault("ray_drawn_behind", "perspective_exponent",
-          "return select(f > L(S(0)), exponent, L(S(-1e30)));", "return exponent;",
+          "return select(f > L(S(0)), exponent, L(kNothingDrawn<S>));", "return exponent;",
           FOOTPRINT, "N11_tile_cover_conservative"),
     fault("near_inclusive", "beyond_near_plane", "return z > F(near_plane);", "return z >= F(near_plane);",
           "tests/hard_cases/test_near.cpp", "N16_near_plane_cross", on=EVERY),

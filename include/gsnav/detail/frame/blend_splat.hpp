@@ -170,6 +170,10 @@ GSNAV_HD L column_exponent(const ColumnTerms<L>& terms, L ref_y, L b, L py) noex
   return fma(-w2, w2, terms.column);
 }
 
+/// log2 alpha where nothing is drawn: far below BlendRules::log2_alpha_min, and finite.
+template <class S>
+inline constexpr S kNothingDrawn = S(-1e30);
+
 /// log2 alpha for responses that are not linearised (Response). Behind the camera it is far below any
 /// that is drawn.
 template <class L, class S>
@@ -180,7 +184,7 @@ GSNAV_HD L perspective_exponent(const SplatGeometry<S>& g, const SplatPerspectiv
   const L s = fma(w2, w2, w1 * w1);
   const L f = fma(dx, L(v.fx), fma(dy, L(v.fy), L(v.f0)));
   const L exponent = L(g.log2_opacity) - s / fma(f, f, L(v.c) * s);
-  return select(f > L(S(0)), exponent, L(S(-1e30)));
+  return select(f > L(S(0)), exponent, L(kNothingDrawn<S>));
 }
 
 /// log2 alpha of a splat at pixel centres. If `along_rays`, of the response along each ray, with

@@ -127,7 +127,7 @@ class TileBlender {
         terms.column.store(columns[j].column + at);
         terms.w2.store(columns[j].w2 + at);
       }
-      F(-1e30f).store(columns[kNothing].column + at);
+      F(kNothingDrawn<float>).store(columns[kNothing].column + at);
       F(0.0f).store(columns[kNothing].w2 + at);
     }
   }
