@@ -33,11 +33,16 @@ struct LaneRow {
 template <bool PlainRules>
 __device__ inline LaneRow read_row(const ShapeRows& rows, std::size_t row) {
   ShapeRows from = rows;
-  if (!PlainRules &&
-      rows.encoding() ==
-          ShapeEncoding::factors) {  // The values are not used, but their addresses must exist.
-    from.quats.data[0] = from.quats.data[1] = from.quats.data[2] = from.quats.data[3] =
-        from.scales.data[0] = from.scales.data[1] = from.scales.data[2] = rows.means.data[0];
+  if constexpr (!PlainRules) {
+    switch (rows.encoding()) {
+      case ShapeEncoding::factors:  // The values are not used, but their addresses must exist.
+        from.quats.data[0] = from.quats.data[1] = from.quats.data[2] = from.quats.data[3] =
+            from.scales.data[0] = from.scales.data[1] = from.scales.data[2] = rows.means.data[0];
+        break;
+      case ShapeEncoding::ellipsoids:
+      case ShapeEncoding::codes:
+        break;
+    }
   }
   const SetRows<OneRow> set{{from, row < rows.size ? row : 0}};
   return {set.mean(), set.quat(), set.scales(), set.opacity()};
@@ -79,10 +84,14 @@ __device__ __noinline__ inline void ask_for_bands(const ColorRows& sh, std::size
   for (unsigned row = 0; row < rows; ++row) {
     if (lane >= kept) continue;  // Degree 2 has 24 values.
     const std::size_t from = begin + rest * row + lane;
-    if (sh.band_encoding() == BandEncoding::floats) {
-      __pipeline_memcpy_async(to.sh + kept * row + lane, sh.shN.data + from, sizeof(float));
-    } else {
-      to.sh_half[kept * row + lane] = sh.shN_half.data[from];
+    switch (sh.band_encoding()) {
+      case BandEncoding::floats:
+        __pipeline_memcpy_async(to.sh + kept * row + lane, sh.shN.data + from, sizeof(float));
+        break;
+      case BandEncoding::halves:
+      case BandEncoding::codes:  // No device code reads them.
+        to.sh_half[kept * row + lane] = sh.shN_half.data[from];
+        break;
     }
   }
   __pipeline_commit();
@@ -95,12 +104,17 @@ __device__ inline void ask_for_sh(const ColorRows& sh, std::size_t size, int deg
   if (degree < sh.degree) return ask_for_bands(sh, size, degree, first, to);
   const std::size_t rest = sh.rest(), rows = size - first < 32 ? size - first : 32;
   const unsigned n = static_cast<unsigned>(rest * rows);
-  if (sh.band_encoding() == BandEncoding::floats) {
-    copy_async(to.sh, sh.shN.data + rest * first, n);
-  } else {
-    const std::uint16_t* const from = sh.shN_half.data + rest * first;
-    copy_async(to.sh_half, from, n & ~1u);
-    if (n % 2 != 0 && threadIdx.x % 32 == 0) to.sh_half[n - 1] = from[n - 1];
+  switch (sh.band_encoding()) {
+    case BandEncoding::floats:
+      copy_async(to.sh, sh.shN.data + rest * first, n);
+      break;
+    case BandEncoding::halves:
+    case BandEncoding::codes: {  // No device code reads them.
+      const std::uint16_t* const from = sh.shN_half.data + rest * first;
+      copy_async(to.sh_half, from, n & ~1u);
+      if (n % 2 != 0 && threadIdx.x % 32 == 0) to.sh_half[n - 1] = from[n - 1];
+      break;
+    }
   }
   __pipeline_commit();
 }
@@ -118,10 +132,14 @@ __device__ inline SplatColor<float> row_color(const ColorRows& sh, int degree, s
   ColorRows v;  // Rows of the warp.
   v.degree = degree;
   v.sh0 = {sh.sh0.data + 3 * first, 3 * 32};
-  if (sh.band_encoding() == BandEncoding::floats) {
-    v.shN = {rows.sh, 1};
-  } else {
-    v.shN_half = {rows.sh_half, 1};
+  switch (sh.band_encoding()) {
+    case BandEncoding::floats:
+      v.shN = {rows.sh, 1};
+      break;
+    case BandEncoding::halves:
+    case BandEncoding::codes:  // No device code reads them.
+      v.shN_half = {rows.sh_half, 1};
+      break;
   }
   if (!PlainRules && !sh.rotations.empty()) {
     for (std::size_t k = 0; k < 4; ++k) v.rotations.data[k] = sh.rotations.data[k] + first;

@@ -187,7 +187,13 @@ GSNAV_HD auto with_coefficients(const ColorRows& rows, std::size_t i, const F& f
                  GSNAV_INLINED { return k == 0 ? sh_values(sh0) : sh_values(bands + 3 * (k - 1)); });
   };
   const std::size_t at = rows.rest() * i;
-  if (rows.band_encoding() == BandEncoding::halves) return of_bands(rows.shN_half.data + at);
+  switch (rows.band_encoding()) {
+    case BandEncoding::halves:
+      return of_bands(rows.shN_half.data + at);
+    case BandEncoding::codes:  // packed()
+    case BandEncoding::floats:
+      break;
+  }
   return of_bands(rows.shN.data + at);
 }
 
