@@ -119,7 +119,7 @@ struct alignas(16) LargeRow {
 
 /// A part of a tile's list that is sorted separately: pairs [begin, end). It consists of whole depth
 /// bins, starting with `bin`.
-struct alignas(16) ListPart {
+struct alignas(16) ListRange {
   std::uint32_t tile, bin, begin, end;
 };
 /// Flag of an entry of tile_order: the tile's list is sorted.
@@ -206,7 +206,7 @@ struct BatchArgs {
   /// Order in which tiles are started: longest lists first, so that the end of a launch need not wait
   /// for one. With the flag kListInOrder.
   std::uint32_t* tile_order;
-  ListPart* parts;            ///< Used if there are many depth bins.
+  ListRange* parts;           ///< Used if there are many depth bins.
   std::uint32_t* long_parts;  ///< Parts that were too long for a warp to sort.
   Pair* pairs;                ///< Lists of all tiles. Unsorted, or sorted after order_lists.
   Pair* pairs_alt;

@@ -242,7 +242,7 @@ __device__ void place_bins(const BatchArgs& a, std::uint32_t* of_length) {
       if (!fits) return;
       const std::uint32_t pair = min(begin + at, a.pair_capacity);
       for (std::uint32_t p = before / kPartLength + 1; p <= last_part; ++p) {
-        ListPart* const part = a.parts + first_part + p;
+        ListRange* const part = a.parts + first_part + p;
         part[-1].end = pair;
         if (p == parts) break;
         part->tile = tile;
@@ -251,7 +251,7 @@ __device__ void place_bins(const BatchArgs& a, std::uint32_t* of_length) {
       }
     };
     if (lane == 0 && parts != 0 && fits) {
-      ListPart& part = a.parts[first_part];
+      ListRange& part = a.parts[first_part];
       part.tile = tile;
       part.bin = 0;
       part.begin = begin;

@@ -134,7 +134,7 @@ __device__ void number_by_rank(std::uint64_t (&v)[K], const std::uint32_t (&rank
 
 /// Sorts a part of at most K * 32 pairs.
 template <int K>
-__device__ void order_part(const BatchArgs& a, const ListPart& part, std::uint32_t camera) {
+__device__ void order_part(const BatchArgs& a, const ListRange& part, std::uint32_t camera) {
   static_assert(K > 1, "the first and last of a lane are two");
   static_assert(K * 32 <= 256, "a place has 8 bits");
   const unsigned lane = threadIdx.x % 32;
@@ -186,7 +186,7 @@ __global__ void __launch_bounds__(kThreads) order_kernel(const BatchArgs a) {
   const std::uint32_t count = a.counters->parts;
   const std::uint32_t tiles = static_cast<std::uint32_t>(a.grid.count());
   for (std::uint32_t p = blockIdx.x * kWarps + threadIdx.x / 32; p < count; p += gridDim.x * kWarps) {
-    const ListPart part = a.parts[p];
+    const ListRange part = a.parts[p];
     const std::uint32_t n = part.end - part.begin, camera = part.tile / tiles;
     if (n <= Policy::kOfWarp<4>) {
       order_part<4>(a, part, camera);
@@ -204,7 +204,7 @@ __global__ void __launch_bounds__(kThreads) order_long_kernel(const BatchArgs a)
   const std::uint32_t count = a.counters->long_parts;
   const std::uint32_t tiles = static_cast<std::uint32_t>(a.grid.count());
   for (std::uint32_t p = blockIdx.x; p < count; p += gridDim.x) {
-    const ListPart part = a.parts[a.long_parts[p]];
+    const ListRange part = a.parts[a.long_parts[p]];
     TileOrder order(part, part.tile / tiles);
     std::uint32_t at = part.begin;
     while (const std::uint32_t n = order.next(s, a)) {
@@ -223,7 +223,7 @@ __global__ void __launch_bounds__(kThreads) order_lists_kernel(const BatchArgs a
     const std::uint32_t tile = a.tile_order[i], camera = tile / tiles;
     const PairRange pairs = pairs_of(a, tile);
     const std::uint32_t n = pairs.size();
-    const ListPart list{tile, 0, pairs.begin, pairs.end};
+    const ListRange list{tile, 0, pairs.begin, pairs.end};
     if (n > a.list_room || n > Policy::kOfWarp<8>) continue;
     if (n <= Policy::kOfWarp<2>) {
       order_part<2>(a, list, camera);

@@ -46,7 +46,7 @@ struct BatchRegions {
   Array<RegionRow> pairs;
   Array<PreciseRow> precise_rows;
   Array<SplatGeometry<float>> precise_records;
-  Array<TilePart> parts;
+  Array<TileShare> parts;
   std::uint32_t pair_capacity = 0, precise_capacity = 0, group_capacity = 0;
   // State of the prepared call.
   std::size_t groups_in_view = 0, zeroed_words = 0;

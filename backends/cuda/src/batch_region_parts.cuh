@@ -13,7 +13,7 @@ inline constexpr std::uint32_t kParts = policy::Regions::kParts, kNoPart = 0xfff
 
 /// Pixels of a tile, between two passes of a warp: all rows that were collected and are not in `rows`
 /// have been drawn.
-struct alignas(128) TilePart {
+struct alignas(128) TileShare {
   std::uint32_t tile;
   std::uint32_t lanes;  ///< The pairs of pixels, by lane.
   ReaderState reader;

@@ -114,7 +114,7 @@ class TileWarp {
   }
 
   /// Goes on with a part where the warp that gave it had stopped.
-  __device__ void resume(const TilePart& part) {
+  __device__ void resume(const TileShare& part) {
     begin(part.tile, part.lanes);
     for (int k = 0; k < 2; ++k) {
       if (!inside_[k]) continue;
@@ -144,7 +144,7 @@ class TileWarp {
     if (lane_ == 0) place = place_for_part(r_);
     place = __shfl_sync(kAll, place, 0);
     if (place >= kParts) return false;
-    TilePart& part = r_.parts[place];
+    TileShare& part = r_.parts[place];
     const unsigned lanes = half_of(open_);
     const ReaderState reader = reader_.save(part.rows);
     if (lane_ == 0) {

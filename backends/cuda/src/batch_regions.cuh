@@ -67,7 +67,7 @@ struct RegionCounters {
   alignas(kLine) std::uint32_t given, taken;  ///< Parts of tiles, and warps that have asked for one.
 };
 
-struct TilePart;
+struct TileShare;
 
 /// Part of the groups of a camera: every `parts`-th batch of them.
 struct CameraPart {
@@ -108,7 +108,7 @@ struct RegionArgs {
   std::uint32_t* order;  ///< Items by class: tile | part << 28.
   PreciseRow* precise_rows;
   SplatGeometry<float>* precise_records;
-  TilePart* parts;             ///< Room for policy::Regions::kParts.
+  TileShare* parts;            ///< Room for policy::Regions::kParts.
   std::uint32_t* part_states;  ///< Per part.
   std::uint32_t pair_capacity, precise_capacity, group_capacity;
   /// Fewest open pairs of pixels, and rows left, of which a warp gives half away. `always_gives`: even

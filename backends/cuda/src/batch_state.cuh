@@ -258,7 +258,7 @@ struct CudaBatchRenderer::State {
   Array<SplatDepth<float>> depths;
   Array<SplatPerspective<float>> perspectives;
   Array<cuda::PreciseSplat> precise;
-  Array<cuda::ListPart> parts;
+  Array<cuda::ListRange> parts;
   Array<cuda::Pair> pairs, pairs_alt;
   Array<cuda::BeyondPair> beyond;
   cuda::BatchMeshes meshes;

@@ -10,7 +10,7 @@ class TileOrder {
  public:
   __device__ TileOrder(const PairRange& list, std::uint32_t tile, std::uint32_t camera)
       : tile_(tile), camera_(camera), begin_(list.begin), end_(list.end) {}
-  __device__ TileOrder(const ListPart& part, std::uint32_t camera)
+  __device__ TileOrder(const ListRange& part, std::uint32_t camera)
       : tile_(part.tile), camera_(camera), begin_(part.begin), end_(part.end), bin_(part.bin) {}
 
   /// Stores the next splats in s.slots and returns their number. 0 at the end.

@@ -88,7 +88,7 @@ struct OneRow {
 };
 
 /// Decodes one row of a set, or a pack of rows, from any encoding. Each member reads memory when it is
-/// called. At selects the rows (OneRow, lanes::PackOfRows or lanes::PlainRows).
+/// called. At selects the rows (OneRow, lanes::PackOfRows or lanes::FloatRows).
 template <class At>
 struct SetRows {
   using L = typename At::lane;

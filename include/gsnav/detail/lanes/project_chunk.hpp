@@ -67,7 +67,7 @@ struct PackOfRows {
 
 /// PackOfRows for kWidth rows of ShapeEncoding::ellipsoids, as nearly all packs are. Code without the
 /// other cases is much shorter.
-struct PlainRows {
+struct FloatRows {
   using lane = F;
   const ShapeRows& shape;
   std::size_t i;
@@ -135,7 +135,7 @@ inline void project_chunk(const ViewedSet<float>& args, const ProjectOutputs<flo
   const SeenRows may_be_seen = args.seen_rows(id);
   const PackedChunk* const packed =
       shape.encoding() == ShapeEncoding::codes ? &shape.chunks[id] : nullptr;
-  const bool plain = PlainRows::fit(shape);
+  const bool plain = FloatRows::fit(shape);
   std::uint32_t written = 0;
   Survivors survivors;
   static_assert(kChunkPart % step == 0 && 32 % step == 0);
@@ -147,7 +147,7 @@ inline void project_chunk(const ViewedSet<float>& args, const ProjectOutputs<flo
     if (wanted == 0) continue;
     const PackPlace place{i, wanted, base, written};
     written += plain && count == step
-                   ? project_pack(args, out, PlainRows{shape, i}, place, survivors)
+                   ? project_pack(args, out, FloatRows{shape, i}, place, survivors)
                    : project_pack(args, out, PackOfRows{shape, packed, i, count}, place, survivors);
   }
   if (!out.colors.empty()) {
