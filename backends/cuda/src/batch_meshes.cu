@@ -31,8 +31,7 @@ struct BytesOfImage {
 /// Lists what each camera sees, in waves of cameras. `most_triangles` is the largest number of a wave.
 Status CudaBatchRenderer::State::list_meshes(std::span<const BatchCamera> cameras,
                                              std::uint64_t& most_triangles) {
-  const std::size_t pixels =
-      static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
+  const std::size_t pixels = image_pixels();
   cuda::Flight& flight = flights[calls % cuda::policy::Batch::kInFlight];
   meshes.placements.clear();
   meshes.places.clear();
@@ -121,11 +120,10 @@ Status CudaBatchRenderer::State::place_meshes(std::span<const BatchCamera> camer
   if (Status s = list_meshes(cameras, most_triangles); !s) return s;
   write_mesh_inputs(cameras);
 
-  const std::size_t pixels =
-      static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
+  const std::size_t pixels = call_pixels();
   const bool color = raster.images.rgb != nullptr || rgb8 != nullptr;
-  meshes.depth.resize_discard(args.cameras * pixels);
-  meshes.color.resize_discard(color ? args.cameras * 3 * pixels : 0);
+  meshes.depth.resize_discard(pixels);
+  meshes.color.resize_discard(color ? 3 * pixels : 0);
   meshes.layer = {meshes.depth.data(), color ? meshes.color.data() : nullptr, {}};
   if (config.composite == Composite::hard_depth) {
     separate_gaussians();
@@ -141,8 +139,7 @@ Status CudaBatchRenderer::State::place_meshes(std::span<const BatchCamera> camer
 }
 
 void CudaBatchRenderer::State::separate_gaussians() {
-  const std::size_t pixels = args.cameras * static_cast<std::size_t>(args.grid.width) *
-                             static_cast<std::size_t>(args.grid.height);
+  const std::size_t pixels = call_pixels();
   FrameImages<float>& alone = raster.images;
   meshes.hard_depth = {alone, nullptr, nullptr, meshes.layer, raster.background};
   meshes.hard_depth_bytes = std::exchange(rgb8, nullptr);
@@ -159,8 +156,7 @@ void CudaBatchRenderer::State::separate_gaussians() {
 }
 
 void CudaBatchRenderer::State::composite_hard_depth() {
-  const std::size_t pixels = args.cameras * static_cast<std::size_t>(args.grid.width) *
-                             static_cast<std::size_t>(args.grid.height);
+  const std::size_t pixels = call_pixels();
   backend.parallel_for(pixels, meshes.hard_depth);
   if (meshes.hard_depth_bytes != nullptr) {
     backend.parallel_for(3 * pixels,
@@ -175,8 +171,7 @@ void CudaBatchRenderer::State::size_layers() {
     chunks = std::max<std::size_t>(chunks, w.triangle_chunks);
     cameras = std::max<std::size_t>(cameras, w.cameras);
   }
-  const std::size_t pixels =
-      static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
+  const std::size_t pixels = image_pixels();
   meshes.inputs.resize_discard(meshes.input_bytes);
   meshes.vertices.resize_discard(vertices);
   meshes.counts.resize_discard(chunks);
@@ -191,7 +186,7 @@ void CudaBatchRenderer::State::size_layers() {
 void CudaBatchRenderer::State::enqueue_layers(const cuda::Flight& flight) {
   const cudaStream_t stream = backend.stream();
   const int width = args.grid.width, height = args.grid.height;
-  const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  const std::size_t pixels = image_pixels();
   const auto there = [&]<class T>(const T*, std::size_t at, std::size_t first) {
     return reinterpret_cast<const T*>(meshes.inputs.data() + at) + first;
   };

@@ -81,8 +81,7 @@ void CudaBatchRenderer::State::size_scratch() {
   // If there are many pixels compared with visible splats, storing a depth record per splat costs less
   // than projecting the median Gaussians again.
   const DepthMode mode = raster.depth_mode();
-  const std::size_t pixels = args.cameras * static_cast<std::size_t>(args.grid.width) *
-                             static_cast<std::size_t>(args.grid.height);
+  const std::size_t pixels = call_pixels();
   const bool records_depths =
       mode == DepthMode::all || !raster.mesh.empty() ||
       (mode == DepthMode::median &&

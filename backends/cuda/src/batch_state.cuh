@@ -208,6 +208,11 @@ struct CudaBatchRenderer::State {
   void plan_regions(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                     std::uint64_t gaussians, const cuda::InputPlaces& at);
   void size_regions();
+  /// Number of pixels of one image, and of the images of all cameras.
+  std::size_t image_pixels() const {
+    return static_cast<std::size_t>(args.grid.width) * static_cast<std::size_t>(args.grid.height);
+  }
+  std::size_t call_pixels() const { return args.cameras * image_pixels(); }
   /// Writes the meshes that the prepared cameras see into the call's pinned memory.
   Status place_meshes(std::span<const BatchCamera> cameras);
   /// Draws Gaussians into images of their own, for Composite::hard_depth.
