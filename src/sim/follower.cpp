@@ -7,6 +7,7 @@
 #include <limits>
 #include <vector>
 
+#include "action_motion.hpp"
 #include "gsnav/detail/math/angles.hpp"
 
 namespace gsnav {
@@ -75,11 +76,12 @@ class Lookahead {
       Action a = scripted(plan, i);
       if (a == Action::stop) a = steer(way, yaw);
       if (i == 0) out.first = a;
+      const detail::ActionMotion motion = detail::action_motion(a, c);
       Vec3d displacement{};
       if (a == Action::move_forward) {
-        displacement = along_heading(yaw) * c.forward_step;
+        displacement = along_heading(yaw) * motion.forward;
       } else {
-        yaw += a == Action::turn_left ? turn_ : -turn_;
+        yaw += motion.turn;
       }
       const CapsuleSet& now = bodies_.empty() ? nobody : bodies_[static_cast<std::size_t>(i)];
       // Later actions count less, because a new plan is made before they happen.

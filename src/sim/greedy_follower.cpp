@@ -6,6 +6,7 @@
 #include <numbers>
 #include <utility>
 
+#include "action_motion.hpp"
 #include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/detail/math/angles.hpp"
 
@@ -31,12 +32,13 @@ Result<GreedyGeodesicFollower> GreedyGeodesicFollower::make(const NavMesh& mesh,
 }
 
 void GreedyGeodesicFollower::act(AgentPose& agent, Action action) const {
-  const double turn = radians(task_.turn_angle);
-  if (action == Action::turn_left) agent.yaw += turn;
-  if (action == Action::turn_right) agent.yaw -= turn;
-  if (action != Action::move_forward) return;
-  const SurfaceWalk walk = mesh_->walk({agent.position, agent.poly},
-                                       agent.forward() * task_.forward_step, task_.allow_sliding);
+  const detail::ActionMotion motion = detail::action_motion(action, task_);
+  if (action != Action::move_forward) {
+    agent.yaw += motion.turn;
+    return;
+  }
+  const SurfaceWalk walk =
+      mesh_->walk({agent.position, agent.poly}, agent.forward() * motion.forward, task_.allow_sliding);
   if (walk.points.empty()) return;
   agent.position = walk.points.back().position;
   agent.poly = walk.points.back().poly;

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "action_motion.hpp"
 #include "gsnav/detail/math/angles.hpp"
 #include "gsnav/detail/sim/proximity.hpp"
 
@@ -134,29 +135,15 @@ Status World::ready() const {
 }
 
 Result<World::Motion> World::motion_of(Action action) const {
-  Motion m;
-  switch (action) {
-    case Action::stop:
-      break;
-    case Action::move_forward:
-      m.chord = config_.forward_step / config_.substeps;
-      break;
-    case Action::turn_left:
-      m.first_turn = radians(config_.turn_angle);
-      break;
-    case Action::turn_right:
-      m.first_turn = -radians(config_.turn_angle);
-      break;
-    case Action::look_up:
-      m.tilt = radians(config_.tilt_angle);
-      break;
-    case Action::look_down:
-      m.tilt = -radians(config_.tilt_angle);
-      break;
-    default:
-      return {Errc::invalid_argument,
-              "action " + std::to_string(static_cast<int>(action)) + " is unknown"};
+  if (action > Action::look_down) {
+    return {Errc::invalid_argument,
+            "action " + std::to_string(static_cast<int>(action)) + " is unknown"};
   }
+  const detail::ActionMotion a = detail::action_motion(action, config_);
+  Motion m;
+  m.first_turn = a.turn;
+  m.tilt = a.tilt;
+  m.chord = a.forward / config_.substeps;
   return m;
 }
 
