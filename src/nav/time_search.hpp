@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "gsnav/detail/nav/position_at.hpp"
 #include "gsnav/detail/nav/time_planner.hpp"
 #include "timed_bodies.hpp"
 
@@ -291,21 +292,12 @@ class TimeSearch {
         if (p.fraction > u0 && p.fraction < u1)
           between.push_back({p.position, p.poly, (p.fraction - u0) / (u1 - u0)});
       }
-      const Vec3d to = along(leg, u1);
+      const Vec3d to = position_at(leg, u1);
       if (!bodies_.clear(k, from, to, between)) return false;
       from = to;
       u0 = u1;
     }
     return true;
-  }
-  static Vec3d along(const Leg& leg, double u) noexcept {
-    for (std::size_t i = 1; i < leg.size(); ++i) {
-      if (u > leg[i].fraction) continue;
-      const double span = leg[i].fraction - leg[i - 1].fraction;
-      return span > 0 ? lerp(leg[i - 1].position, leg[i].position, (u - leg[i - 1].fraction) / span)
-                      : leg[i].position;
-    }
-    return leg.back().position;
   }
 
   /// Writes the points up to a state, with a wait where a place was left later than reached.

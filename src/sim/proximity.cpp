@@ -5,22 +5,11 @@
 #include <limits>
 #include <numeric>
 
+#include "gsnav/detail/nav/position_at.hpp"
 #include "gsnav/sim/metrics.hpp"
 
 namespace gsnav {
 namespace {
-
-Vec3d position_at(std::span<const WalkPoint> path, double u) {
-  if (path.empty()) return {};
-  for (std::size_t i = 1; i < path.size(); ++i) {
-    if (u < path[i].fraction) {
-      const double length = path[i].fraction - path[i - 1].fraction;
-      const double k = length > 0 ? (u - path[i - 1].fraction) / length : 1.0;
-      return lerp(path[i - 1].position, path[i].position, clamp(k, 0.0, 1.0));
-    }
-  }
-  return path.back().position;
-}
 
 constexpr double kRounding = 1e-9;
 
@@ -164,7 +153,7 @@ class Approach {
   }
 
   double gap(double u) {
-    const Capsule<double> agent = agent_capsule(position_at(path_, u), radius_, height_);
+    const Capsule<double> agent = agent_capsule(detail::position_at(path_, u), radius_, height_);
     const Capsule<double> here{{}, agent.p1 - agent.p0, agent.radius};
     double least = std::numeric_limits<double>::infinity();
     for (Near& n : near_) {
