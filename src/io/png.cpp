@@ -25,7 +25,7 @@ void write_bytes(png_structp png, png_bytep from, std::size_t n) {
 }
 void flush_nothing(png_structp) {}
 
-bool encode(OutputFile& file, png_const_bytep pixels, int width, int height, int bits, int channels) {
+bool encode(OutputFile& file, png_const_bytep pixels, int width, int height) {
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, on_error, on_warning);
   if (png == nullptr) return false;
   png_infop info = png_create_info_struct(png);
@@ -34,13 +34,11 @@ bool encode(OutputFile& file, png_const_bytep pixels, int width, int height, int
     return false;
   }
   png_set_write_fn(png, &file, write_bytes, flush_nothing);
-  png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), bits,
-               channels == 3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
-               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), 8,
+               PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+               PNG_FILTER_TYPE_DEFAULT);
   png_write_info(png, info);
-  if (bits == 16) png_set_swap(png);
-  const std::size_t stride = static_cast<std::size_t>(width) * static_cast<std::size_t>(channels) *
-                             static_cast<std::size_t>(bits / 8);
+  const std::size_t stride = 3 * static_cast<std::size_t>(width);
   for (int row = 0; row < height; ++row)
     png_write_row(png, pixels + static_cast<std::size_t>(row) * stride);
   png_write_end(png, nullptr);
@@ -48,17 +46,16 @@ bool encode(OutputFile& file, png_const_bytep pixels, int width, int height, int
   return true;
 }
 
-Status save(const std::filesystem::path& path, const void* pixels, std::size_t samples, int width,
-            int height, int bits, int channels) {
+Status save(const std::filesystem::path& path, std::span<const std::uint8_t> rgb, int width,
+            int height) {
   if (width <= 0 || height <= 0 || width > detail::kMostPngSide || height > detail::kMostPngSide ||
-      samples != static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
-                     static_cast<std::size_t>(channels)) {
-    return {Errc::invalid_argument, path.string() + ": " + std::to_string(samples) + " samples are no " +
-                                        std::to_string(width) + " x " + std::to_string(height) +
-                                        " image of " + std::to_string(channels) + " channels"};
+      rgb.size() != 3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
+    return {Errc::invalid_argument, path.string() + ": " + std::to_string(rgb.size()) +
+                                        " samples are no " + std::to_string(width) + " x " +
+                                        std::to_string(height) + " image of 3 channels"};
   }
   return replace_file(path, [&](OutputFile& file) -> Status {
-    if (encode(file, static_cast<png_const_bytep>(pixels), width, height, bits, channels)) return {};
+    if (encode(file, rgb.data(), width, height)) return {};
     return {Errc::out_of_memory, path.string() + ": the PNG could not be made: not enough memory"};
   });
 }
@@ -158,20 +155,13 @@ Status save_png_rgb(const std::filesystem::path& path, std::span<const float> rg
   return detail::guarded(path.string(), [&]() -> Status {
     std::vector<std::uint8_t> bytes(rgb.size());
     std::transform(rgb.begin(), rgb.end(), bytes.begin(), [](float x) { return to_byte(x); });
-    return save(path, bytes.data(), bytes.size(), width, height, 8, 3);
+    return save(path, bytes, width, height);
   });
 }
 
 Status save_png_rgb8(const std::filesystem::path& path, std::span<const std::uint8_t> rgb, int width,
                      int height) {
-  return detail::guarded(path.string(),
-                         [&] { return save(path, rgb.data(), rgb.size(), width, height, 8, 3); });
-}
-
-Status save_png_gray16(const std::filesystem::path& path, std::span<const std::uint16_t> values,
-                       int width, int height) {
-  return detail::guarded(path.string(),
-                         [&] { return save(path, values.data(), values.size(), width, height, 16, 1); });
+  return detail::guarded(path.string(), [&] { return save(path, rgb, width, height); });
 }
 
 Result<PngImage> load_png(const std::filesystem::path& path) {

@@ -131,7 +131,8 @@ TEST_CASE("a batch over a library that has room for one scene has the bits of on
   };
   OpenMPBackend backend(2);
   auto a = make_batch_simulator(backend, all, config, 3, source).value();
-  auto b = make_batch_simulator_from_library(backend, library, config, 3, source).value();
+  auto b = BasicBatchSimulator<OpenMPBackend>::create_from_library(backend, library, config, 3, source)
+               .value();
   const auto same = [](const BatchStep& x, const BatchStep& y) {
     for (std::size_t i = 0; i < x.images.size(); ++i) {
       if (std::memcmp(x.images[i].data.data(), y.images[i].data.data(), x.images[i].data.size_bytes()) !=

@@ -32,11 +32,6 @@ Status save_png_rgb8(const std::filesystem::path& path, std::span<const std::uin
 Result<std::vector<std::byte>> encode_jpeg(std::span<const std::uint8_t> rgb, int width, int height,
                                            int quality = 85);
 
-/// Writes [height][width] values as a 16-bit grey PNG, values unchanged: depth in millimetres, for
-/// example.
-Status save_png_gray16(const std::filesystem::path& path, std::span<const std::uint16_t> values,
-                       int width, int height);
-
 /// Maps depth to colours for viewing: bright where near, dark where far, evenly spaced in lightness.
 /// @param depth [N] in metres, clamped to [near, far]. 0, negative values and NaN (no return) become
 /// black.

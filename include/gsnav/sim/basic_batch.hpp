@@ -324,15 +324,4 @@ Result<BasicBatchSimulator<B>> make_batch_simulator(
                                         std::move(next_episode));
 }
 
-/// Calls `BasicBatchSimulator<B>::create_from_library`, whose comment describes the arguments.
-template <Backend B>
-Result<BasicBatchSimulator<B>> make_batch_simulator_from_library(B& backend,
-                                                                 std::shared_ptr<SceneLibrary> library,
-                                                                 BatchConfig config,
-                                                                 std::size_t environments,
-                                                                 EpisodeSource next_episode) {
-  return BasicBatchSimulator<B>::create_from_library(backend, std::move(library), std::move(config),
-                                                     environments, std::move(next_episode));
-}
-
 }  // namespace gsnav
