@@ -6,12 +6,13 @@
 #include <cstdint>
 #include <limits>
 
+#include "gsnav/detail/math/half.hpp"
 #include "gsnav/frame/sh.hpp"
 #include "gsnav/math/quat.hpp"
 
 namespace gsnav::io::detail {
 
-/// The logit whose sigmoid is byte / 255; infinite at both ends.
+/// The logit whose sigmoid is byte / 255; infinite at both ends. More exact than logit(byte / 255.0).
 inline double opacity_logit(unsigned byte) noexcept {
   const double value = static_cast<double>(byte);
   return std::log(value / (255.0 - value));
@@ -50,16 +51,12 @@ inline Quatd quat_without(std::size_t largest, const double (&others)[3]) noexce
   return {q[0], q[1], q[2], q[3]};
 }
 
-/// Converts an IEEE 754 binary16.
+/// Converts an IEEE 754 binary16. Files may have infinity and NaN, unlike half_to_float().
 inline double half_to_double(std::uint16_t bits) noexcept {
-  const int exponent = (bits >> 10) & 31, mantissa = bits & 1023;
-  double v = 0;
-  if (exponent == 31) {
-    v = mantissa != 0 ? std::numeric_limits<double>::quiet_NaN()
-                      : std::numeric_limits<double>::infinity();
-  } else {
-    v = exponent == 0 ? std::ldexp(mantissa, -24) : std::ldexp(mantissa + 1024, exponent - 25);
-  }
+  using Limits = std::numeric_limits<double>;
+  constexpr unsigned kExponent = 0x7c00;
+  if ((bits & kExponent) != kExponent) return static_cast<double>(half_to_float(bits));
+  const double v = (bits & 0x3ff) != 0 ? Limits::quiet_NaN() : Limits::infinity();
   return (bits & 0x8000) != 0 ? -v : v;
 }
 
