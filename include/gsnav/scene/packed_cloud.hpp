@@ -11,6 +11,7 @@
 
 #include "gsnav/detail/core/huge_pages.hpp"
 #include "gsnav/detail/frame/set_rows.hpp"
+#include "gsnav/detail/math/smallest_three.hpp"
 #include "gsnav/detail/scene/load_report.hpp"
 #include "gsnav/detail/scene/needed_bands.hpp"
 #include "gsnav/detail/scene/packed_rows.hpp"
@@ -28,19 +29,14 @@ inline std::uint16_t code_of(double value, double largest) noexcept {
 
 /// The three codes of a unit quaternion that unpack_quat reads.
 inline std::array<std::uint16_t, 3> pack_quat(const Quatd& q) noexcept {
-  const double parts[] = {q.w, q.x, q.y, q.z};
-  std::size_t missing = 0;
-  for (std::size_t k = 1; k < 4; ++k)
-    missing = std::fabs(parts[k]) > std::fabs(parts[missing]) ? k : missing;
-  const double sign = parts[missing] < 0 ? -1 : 1, middle = static_cast<double>(kQuatCodes) / 2;
+  const double parts[] = {q.w, q.x, q.y, q.z}, middle = static_cast<double>(kQuatCodes) / 2;
+  double others[3];
+  const std::size_t missing = smallest_three(parts, others);
   std::array<std::uint16_t, 3> out{};
-  std::size_t to = 0;
-  for (std::size_t k = 0; k < 4; ++k) {
-    if (k == missing) continue;
+  for (std::size_t k = 0; k < 3; ++k) {
     const std::uint16_t code =
-        code_of(sign * parts[k] * middle * std::sqrt(2.0) + middle, static_cast<double>(kQuatCodes));
-    const std::uint16_t bit = to < 2 ? static_cast<std::uint16_t>(missing >> to & 1u) : std::uint16_t{0};
-    out[to++] = static_cast<std::uint16_t>(2 * code + bit);
+        code_of(others[k] * middle * std::sqrt(2.0) + middle, static_cast<double>(kQuatCodes));
+    out[k] = static_cast<std::uint16_t>(2u * code + (missing >> k & 1u));
   }
   return out;
 }
