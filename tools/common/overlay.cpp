@@ -25,7 +25,7 @@ struct Point {
 };
 
 std::optional<Point> project(const gsnav::Camera& c, const Vec3d& p) {
-  const Vec3d v = c.viewmat.linear * p + c.viewmat.translation;
+  const Vec3d v = c.viewmat * p;
   if (v.z < kNear) return {};
   return Point{c.fx * v.x / v.z + c.cx, c.fy * v.y / v.z + c.cy, v.z};
 }
