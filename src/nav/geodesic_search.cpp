@@ -207,11 +207,9 @@ void GeodesicSearch::open(std::uint32_t edge, const Flat& root, const Flat& righ
   }
   // Goal in 3D relative to the right end of the window: distance along the edge and from its line.
   const Vec3d &a = here.corner, &b = mesh_->edges[mesh_->next(edge)].corner;
-  const Vec3d e{b.x - a.x, b.y - a.y, b.z - a.z},
-      to{goal_.position.x - a.x, goal_.position.y - a.y, goal_.position.z - a.z};
-  const double ee = e.x * e.x + e.y * e.y + e.z * e.z, te = to.x * e.x + to.y * e.y + to.z * e.z;
-  const double tt = to.x * to.x + to.y * to.y + to.z * to.z, along = te / std::sqrt(ee);
-  const double beyond = std::sqrt(max(tt - along * along, 0.0));
+  const Vec3d e = b - a, to = goal_.position - a;
+  const double along = plain_dot(to, e) / std::sqrt(plain_dot(e, e));
+  const double beyond = std::sqrt(max(plain_dot(to, to) - along * along, 0.0));
   const double begin = length(right - here.at);
   double f = length_through(root, right, left, along - begin, beyond);
   if (lead_ != nullptr && (g + f) * (1 + slack_) < best_) {

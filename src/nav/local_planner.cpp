@@ -16,32 +16,32 @@ namespace gsnav {
 namespace {
 
 using detail::Disc;
-using detail::Ground;
+using detail::Flat;
 using detail::HalfPlane;
 
 /// Half plane of allowed velocities: the tangent of the velocity obstacle nearest to `preferred`.
 /// @param to Vector from the agent to the centre of the disc.
 /// @param reach Sum of both radii and the margin.
 /// @param velocity Velocity of the disc.
-HalfPlane avoid(const Ground& to, double reach, const Ground& velocity, const Ground& preferred,
+HalfPlane avoid(const Flat& to, double reach, const Flat& velocity, const Flat& preferred,
                 const LocalPlannerOptions& o) noexcept {
   const double distance = detail::length(to);
-  const Ground towards = distance > 0 ? to * (1 / distance) : Ground{1, 0};
-  const auto plane = [&](const Ground& n, double relative) {
+  const Flat towards = distance > 0 ? to * (1 / distance) : Flat{1, 0};
+  const auto plane = [&](const Flat& n, double relative) {
     return HalfPlane{n, relative + dot(n, velocity), true};
   };
   if (distance <= reach) return plane(towards * -1.0, (reach - distance) / o.escape_time);
   // The obstacle is a cone, cut off by the disc of velocities that meet at the horizon. The nearest
   // boundary is its round end or a side.
-  const Ground from_end = preferred - velocity - to * (1 / o.horizon);
+  const Flat from_end = preferred - velocity - to * (1 / o.horizon);
   const double off = detail::length(from_end);
   if (dot(from_end, to) < -reach * off) {
-    const Ground n = from_end * (1 / off);
+    const Flat n = from_end * (1 / off);
     return plane(n, dot(n, to) / o.horizon + reach / o.horizon);
   }
   const double sine = reach / distance, cosine = std::sqrt(max(1 - sine * sine, 0.0));
-  const double side = det(to, from_end) >= 0 ? 1.0 : -1.0;
-  const Ground leg = towards * cosine + detail::left_of(towards) * (side * sine);
+  const double side = cross(to, from_end) >= 0 ? 1.0 : -1.0;
+  const Flat leg = towards * cosine + detail::left_of(towards) * (side * sine);
   return plane(detail::left_of(leg) * side, 0);
 }
 
@@ -50,7 +50,7 @@ HalfPlane avoid(const Ground& to, double reach, const Ground& velocity, const Gr
 class VelocitySearch {
  public:
   VelocitySearch(const NavMesh& mesh, const AgentState& agent, const NavPoint& here,
-                 const CapsuleSet& bodies, const Ground& wanted, const LocalPlannerOptions& o)
+                 const CapsuleSet& bodies, const Flat& wanted, const LocalPlannerOptions& o)
       : mesh_(mesh),
         agent_(agent),
         here_(here),
@@ -61,19 +61,19 @@ class VelocitySearch {
 
   /// Returns the best velocity, with `candidate` among those tried, and the time in seconds until its
   /// first contact.
-  std::pair<Ground, double> best(const Ground& candidate) const {
-    std::vector<std::pair<double, Ground>> tries;
-    const auto add = [&](const Ground& v) { tries.emplace_back(off(v), v); };
-    add(detail::nearest_in({}, wanted_, o_.max_speed).value_or(Ground{}));
+  std::pair<Flat, double> best(const Flat& candidate) const {
+    std::vector<std::pair<double, Flat>> tries;
+    const auto add = [&](const Flat& v) { tries.emplace_back(off(v), v); };
+    add(detail::nearest_in({}, wanted_, o_.max_speed).value_or(Flat{}));
     add(candidate);
     add({});
-    const double ahead = std::atan2(wanted_.z, wanted_.x);
+    const double ahead = std::atan2(wanted_.y, wanted_.x);
     for (int k = 0; k < kDirections; ++k) {
       for (const double part : {1.0, 0.5}) add(around(ahead, k, kDirections, part * o_.max_speed));
     }
     std::stable_sort(tries.begin(), tries.end(),
                      [](const auto& a, const auto& b) { return a.first < b.first; });
-    Ground chosen;
+    Flat chosen;
     double least = kNever, contact = 0;
     for (const auto& [cost, v] : tries) {
       if (cost >= least) break;
@@ -94,17 +94,17 @@ class VelocitySearch {
   static constexpr double kSoonest = 0.1;    // Seconds. Earlier contacts do not cost more.
   static constexpr double kOutWeight = 2.0, kInTick = 1000.0, kNever = 1e30;
 
-  static Ground around(double ahead, int k, int count, double speed) noexcept {
+  static Flat around(double ahead, int k, int count, double speed) noexcept {
     const double a = ahead + k * (kTwoPi / count);
     return {speed * std::cos(a), speed * std::sin(a)};
   }
-  double off(const Ground& v) const noexcept {
+  double off(const Flat& v) const noexcept {
     return detail::length(v - wanted_) / max(o_.max_speed, 1e-9);
   }
   double urgency(double seconds) const noexcept { return 1 / max(seconds, kSoonest) - 1 / o_.horizon; }
 
-  SurfaceWalk walk(const NavPoint& from, const Ground& v, double seconds) const {
-    return mesh_.walk(from, {v.x * seconds, 0, v.z * seconds}, true);
+  SurfaceWalk walk(const NavPoint& from, const Flat& v, double seconds) const {
+    return mesh_.walk(from, {v.x * seconds, 0, v.y * seconds}, true);
   }
   double contact(const SurfaceWalk& walk, double margin, double from) const {
     return people_.first_contact(walk, agent_.radius + margin, agent_.height, from, o_.horizon - from);
@@ -112,7 +112,7 @@ class VelocitySearch {
 
   /// Returns the cost of a velocity without that of its difference from the preferred one, and the time
   /// of its first contact. Costs of `enough` or more may be inexact.
-  std::pair<double, double> price(const Ground& v, double enough) const {
+  std::pair<double, double> price(const Flat& v, double enough) const {
     if (people_.size() == 0) return {0, o_.horizon};
     const SurfaceWalk way = walk(here_, v, o_.horizon);
     const double wide = contact(way, max(o_.margin, kTight), 0);
@@ -126,12 +126,12 @@ class VelocitySearch {
   }
   /// Latest possible time of contact, if the agent moves at v for `react_` seconds and then in the best
   /// direction.
-  double latest(const Ground& v) const {
+  double latest(const Flat& v) const {
     const SurfaceWalk first = walk(here_, v, react_);
     const NavPoint there{first.points.back().position, first.points.back().poly};
     double last = 0;
     for (int k = 0; k <= kWaysOut && last < o_.horizon; ++k) {
-      const Ground u = k == kWaysOut ? Ground{} : around(0, k, kWaysOut, o_.max_speed);
+      const Flat u = k == kWaysOut ? Flat{} : around(0, k, kWaysOut, o_.max_speed);
       last = max(last, contact(walk(there, u, o_.horizon - react_), kTight, react_));
     }
     return last;
@@ -140,7 +140,7 @@ class VelocitySearch {
   const NavMesh& mesh_;
   const AgentState& agent_;
   const NavPoint here_;
-  const Ground wanted_;
+  const Flat wanted_;
   const LocalPlannerOptions& o_;
   detail::PredictedBodies people_;
   double react_;
@@ -160,7 +160,7 @@ PlannedVelocity plan_velocity(const NavMesh& mesh, const AgentState& agent, cons
   if (!valid) return out;
   const SurfaceWalk start = mesh.walk({agent.position, agent.poly}, {}, false);
   if (start.points.empty()) return out;
-  const Ground at{agent.position.x, agent.position.z}, wanted{preferred.x, preferred.z};
+  const Flat at{agent.position.x, agent.position.z}, wanted{preferred.x, preferred.z};
 
   const NavPoint here{start.points[0].position, start.points[0].poly};
   std::vector<HalfPlane> planes;
@@ -173,7 +173,7 @@ PlannedVelocity plan_velocity(const NavMesh& mesh, const AgentState& agent, cons
                                    agent.position.y + agent.height, seconds);
     if (!(d.radius > 0)) continue;
     const double reach = d.radius + agent.radius + o.margin;
-    const Ground to = d.at - at;
+    const Flat to = d.at - at;
     const double closing = o.max_speed + detail::length(d.velocity);
     if (detail::length(to) - reach > closing * o.horizon) continue;
     planes.push_back(avoid(to, reach, d.velocity, wanted, o));
@@ -194,13 +194,13 @@ PlannedVelocity plan_velocity(const NavMesh& mesh, const AgentState& agent, cons
       if (found) v = found;
     }
   }
-  Ground chosen = v.value_or(Ground{});
+  Flat chosen = v.value_or(Flat{});
   out.contact_after = o.horizon;
   if (out.bodies > 0) {
     std::tie(chosen, out.contact_after) =
         VelocitySearch(mesh, agent, here, bodies, wanted, o).best(chosen);
   }
-  out.velocity = {chosen.x, 0, chosen.z};
+  out.velocity = {chosen.x, 0, chosen.y};
   out.safe = out.contact_after >= o.horizon;
   return out;
 }

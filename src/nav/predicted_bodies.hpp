@@ -10,7 +10,7 @@ namespace gsnav::detail {
 
 /// Disc around a body on the ground plane, and its mean velocity during a tick.
 struct Disc {
-  Ground at, velocity;
+  Flat at, velocity;
   double radius = 0;
 };
 
@@ -26,18 +26,18 @@ inline Disc disc_of(View<const DynamicCapsule> capsules, double low, double high
     if (!reaches(c.motion.begin) && !reaches(c.motion.end)) continue;
     for (const auto& [from, to] :
          {std::pair{c.motion.begin.p0, c.motion.end.p0}, {c.motion.begin.p1, c.motion.end.p1}}) {
-      disc.at = disc.at + Ground{from.x, from.z};
-      disc.velocity = disc.velocity + Ground{to.x - from.x, to.z - from.z};
+      disc.at = disc.at + Flat{from.x, from.z};
+      disc.velocity = disc.velocity + Flat{to.x - from.x, to.z - from.z};
       count += 1;
     }
   }
   if (count <= 0) return disc;
   disc.at = disc.at * (1 / count);
-  disc.velocity = seconds > 0 ? disc.velocity * (1 / (count * seconds)) : Ground{};
+  disc.velocity = seconds > 0 ? disc.velocity * (1 / (count * seconds)) : Flat{};
   for (const DynamicCapsule& c : capsules) {
     if (!reaches(c.motion.begin) && !reaches(c.motion.end)) continue;
     for (const Vec3d& p : {c.motion.begin.p0, c.motion.begin.p1}) {
-      disc.radius = max(disc.radius, length(Ground{p.x, p.z} - disc.at) + c.motion.begin.radius);
+      disc.radius = max(disc.radius, length(Flat{p.x, p.z} - disc.at) + c.motion.begin.radius);
     }
   }
   return disc;
@@ -51,7 +51,7 @@ class PredictedBodies {
   /// the tick.
   PredictedBodies(const CapsuleSet& bodies, const AgentState& agent, double speed, double seconds)
       : tick_(bodies.t1() - bodies.t0()) {
-    const Ground at{agent.position.x, agent.position.z};
+    const Flat at{agent.position.x, agent.position.z};
     for (const CapsuleSet::Group& g : bodies.groups()) {
       const Disc d =
           disc_of(bodies.capsules_of(g), agent.position.y, agent.position.y + agent.height, tick_);
@@ -62,7 +62,7 @@ class PredictedBodies {
       // Limbs may leave the disc of the first pose.
       for (const DynamicCapsule& c : b.known) {
         for (const Vec3d& p : {c.motion.end.p0, c.motion.end.p1}) {
-          const Ground off = Ground{p.x, p.z} - d.at - d.velocity * tick_;
+          const Flat off = Flat{p.x, p.z} - d.at - d.velocity * tick_;
           b.disc.radius = max(b.disc.radius, length(off) + c.motion.end.radius);
         }
       }
@@ -104,9 +104,9 @@ class PredictedBodies {
   double contact(const Body& b, const Vec3d& p, const Vec3d& q, double t0, double t1, double radius,
                  double height) const {
     const double reach = b.disc.radius + radius + 1e-3;
-    const Ground d0 = Ground{p.x, p.z} - b.disc.at - b.disc.velocity * t0;
-    const Ground d1 = Ground{q.x, q.z} - b.disc.at - b.disc.velocity * t1;
-    const Ground e = d1 - d0;
+    const Flat d0 = Flat{p.x, p.z} - b.disc.at - b.disc.velocity * t0;
+    const Flat d1 = Flat{q.x, q.z} - b.disc.at - b.disc.velocity * t1;
+    const Flat e = d1 - d0;
     if (length(d0 + e * segment_fraction(-dot(d0, e), dot(e, e))) > reach) return kNever;
     const double middle = clamp(tick_, t0, t1);
     const Vec3d m = t1 > t0 ? lerp(p, q, (middle - t0) / (t1 - t0)) : p;
@@ -121,7 +121,7 @@ class PredictedBodies {
       double first = kNever;
       for (const DynamicCapsule& c : b.known) {
         const auto placed = [&](double t) {
-          const Vec3d by{b.disc.velocity.x * (t - tick_), 0, b.disc.velocity.z * (t - tick_)};
+          const Vec3d by{b.disc.velocity.x * (t - tick_), 0, b.disc.velocity.y * (t - tick_)};
           return Capsule<double>{c.motion.end.p0 + by, c.motion.end.p1 + by, c.motion.end.radius};
         };
         const DynamicCapsule later{{placed(middle), placed(t1)}, c.avatar, c.bone};

@@ -6,24 +6,19 @@
 #include <vector>
 
 #include "face_grid.hpp"
+#include "flat.hpp"
 #include "poly_mesh.hpp"
 
 namespace gsnav::detail {
 
-/// Point of a face in the plane of the face.
-struct Flat {
-  double x = 0, y = 0;
-};
-inline Flat operator-(const Flat& a, const Flat& b) noexcept { return {a.x - b.x, a.y - b.y}; }
-inline Flat operator+(const Flat& a, const Flat& b) noexcept { return {a.x + b.x, a.y + b.y}; }
-inline Flat operator*(const Flat& a, double s) noexcept { return {a.x * s, a.y * s}; }
-inline double cross(const Flat& a, const Flat& b) noexcept { return a.x * b.y - a.y * b.x; }
-inline double dot(const Flat& a, const Flat& b) noexcept { return a.x * b.x + a.y * b.y; }
-inline double length(const Flat& a) noexcept { return std::sqrt(dot(a, a)); }
-/// Distance in 3D. Without fused multiply-add, which is a function call if the processor may lack it.
+/// Dot product in 3D without fused multiply-add, as in flat.hpp.
+inline double plain_dot(const Vec3d& a, const Vec3d& b) noexcept {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+/// Distance in 3D.
 inline double distance(const Vec3d& a, const Vec3d& b) noexcept {
-  const double x = a.x - b.x, y = a.y - b.y, z = a.z - b.z;
-  return std::sqrt(x * x + y * y + z * z);
+  const Vec3d d = a - b;
+  return std::sqrt(plain_dot(d, d));
 }
 
 /// Surface of a NavMesh as flat convex faces. Each face has its own plane coordinates, and each edge has
@@ -78,7 +73,7 @@ class UnfoldedMesh {
     return e == f.first ? f.first + f.count - 1 : e - 1;
   }
   Flat flat(const Face& f, const Vec3d& p) const noexcept {
-    return {p.x * f.u.x + p.y * f.u.y + p.z * f.u.z, p.x * f.v.x + p.y * f.v.y + p.z * f.v.z};
+    return {plain_dot(p, f.u), plain_dot(p, f.v)};
   }
   /// Transforms a point from the plane of the face of edge e to that of the neighbour across it.
   static Flat across(const Edge& e, const Flat& p) noexcept {

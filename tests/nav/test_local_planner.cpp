@@ -14,14 +14,14 @@
 
 using namespace gsnav;
 using namespace gsnav_test;
-using detail::Ground;
+using detail::Flat;
 using detail::HalfPlane;
 
 namespace {
 
 /// The same by trying every point where an optimum can lie.
-double nearest_by_trying(const std::vector<HalfPlane>& planes, const Ground& wanted, double limit) {
-  std::vector<Ground> points{length(wanted) > limit ? wanted * (limit / length(wanted)) : wanted};
+double nearest_by_trying(const std::vector<HalfPlane>& planes, const Flat& wanted, double limit) {
+  std::vector<Flat> points{length(wanted) > limit ? wanted * (limit / length(wanted)) : wanted};
   for (std::size_t i = 0; i < planes.size(); ++i) {
     const HalfPlane& h = planes[i];
     points.push_back(wanted + h.normal * (h.offset - dot(h.normal, wanted)));
@@ -30,14 +30,14 @@ double nearest_by_trying(const std::vector<HalfPlane>& planes, const Ground& wan
       if (room >= 0) points.push_back(h.normal * h.offset + left_of(h.normal) * (s * std::sqrt(room)));
     }
     for (std::size_t j = 0; j < i; ++j) {
-      const double d = det(h.normal, planes[j].normal);
+      const double d = cross(h.normal, planes[j].normal);
       if (std::abs(d) < 1e-12) continue;
       points.push_back(left_of(h.normal) * (planes[j].offset / d) -
                        left_of(planes[j].normal) * (h.offset / d));
     }
   }
   double best = std::numeric_limits<double>::infinity();
-  for (const Ground& p : points) {
+  for (const Flat& p : points) {
     bool ok = length(p) <= limit + 1e-9;
     for (const HalfPlane& h : planes) ok = ok && dot(h.normal, p) >= h.offset - 1e-9;
     if (ok) best = std::min(best, length(p - wanted));
@@ -69,7 +69,7 @@ TEST_CASE("half planes: the nearest point, against all that can be it") {
       planes.push_back({{std::cos(a), std::sin(a)}, rng.uniform(-1, 0.6), false});
     }
     const double a = rng.uniform(0, 2 * std::numbers::pi), r = rng.uniform(0, 1.5);
-    const Ground wanted{r * std::cos(a), r * std::sin(a)};
+    const Flat wanted{r * std::cos(a), r * std::sin(a)};
     const auto v = detail::nearest_in(planes, wanted, 1.0);
     const double best = nearest_by_trying(planes, wanted, 1.0);
     if (!v) {
