@@ -2,12 +2,12 @@
 // skeleton made from it.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <set>
 #include <string>
 
 #include "gltf_file_skins.hpp"
+#include "gsnav/detail/math/angles.hpp"
 #include "gsnav/skin/lbs.hpp"
 
 namespace gsnav::io::detail {
@@ -45,7 +45,7 @@ Mat3d squared(const Mat3d& m) {
   }
   const Mat3d between = transpose(out) * m;
   const double trace = between(0, 0) + between(1, 1) + between(2, 2);
-  return determinant(out) > 0.5 && trace > 1 + 2 * std::cos(30 * std::numbers::pi / 180) ? out : m;
+  return determinant(out) > 0.5 && trace > 1 + 2 * std::cos(radians(30)) ? out : m;
 }
 
 Affine3<double> inverse_of(const Affine3<double>& m) {

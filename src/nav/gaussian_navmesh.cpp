@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <thread>
@@ -13,6 +12,7 @@
 #include "gaussian_floor.hpp"
 #include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/detail/core/guarded.hpp"
+#include "gsnav/detail/math/angles.hpp"
 #include "navmesh_stages.hpp"
 #include "triangle_heights.hpp"
 
@@ -159,7 +159,7 @@ detail::FloorSettings floor_settings(const NavMeshSettings& settings, const Gaus
   const detail::VoxelSettings cells(settings);
   return {static_cast<std::size_t>(cells.height), static_cast<std::size_t>(cells.climb),
           static_cast<std::size_t>(std::floor(options.floor_band / g.level + 1e-6)),
-          std::tan(settings.agent_max_slope * std::numbers::pi / 180.0)};
+          std::tan(radians(settings.agent_max_slope))};
 }
 
 Status no_floor(const NavMeshSettings& settings, const GaussianNavOptions& options, const VoxelGrid& g,

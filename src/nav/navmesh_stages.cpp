@@ -6,8 +6,9 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
-#include <numbers>
 #include <utility>
+
+#include "gsnav/detail/math/angles.hpp"
 
 namespace gsnav::detail {
 namespace {
@@ -62,9 +63,7 @@ VoxelSettings::VoxelSettings(const NavMeshSettings& s) noexcept
       climb(clamp_cells(std::floor(s.agent_max_climb / s.cell_height + kEdge))),
       radius(clamp_cells(std::ceil(s.agent_radius / s.cell_size - kEdge))) {}
 
-double slope_cosine(const NavMeshSettings& s) noexcept {
-  return std::cos(s.agent_max_slope * std::numbers::pi / 180.0);
-}
+double slope_cosine(const NavMeshSettings& s) noexcept { return std::cos(radians(s.agent_max_slope)); }
 
 Result<Aabb<double>> check_triangles(std::span<const Vec3d> vertices,
                                      std::span<const NavMesh::Triangle> triangles) {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "gsnav/detail/math/angles.hpp"
+
 namespace gsnav {
 namespace {
 
@@ -27,7 +29,7 @@ double sphere_scale(const FisheyeLens& lens, double z) noexcept {
 
 std::array<double, 2> focal_length(const SensorSpec& s) noexcept {
   std::array<double, 2> f = s.fisheye.focal_length;
-  const double half = 0.5 * s.hfov * std::numbers::pi / 180.0;
+  const double half = radians(0.5 * s.hfov);
   const double fit = 0.5 * s.resolution[1] * sphere_scale(s.fisheye, std::cos(half)) / std::sin(half);
   for (double& v : f) v = v > 0 ? v : fit;
   return f;
