@@ -188,7 +188,7 @@ struct Stages {
 
 /// Copies to the device from memory that is not pinned.
 struct Upload {
-  static constexpr std::size_t kMaxBytes = std::size_t{1} << 20;  ///< Size of one copy.
+  static constexpr std::size_t kMaxBytes = std::size_t{4} << 20;  ///< Size of one copy.
   static constexpr std::size_t kBlocks = 8;
 };
 
