@@ -15,7 +15,8 @@
 // - if a pixel's value is known before the last Gaussian: the transmittance at which it is, in
 //   blend_rules (detail/render/rules.hpp);
 // - if it is not a depth: its rule in HardDepthPixel (detail/frame/composite.hpp);
-// - for tests, its definition in the oracles (detail/eval/oracle_config.hpp, oracle_blend.hpp).
+// - for tests, its definition in the oracles (detail/eval/oracle_config.hpp, oracle_blend.hpp), and how
+//   rays are joined into pixels (detail/eval/oracle_photo.hpp).
 
 namespace gsnav {
 
