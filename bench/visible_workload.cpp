@@ -36,28 +36,37 @@ Quatd upright(const std::vector<Camera>& cameras) {
 
 }  // namespace
 
-VisibleSets workload_visible_sets(VisibleSettings settings) {
+VisibleWorkload visible_workload(double spacing) {
   const GaussianCloud& cloud = workload().cloud;
-  const std::vector<Camera> cameras = sized(256, 256);
-  const Similarity placed{upright(cameras), {}, 1.0};
+  const std::vector<Camera>& cameras = workload().cameras;
+  VisibleWorkload out;
+  out.placed = Similarity{upright(cameras), {}, 1.0};
   NavMeshSettings mesh = gaussian_navmesh_settings();
   mesh.agent_radius = 0.3;
-  const GaussianSet set = cloud.set(placed);
+  const GaussianSet set = cloud.set(out.placed);
   GaussianNavOptions how;
   if (std::getenv("GSNAV_BENCH_SCENE") == nullptr)
     how.solid_alpha = 0.2;  // the flat's surfaces are as thin as paper
   const NavMeshFromGaussians built = build_navmesh(mesh, std::span(&set, 1), how).value();
   std::vector<double> heights;  // above the floor, to the millimetre, each once
   for (const Camera& c : cameras) {
-    heights.push_back(std::round(1000 * ((placed * c.position()).y - built.report.floor_y)) / 1000);
+    heights.push_back(std::round(1000 * ((out.placed * c.position()).y - built.report.floor_y)) / 1000);
   }
   std::sort(heights.begin(), heights.end());
   heights.erase(std::unique(heights.begin(), heights.end()), heights.end());
+  out.viewpoints = navmesh_viewpoints(built.mesh, heights, spacing).value();
+  return out;
+}
+
+VisibleSets workload_visible_sets(VisibleSettings settings) {
+  const GaussianCloud& cloud = workload().cloud;
+  const std::vector<Camera> cameras = sized(256, 256);
   settings.serve(*std::max_element(cameras.begin(), cameras.end(), [](const Camera& x, const Camera& y) {
     return std::max(x.fx, x.fy) < std::max(y.fx, y.fy);
   }));
-  const std::vector<Vec3d> viewpoints =
-      navmesh_viewpoints(built.mesh, heights, settings.spacing()).value();
+  const VisibleWorkload places = visible_workload(settings.spacing());
+  const Similarity& placed = places.placed;
+  const std::vector<Vec3d>& viewpoints = places.viewpoints;
   settings.most_share = 1;  // measured even if visible sets save nothing
   OpenMPBackend backend;
   const auto start = std::chrono::steady_clock::now();
