@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "hard_cases/arrays.hpp"
+#include "hard_cases/fast_images.hpp"
 #include "ops/stage_frames.hpp"
 #include "support/image_hashes.hpp"
 #if defined(GSNAV_HAS_CUDA)
@@ -77,6 +78,12 @@ Frames<S> CaseRenderer<S, B>::render(const std::vector<Placed>& scene,
   Frames<S> frames = draw<S>(*backend_, there.sets, cameras, config, there.instances);
   REQUIRE(frames.stats.size() == cameras.size());  // only batches have none
   record_hashes(frames, this->name());
+  if constexpr (std::is_same_v<S, double>) {
+    const auto in_float = [&](const RenderConfig& how) {
+      return draw<float>(*backend_, there.sets, cameras, how, there.instances);
+    };
+    if (judges_fast(config)) check_fast(in_float(fast_of(config)), in_float(config), frames);
+  }
   return frames;
 }
 
