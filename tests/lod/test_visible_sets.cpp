@@ -31,6 +31,7 @@ namespace {
 VisibleSettings coarse() {
   VisibleSettings s;
   s.face = 32;
+  s.min_weight = 1e-3;  // the rooms' walls let a little light through
   return s;
 }
 
@@ -376,6 +377,21 @@ TEST_CASE(
     CHECK(asked.ends == unasked.ends);
     CHECK(asked.bits == unasked.bits);
   }
+}
+
+TEST_CASE(
+    "visible sets: made for a camera they have at least its resolution, and none coarser than asked") {
+  const Camera small = Camera::look_at({0, 1, 0}, {1, 1, 0}, {0, 1, 0}, 64, 48, 90);
+  Camera large = Camera::look_at({0, 1, 0}, {1, 1, 0}, {0, 1, 0}, 640, 480, 90);
+  large.near_plane = 0.1;
+  large.near_sigma = 1;
+  VisibleSettings s;
+  s.serve(small);
+  CHECK(s.face == VisibleSettings{}.face);
+  s.serve(large);
+  CHECK(s.face == 640);
+  CHECK(s.near_plane == 0.1);
+  CHECK(s.near_sigma == 1);
 }
 
 TEST_CASE("visible sets: what cannot be is refused by name") {

@@ -72,7 +72,7 @@ Status write_visible_sets(const Options& o, const GaussianCloud& cloud, const Na
   const auto viewpoints = navmesh_viewpoints(mesh, o.eye_heights, o.visible.spacing());
   if (!viewpoints) return viewpoints.status();
   VisibleSettings settings = o.visible;
-  settings.margin = settings.spacing();
+  settings.margin = settings.cell;
   settings.progress = [print = gsnav_tools::progress_printer()](double share) {
     print("visible sets", share);
   };

@@ -102,7 +102,10 @@ void bind_visible_sets(nb::module_& m) {
   using S = VisibleSettings;
   Struct<S>(m, "VisibleSettings", "Settings of build_visible_sets. Lengths are metres in the world.")
       .field("cell", &S::cell, "Side of a cell.")
-      .field("margin", &S::margin, "A viewpoint counts for a cell at most this far outside of it.")
+      .field(
+          "margin", &S::margin,
+          "A viewpoint counts for a cell at most this far outside of it. With less than the side of a "
+          "cell, single pixels are far off.")
       .field("min_weight", &S::min_weight,
              "Least share of a pixel that a Gaussian must have to count as seen.")
       .field("rows", &S::rows,
@@ -115,7 +118,8 @@ void bind_visible_sets(nb::module_& m) {
       .done()
       .def("spacing", &S::spacing, "Recommended distance between viewpoints (navmesh_viewpoints).")
       .def("serve", &S::serve, nb::arg("camera"),
-           "Sets `face`, `near_plane` and `near_sigma` so that the sets apply to this camera.");
+           "Raises `face` where the camera needs more, and sets `near_plane` and `near_sigma`, so that "
+           "the sets apply to this camera.");
   using V = VisibleSets;
   nb::class_<V>(m, "VisibleSets",
                 "For each cell of space, the Gaussians that can be seen from it. They are sampled from "

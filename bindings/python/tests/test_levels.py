@@ -186,9 +186,11 @@ def test_wrong_settings_are_named(scene, cloud):
     for wrong in (np.zeros(3), np.zeros((2, 2)), None, "x"):
         with pytest.raises(TypeError):
             build("cpu", cloud, wrong)
-    settings = gsnav.VisibleSettings()
-    settings.serve(gsnav.Camera.look_at((0, 1, 0), (1, 1, 0), (0, 1, 0), 128, 128, 90))
-    assert settings.face == 128 and settings.spacing() == 0.25
+    camera = gsnav.Camera.look_at((0, 1, 0), (1, 1, 0), (0, 1, 0), 128, 128, 90)
+    for face, served in ((64, 128), (256, 256)):
+        settings = gsnav.VisibleSettings(face=face)
+        settings.serve(camera)
+        assert settings.face == served and settings.spacing() == 0.25
 
 
 def interrupted(call):

@@ -11,11 +11,14 @@
 
 namespace gsnav {
 
-/// Settings of build_visible_sets. Lengths are metres in the world.
+/// Settings of build_visible_sets. Lengths are metres in the world. With the defaults, images of
+/// Quality::fast keep the bounds of the profile `fast`, as measured (docs/notes/lod.md).
 struct VisibleSettings {
-  double cell = 0.5;         ///< Side of a cell.
-  double margin = 0.25;      ///< A viewpoint counts for a cell if it is at most this far outside of it.
-  double min_weight = 1e-3;  ///< Least share of a pixel that a Gaussian must have to count as seen.
+  double cell = 0.5;  ///< Side of a cell.
+  /// A viewpoint counts for a cell if it is at most this far outside of it. With less than the side of a
+  /// cell, single pixels are far off.
+  double margin = 0.5;
+  double min_weight = 1e-5;  ///< Least share of a pixel that a Gaussian must have to count as seen.
   /// Consecutive rows that are seen or not together: 1, 2, 4, 8, 16 or 32. 0: all rows of a chunk.
   int rows = 8;
   int face = 256;  ///< Pixels along a side of the six images that are rendered for each viewpoint.
@@ -31,9 +34,10 @@ struct VisibleSettings {
   /// Recommended distance between viewpoints (navmesh_viewpoints). Each cell then has several, each with
   /// its own directions.
   double spacing() const noexcept { return 0.5 * cell; }
-  /// Sets `face`, `near_plane` and `near_sigma` so that the sets apply to this camera.
+  /// Raises `face` where the camera needs more, and sets `near_plane` and `near_sigma`, so that the sets
+  /// apply to this camera. Coarser images than the default miss gaps that small images show.
   void serve(const Camera& camera) noexcept {
-    face = static_cast<int>(std::ceil(2 * max(camera.fx, camera.fy) - 1e-6));
+    face = max(face, static_cast<int>(std::ceil(2 * max(camera.fx, camera.fy) - 1e-6)));
     near_plane = camera.near_plane;
     near_sigma = camera.near_sigma;
   }
