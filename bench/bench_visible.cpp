@@ -64,8 +64,7 @@ bool read_row(const char* text, Row& row) {
   if (row.name == "none") return true;
   row.with_sets = true;
   VisibleSettings& s = row.settings;
-  const int fields =
-      std::sscanf(text, "%d,%lf,%lf,%d", &s.rows, &s.min_weight, &s.margin, &s.face);
+  const int fields = std::sscanf(text, "%d,%lf,%lf,%d", &s.rows, &s.min_weight, &s.margin, &s.face);
   return fields >= 2 && validate(s).ok();
 }
 
@@ -176,8 +175,7 @@ void judge(const std::vector<Row>& rows, const Cells& cells, int size) {
         errors[r].largest = std::max(errors[r].largest, d);
         errors[r].over += d > kBound ? 1 : 0;
       }
-      const double psnr =
-          -10 * std::log10(std::max(squares / static_cast<double>(image.size()), 1e-30));
+      const double psnr = -10 * std::log10(std::max(squares / static_cast<double>(image.size()), 1e-30));
       errors[r].worst = std::min(errors[r].worst, psnr);
       errors[r].sum += psnr;
     }

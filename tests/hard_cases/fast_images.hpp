@@ -9,14 +9,14 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "gsnav/render/frames.hpp"
 #include "gsnav/render/config.hpp"
+#include "gsnav/render/frames.hpp"
 
 // Quality::fast on the hard cases: each image that a case draws in double is drawn by `fast` too.
 
 namespace gsnav_test {
 
-/// The settings of a case with those of Quality::fast. What the case asks for beyond them is kept.
+/// The settings of a case with those of Quality::fast. Its other settings are kept.
 inline gsnav::RenderConfig fast_of(gsnav::RenderConfig config) {
   const gsnav::Quality fast = gsnav::Quality::fast();
   config.quality.exponential = fast.exponential;
@@ -29,16 +29,15 @@ inline gsnav::RenderConfig fast_of(gsnav::RenderConfig config) {
 /// rules, nor if the case itself stops earlier.
 inline bool judges_fast(const gsnav::RenderConfig& config) {
   return config.compat == gsnav::Compat::none && config.composite == gsnav::Composite::merged &&
-         !config.quality.normalize_closed &&
-         config.quality.transmittance_min <= 1e-4;
+         !config.quality.normalize_closed && config.quality.transmittance_min <= 1e-4;
 }
 
 /// CHECKs `fast` against the case's images in double: colours and alpha within 1.2e-3, where colours are
-/// divided by the largest one of the images if that is above 1. The exponential may change an alpha by
-/// 1e-4 of it, and what lies behind a closed pixel has less than 1e-3 of its light. Median depths are
-/// within a millimetre in 98.5 % of the pixels: elsewhere the transmittance is 1/2 between two surfaces.
-/// Pixels that rounding decides are left out, where `exact` in float32 is off by 1e-3. The environment
-/// variable GSNAV_FAST_ERRORS names a file that gets the errors, one line for each call.
+/// divided by the largest one of the images if that is above 1. The exponential changes an alpha by up
+/// to 1e-4 of it, and less than 1e-3 of the light passes a closed pixel. Median depths are within a
+/// millimetre in 98.5 % of the pixels: elsewhere the transmittance is 1/2 between two surfaces. Pixels
+/// that rounding decides are left out, where `exact` in float32 is off by 1e-3. The environment variable
+/// GSNAV_FAST_ERRORS names a file that gets the errors, one line for each call.
 inline void check_fast(const gsnav::Frames<float>& fast, const gsnav::Frames<float>& exact,
                        const gsnav::Frames<double>& reference) {
   constexpr double kBound = 1.2e-3, kRounding = 1e-3, kMillimetre = 1e-3;

@@ -120,7 +120,7 @@ TEST_CASE(
   CHECK(with.largest <= 6.0 / 255);
   CHECK(with.worst_db >= 65);
   CHECK(with.mean_db >= 70);
-  // Of this small scene the bound is stricter, so that it notices the settings before 2026-11-30.
+  // A small scene allows a stricter bound, which the settings before 2026-11-30 miss.
   const double strict = without.largest + 0.5 / 255;
   CHECK(with.largest <= strict);
   VisibleSettings before;
