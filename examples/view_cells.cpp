@@ -17,7 +17,7 @@ int main(int argc, char** argv) try {
   const std::size_t rows = asset.cloud->size();
   // Once for each scene: look around from places all over the floor, and keep for each cell of 1.5 m
   // which Gaussians are seen from there. For files, gsnav-navmesh --visible-sets does it. These cells
-  // are coarse, to be quick; the default settings keep every pixel within 6/255.
+  // are coarse, to be quick; the default settings are finer.
   gsnav::VisibleSettings settings{.cell = 1.5, .margin = 0.5, .min_weight = 1e-3};
   const double heights[] = {1.5};  // of the cameras, metres
   auto places = gsnav::navmesh_viewpoints(*flat.navmesh, heights, settings.spacing()).value();

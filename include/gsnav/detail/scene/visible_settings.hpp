@@ -12,7 +12,8 @@
 namespace gsnav {
 
 /// Settings of build_visible_sets. Lengths are metres in the world. With the defaults, images of
-/// Quality::fast keep the bounds of the profile `fast`, as measured (docs/notes/lod.md).
+/// Quality::fast keep the bounds of the profile `fast`, as measured with up to a million Gaussians
+/// (docs/notes/lod.md).
 struct VisibleSettings {
   double cell = 0.5;  ///< Side of a cell.
   /// A viewpoint counts for a cell if it is at most this far outside of it. With less than the side of a
