@@ -240,7 +240,7 @@ def main():
     parser.add_argument("--list", action="store_true")
     parser.add_argument("--check", action="store_true")
     parser.add_argument("--only", nargs="+", metavar="NAME")
-    parser.add_argument("--scratch", type=pathlib.Path)
+    parser.add_argument("--scratch", type=pathlib.Path, help="folder for copies of the sources; made if absent")
     parser.add_argument("--cxx", default=os.environ.get("CXX", "c++"))
     parser.add_argument("--jobs", type=int, default=1)
     args = parser.parse_args()
@@ -256,6 +256,8 @@ def main():
         return 2 if wrong else 0
     if not faults:
         parser.error("no fault of that name")
+    if args.scratch is not None:
+        args.scratch.mkdir(parents=True, exist_ok=True)
     verdicts = []
     with tempfile.TemporaryDirectory(dir=args.scratch) as folder, \
             concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:
