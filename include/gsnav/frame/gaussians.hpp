@@ -82,6 +82,17 @@ GSNAV_HD Vec3d origin_of(const View<const std::uint32_t>& ids, const View<const 
   return origins.empty() ? Vec3d{} : origins[origin_id(ids, i)];
 }
 
+// A new encoding of shapes or bands needs:
+// - what a row is read as (detail/frame/set_rows.hpp), by lanes (detail/lanes/project_chunk.hpp,
+//   color.hpp) and by batches on a GPU (backends/cuda/src: batch_rows.cuh, batch_regions.cu,
+//   batch_state.cuh); most of these are a switch that the compiler checks;
+// - the check of its arrays (detail/render/validate_set.hpp);
+// - its cloud (scene/packed_cloud.hpp) and all that handles clouds (detail/scene/: content_hash.hpp,
+//   describe_cloud.hpp, drop_bands.hpp, edit_cloud.hpp, gaussian_arrays.hpp, lod_build.hpp,
+//   packed_rows.hpp, spatial_order.hpp);
+// - for tests, its own decoding in the oracle (detail/eval/oracle_rows.hpp);
+// - for users: bindings/python/src/cloud.cpp.
+
 /// How shapes are stored.
 enum class ShapeEncoding : std::uint8_t {
   ellipsoids,  ///< quats and scales

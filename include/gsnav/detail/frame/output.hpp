@@ -16,7 +16,10 @@
 //   blend_rules (detail/render/rules.hpp);
 // - if it is not a depth: its rule in HardDepthPixel (detail/frame/composite.hpp);
 // - for tests, its definition in the oracles (detail/eval/oracle_config.hpp, oracle_blend.hpp), and how
-//   rays are joined into pixels (detail/eval/oracle_photo.hpp).
+//   rays are joined into pixels (detail/eval/oracle_photo.hpp); the lists of images in tests/support
+//   (frame_images.hpp, image_hashes.hpp, oracle.hpp) and tests/ops/cuda_batch_images.hpp;
+// - for users: its array in bindings/python/src (frames.{hpp,cpp}, render_settings.cpp, eval.cpp), and
+//   its file in tools/render/{options,main}.cpp.
 
 namespace gsnav {
 
