@@ -22,6 +22,18 @@ from torch import Tensor, nn
 import gsnav
 
 
+# [snippet: rows]
+class Rows:
+    """Memory of a rollout's images, [T + 1][N][H][W][C] per sensor. The simulator draws into row `at`."""
+
+    def __init__(self, images: list[Tensor]) -> None:
+        self.images, self.at = images, 0
+
+    def __call__(self, sensor: int, floats: int) -> Tensor:
+        return self.images[sensor][self.at]
+# [/snippet]
+
+
 class Mirror:
     """Swaps left and right in every other environment, so that each flat has a mirrored twin, if `on`."""
 
@@ -34,9 +46,9 @@ class Mirror:
         where = self.where
         return images if where is None else [torch.where(where, i.flip(-2), i) for i in images]
 
-    def goals(self, goals: np.ndarray, part: slice) -> np.ndarray:
-        """Goals [...][3] of some environments as the agent sees them: their sines are negated in place."""
-        goals[self.of[part], 2] *= -1
+    def goals(self, goals: np.ndarray) -> np.ndarray:
+        """Goals [N][3] as the agent sees them: their sines, the last numbers, are negated in place."""
+        goals[self.of, 2] *= -1
         return goals
 
     def actions(self, actions: np.ndarray) -> np.ndarray:

@@ -14,8 +14,8 @@ import time
 import numpy as np
 
 import gsnav
-from pointnav_worlds import (TRAIN_SEEDS, Simulators, Worlds, check_groups, device_of, environments_arguments,
-                             flats_argument, number, run_program, sensor_arguments, sensors_of, world_arguments)
+from pointnav_worlds import (TRAIN_SEEDS, Draw, Worlds, device_of, flats_argument, number, run_program,
+                             sensor_arguments, sensors_of, world_arguments)
 
 
 def main() -> None:
@@ -23,32 +23,30 @@ def main() -> None:
     world_arguments(p)
     sensor_arguments(p)
     flats_argument(p, "number of flats")
-    environments_arguments(p)
+    p.add_argument("--environments", type=number(int, 1), default=256, help="number of environments")
     p.add_argument("--steps", type=number(int, 1), default=200, help="steps of all environments per run")
     p.add_argument("--runs", type=number(int, 2), default=5, help="number of runs; the first one is not counted")
     p.add_argument("--seed", type=number(int, 0), default=1, help="seed of episodes and actions")
     args = p.parse_args()
-    check_groups(p, args)
     args.device = device_of(args.device).name
 
     print(f"{args.flats} flats ...", flush=True)
     worlds = Worlds(TRAIN_SEEDS[:args.flats], args, episodes=100)
-    simulators = Simulators(worlds, args, sensors_of(args, args.blind))
+    simulator = worlds.simulator(args, args.environments, sensors_of(args, args.blind), Draw(worlds, args.seed, 0))
     # Mostly forward, never stop.
     actions = np.random.default_rng(args.seed).choice(
         [int(gsnav.Action.move_forward)] * 2 + [int(gsnav.Action.turn_left), int(gsnav.Action.turn_right)],
         (args.steps, args.environments))
-    simulators.reset(0)
+    simulator.reset()
     rates = []
     for _ in range(args.runs):
         begin = time.perf_counter()
         for row in actions:
-            simulators.step(row)
+            simulator.step(row)
         rates.append(args.steps * args.environments / (time.perf_counter() - begin))
     rates = rates[1:]
     print(f"{args.device}: {statistics.median(rates):,.0f} environment steps/s, median of {len(rates)} runs "
-          f"({min(rates):,.0f} to {max(rates):,.0f}); {args.environments} environments in {args.groups} parts, "
-          f"{args.people} people per flat, "
+          f"({min(rates):,.0f} to {max(rates):,.0f}); {args.environments} environments, {args.people} people per flat, "
           f"{'no images' if args.blind else f'{args.sensor} {args.size}x{args.size}'}, density {args.density}")
 
 

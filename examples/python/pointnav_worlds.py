@@ -97,53 +97,6 @@ class Draw:
         return self.episodes[at % len(self.episodes)]
 
 
-# [snippet: rows]
-class Rows:
-    """Memory of a rollout's images, [T + 1][N][H][W][C] per sensor. The simulator draws into row `at`."""
-
-    def __init__(self, images: list[Any]) -> None:
-        self.images, self.at = images, 0
-
-    def __call__(self, sensor: int, floats: int) -> Any:
-        return self.images[sensor][self.at]
-# [/snippet]
-
-
-class Simulators:
-    """Equal parts of the environments, each a simulator. While the GPU draws one part, the host steps the next.
-
-    The number of parts, `args.groups`, changes no result. images: memory of a rollout's images, or None.
-    """
-
-    def __init__(self, worlds: Worlds, args: argparse.Namespace, sensors: list[gsnav.SensorSpec],
-                 images: list[Any] | None = None, first: int = 0) -> None:
-        size = args.environments // args.groups
-        self.parts = [slice(k * size, (k + 1) * size) for k in range(args.groups)]
-        self.draws = [Draw(worlds, args.seed, first + part.start) for part in self.parts]
-        self.rows = [Rows([i[:, part] for i in images or []]) for part in self.parts]
-        self.simulators = [worlds.simulator(args, size, sensors, draw, rows if images else None)
-                           for draw, rows in zip(self.draws, self.rows)]
-
-    def reset(self, epoch: int) -> list[tuple[slice, gsnav.BatchStep]]:
-        """Begins episodes that depend on `epoch`, and draws into row 0. Returns a BatchStep for each part."""
-        for draw, rows in zip(self.draws, self.rows):
-            draw.begin(epoch)
-            rows.at = 0
-        return [(part, simulator.reset()) for part, simulator in zip(self.parts, self.simulators)]
-
-    def step(self, actions: np.ndarray, row: int = 0, record: Callable[[slice, gsnav.BatchStep], None] | None = None,
-             k: int = 0) -> None:
-        """Performs the actions [N] and draws into row `row`. Calls record(part, seen) while the GPU draws the part."""
-        def drawing(seen: gsnav.BatchStep) -> None:
-            if record is not None:
-                record(self.parts[k], seen)
-            if k + 1 < len(self.parts):
-                self.step(actions, row, record, k + 1)
-
-        self.rows[k].at = row
-        self.simulators[k].step(actions[self.parts[k]], drawing)
-
-
 def sensors_of(args: argparse.Namespace, blind: bool) -> list[gsnav.SensorSpec]:
     """The sensors of an agent, none if it is blind."""
     return [gsnav.SensorSpec(uuid=name, kind=gsnav.SensorKind[name], resolution=[args.size, args.size])
@@ -201,19 +154,6 @@ def world_arguments(p: argparse.ArgumentParser) -> None:
                    help="what flats are made of; both: every other flat is a mesh")
     p.add_argument("--quality", default="exact", choices=["exact", "fast", "lod"],
                    help="error budget of the images, or levels of detail")
-
-
-def environments_arguments(p: argparse.ArgumentParser, per: str = "") -> None:
-    """Adds the arguments for the environments and their parts."""
-    p.add_argument("--environments", type=number(int, 1), default=256, help=f"environments{per}")
-    p.add_argument("--groups", type=number(int, 1), default=1, help="parts of the environments: while the GPU draws "
-                   "one, the host steps the next. Changes the speed only, and memory: each part holds all scenes")
-
-
-def check_groups(p: argparse.ArgumentParser, args: argparse.Namespace) -> None:
-    """Ends the program if the parts of the environments are not equal."""
-    if args.environments % args.groups:
-        p.error(f"--environments {args.environments} must be a multiple of --groups {args.groups}")
 
 
 def sensor_arguments(p: argparse.ArgumentParser) -> None:

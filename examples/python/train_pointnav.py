@@ -25,12 +25,11 @@ except ImportError:
     sys.exit("train_pointnav.py needs PyTorch: pip install torch")
 import numpy as np
 import torch.distributed as dist
-from pointnav_agent import (Agent, Mirror, Reorder, agreed, begin_with, checkpoint_of, clear, devices_of,
+from pointnav_agent import (Agent, Mirror, Reorder, Rows, agreed, begin_with, checkpoint_of, clear, devices_of,
                             hash_of, made_by, pieces, progress, set_determinism, write_log)
 from pointnav_policy import ACTIONS, CHANNELS, HIDDEN
-from pointnav_worlds import (METRICS, SUCCESS, TRAIN_SEEDS, Simulators, Worlds, check_groups, environments_arguments,
-                             flats_argument, goals, mixed, number, run_program, sensor_arguments, sensors_of,
-                             world_arguments)
+from pointnav_worlds import (METRICS, SUCCESS, TRAIN_SEEDS, Draw, Worlds, flats_argument, goals, mixed,
+                             number, run_program, sensor_arguments, sensors_of, world_arguments)
 from torch import Tensor, nn
 from torch.nn.utils.rnn import PackedSequence
 
@@ -52,6 +51,7 @@ class Learner:
         self.rank, self.ranks = (dist.get_rank(), dist.get_world_size()) if dist.is_initialized() else (0, 1)
         self.optimizer = torch.optim.Adam(agent.parameters(), args.lr, eps=1e-5, fused=self.device.type == "cuda")
         self.update_count, self.digest = 0, b""
+        self.draw = Draw(worlds, args.seed, self.rank * n)
         sensors = sensors_of(args, args.blind)
 
         def made(*shape: int, dtype: torch.dtype = torch.float32, host: bool = False) -> Tensor:
@@ -59,8 +59,8 @@ class Learner:
             return torch.zeros(*shape, dtype=dtype, device="cpu" if host else self.device, pin_memory=pinned)
 
         self.images = [made(t + 1, n, *spec.resolution, CHANNELS[spec.uuid]) for spec in sensors]
-        self.mirror = Mirror(args.mirror, self.rank * n, n, self.device)
-        self.simulators = Simulators(worlds, args, sensors, self.images, self.rank * n)
+        self.rows, self.mirror = Rows(self.images), Mirror(args.mirror, self.rank * n, n, self.device)
+        self.simulator = worlds.simulator(args, n, sensors, self.draw, self.rows)
         self.goal, self.start = made(t + 1, n, 3), made(t + 1, n)
         self.action, self.log_p, self.values = made(t, n, dtype=torch.int64), made(t, n), made(t + 1, n)
         self.last, self.hidden, self.noise = made(t + 1, n, dtype=torch.int64), made(n, HIDDEN), made(t + 1, n, ACTIONS)
@@ -100,17 +100,17 @@ class Learner:
 
     def begin(self) -> None:
         """Starts new episodes in all environments. From here on, everything follows from the checkpoint."""
-        self.ended = np.ones(self.args.environments, np.bool_)
-        for part, seen in self.simulators.reset(self.update_count):
-            self.observe(0, part, seen)
-        self.ended[:] = False
+        self.draw.begin(self.update_count)
+        self.rows.at = 0
+        self.seen, self.ended = self.simulator.reset(), np.zeros(self.args.environments, np.bool_)
         self.hidden.zero_()
         self.last.zero_()
+        self.observe(0, np.ones_like(self.ended))
 
-    def observe(self, t: int, part: slice, seen: gsnav.BatchStep) -> None:
-        """Stores what a part of the environments sees before action t. The images are in their row already."""
-        self.host_goal.numpy()[t, part] = self.mirror.goals(goals(seen), part)
-        self.host_start.numpy()[t, part] = self.ended[part]
+    def observe(self, t: int, start: np.ndarray) -> None:
+        """Stores the observations before action t. The simulator has drawn the images in their row."""
+        self.host_goal.numpy()[t] = self.mirror.goals(goals(self.seen))
+        self.host_start.numpy()[t] = self.starts = start
 
     def act(self, t: int) -> None:
         """Chooses action t. After the last one, only the value is of use."""
@@ -134,14 +134,15 @@ class Learner:
         self.act(t)
         self.hidden.copy_(hidden)
 
-    def record(self, part: slice, seen: gsnav.BatchStep) -> None:
-        """Stores the result of a step of a part. The simulator calls it while it draws into row `at`."""
-        t, (reward, done, valid) = self.at, self.host_result.numpy()
+    def record(self, seen: gsnav.BatchStep) -> None:
+        """Stores the result of a step. The simulator calls it while it draws into row `rows.at`."""
+        t, (reward, done, valid), start = self.rows.at, self.host_result.numpy(), self.ended
         # After the end of an episode comes a step without effect, which begins the next episode.
-        reward[t - 1, part], valid[t - 1, part] = seen.rewards, ~self.ended[part]
-        self.observe(t, part, seen)
-        self.ended[part] = done[t - 1, part] = seen.terminated | seen.truncated
-        self.finished.append(seen.final_metrics)
+        reward[t - 1], valid[t - 1] = seen.rewards, ~start
+        self.seen, self.ended = seen, seen.terminated | seen.truncated
+        done[t - 1] = self.ended
+        self.observe(t, start)
+        self.finished += [seen.final_metrics] if len(seen.finished) else []
 
     def straggles(self, t: int) -> bool:
         """Whether enough other ranks have finished their rollouts, so that this one ends early."""
@@ -164,15 +165,16 @@ class Learner:
             if self.device.type == "cuda":
                 torch.cuda.current_stream().synchronize()
             self.note("act")
-            self.at = t = t + 1
-            self.simulators.step(self.mirror.actions(self.host_action.numpy()), t, self.record)
+            t += 1
+            self.rows.at = t
+            self.simulator.step(self.mirror.actions(self.host_action.numpy()), self.record)
             self.note("simulate")
         self.run("bootstrap", self.bootstrap, t)
         self.host_result.numpy()[::2, t:] = self.host_start.numpy()[t + 1:] = 0  # no reward, not valid
         if self.ranks > 1 and a.cut_off < 1:
             self.store.add(f"done {self.update_count}", 1)
         self.used = t
-        self.metrics = np.concatenate(self.finished)
+        self.metrics = np.concatenate(self.finished) if self.finished else self.seen.final_metrics
         self.digest = hashlib.sha256(self.digest + self.metrics.tobytes()).digest()
         return self.metrics
 
@@ -255,7 +257,7 @@ class Learner:
         self.last[0].copy_(self.last[self.used])
         for images in self.images:
             images[0].copy_(images[self.used])
-        self.host_goal[0], self.host_start[0] = self.host_goal[self.used], self.host_start[self.used]
+        self.observe(0, self.starts)
         self.update_count += 1
         self.losses /= self.args.epochs * self.args.chunks
         self.note("learn")
@@ -354,7 +356,7 @@ def arguments() -> argparse.Namespace:
     p.add_argument("--seed", type=number(int, 0, 2**32 - 1), default=1, help="seed of weights, episodes and actions")
     flats_argument(p, "flats to train in")
     p.add_argument("--episodes-per-flat", type=number(int, 1), default=1000, help="number of episodes to draw from")
-    environments_arguments(p, " per rank")
+    p.add_argument("--environments", type=number(int, 1), default=256, help="environments per rank")
     p.add_argument("--rollout", type=number(int, 1), default=128, help="steps per update")
     p.add_argument("--chunks", type=number(int, 1), default=4, help="minibatches: parts of a rollout in turn")
     p.add_argument("--epochs", type=number(int, 1), default=3, help="passes over a rollout")
@@ -371,7 +373,6 @@ def arguments() -> argparse.Namespace:
     world_arguments(p)
     sensor_arguments(p)
     a = p.parse_args()
-    check_groups(p, a)
     if a.rollout % a.chunks:
         p.error(f"--rollout {a.rollout} must be a multiple of --chunks {a.chunks}")
     if a.begin_with is not None and not a.begin_with.exists():

@@ -53,13 +53,6 @@ def test_two_runs_give_the_same_hash(first, tmp_path):
     assert rows(tmp_path) == rows(first[0]) and len(rows(first[0])) == 11
 
 
-def test_parts_of_the_environments_change_no_bit(first, tmp_path):
-    assert trained(tmp_path / "two", "--groups", "2") == first[1]
-    assert rows(tmp_path / "two") == rows(first[0])
-    run = subprocess.run(command(tmp_path / "three", "--groups", "3"), env=ONE_THREAD, capture_output=True, text=True)
-    assert run.returncode == 2 and "--environments 4 must be a multiple of --groups 3" in run.stderr
-
-
 def test_a_killed_run_goes_on_with_the_same_bits(first, tmp_path):
     run = subprocess.Popen(command(tmp_path), env=ONE_THREAD, stdout=subprocess.DEVNULL)
     while not (tmp_path / "checkpoint.pt").exists() and run.poll() is None:
