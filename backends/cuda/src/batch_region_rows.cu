@@ -34,7 +34,8 @@ __global__ void __launch_bounds__(Policy::kRowThreads)
     const float scale = max(max(from.scales.x, from.scales.y), from.scales.z);
     const float excess = opacity_excess(log2_of_opacity(from.opacity), a.log2_alpha_min);
     const float radius2 = footprint_radius2(excess) * 1.0001f;
-    const std::uint32_t word = exists ? row_word(r, scale, radius2) : kHidden;
+    // A mean that is not finite would make the bounds of its group useless.
+    const std::uint32_t word = exists && is_finite(from.mean) ? row_word(r, scale, radius2) : kHidden;
     const std::size_t at = std::size_t{group} * 32 + lane;
     r.positions[at] = {from.mean.x, from.mean.y, from.mean.z, __uint_as_float(word)};
     r.shapes[2 * at] = {from.quat.w, from.quat.x, from.quat.y, from.quat.z};
