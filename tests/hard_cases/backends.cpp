@@ -100,6 +100,22 @@ Frames<S> CaseRenderer<S, B>::render_with(const GaussianCloud& cloud, const SetE
 #if defined(GSNAV_HAS_CUDA)
 namespace {
 
+/// Whether some image of this run was drawn by lists of regions.
+bool by_regions_somewhere = false;
+
+/// Ends a run of "cuda regions" alone with an error if no image was drawn by regions: it then shows
+/// nothing about them.
+void expect_regions() {
+  const char* const wanted = std::getenv("GSNAV_CASES_ON");
+  if (wanted == nullptr || std::string_view(wanted) != "cuda regions") return;
+  static const int once = std::atexit([] {
+    if (by_regions_somewhere) return;
+    std::fputs("no image was drawn by lists of regions\n", stderr);
+    std::_Exit(3);
+  });
+  (void)once;
+}
+
 /// Renders by CudaBatchRenderer: by tiles, or by lists of regions where the frame allows them. What no
 /// batch supports is rendered by BasicRenderer.
 class BatchCases final : public CaseImages<float> {
@@ -130,11 +146,23 @@ class BatchCases final : public CaseImages<float> {
       renderer.set_meshes(meshes.instances);
       return renderer.render(sets, cameras).value();
     }
-    CudaBatchRenderer renderer(cuda_, config);
-    renderer.set_least_of_regions(by_regions_ ? 1 : cameras.size() + 1, 0);
-    Frames<float> frames = draw_batch(cuda_, renderer, sets, cameras, {}, config.outputs, false,
-                                      std::vector<MeshFrame>(cameras.size(), meshes))
-                               .frames;
+    const auto drawn = [&](unsigned outputs, bool by_regions) {
+      CudaBatchRenderer renderer(cuda_, config);
+      renderer.set_least_of_regions(by_regions ? 1 : cameras.size() + 1, 0);
+      Batch batch = draw_batch(cuda_, renderer, sets, cameras, {}, outputs, false,
+                               std::vector<MeshFrame>(cameras.size(), meshes));
+      if (batch.stats.by_regions) by_regions_somewhere = true;
+      return std::move(batch.frames);
+    };
+    // Regions draw no depths but the median, so that the others are drawn by tiles.
+    const unsigned by_tiles = by_regions_ ? config.outputs & kAnyDepth & ~kMedianDepth : 0u;
+    Frames<float> frames = drawn(config.outputs & ~by_tiles, by_regions_);
+    if (by_tiles != 0) {
+      Frames<float> rest = drawn(by_tiles, false);
+      frames.expected_depth = std::move(rest.expected_depth);
+      frames.accumulated_depth = std::move(rest.accumulated_depth);
+      frames.first_hit_depth = std::move(rest.first_hit_depth);
+    }
     frames.cameras = cameras.size();
     frames.width = static_cast<std::size_t>(cameras[0].width);
     frames.height = static_cast<std::size_t>(cameras[0].height);
@@ -178,6 +206,7 @@ void visit_renderers(const std::function<void(CaseImages<float>&)>& in_float,
     (void)once;
     return;
   }
+  expect_regions();
   run_if_wanted(BatchCases("cuda tiles float", false), in_float);
   run_if_wanted(BatchCases("cuda regions float", true), in_float);
 #endif

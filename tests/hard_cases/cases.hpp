@@ -46,7 +46,7 @@ inline gsnav::GaussianCloud cloud_of(const std::vector<gsnav::RawGaussian>& gaus
 }
 
 /// Camera at the origin that looks along +z; an odd size has a pixel centre on the axis.
-inline gsnav::Camera axis_camera(int size = 65, double f = 64) {
+inline gsnav::Camera axis_camera(int size = 63, double f = 64) {
   gsnav::Camera c;
   c.width = c.height = size;
   c.fx = c.fy = f;

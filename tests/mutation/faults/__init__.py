@@ -12,7 +12,9 @@ from dataclasses import dataclass
 
 # Renderers of hard cases that share the formulas, and the backends that they use.
 BACKENDS = ("serial", "openmp", "cuda float")
-BY_TILES = ("serial", "openmp", "cuda float", "cuda tiles")  # regions list rows before their ellipse is known
+# Regions list rows before their ellipse is known. They draw no meshes, no other response and of the depths only
+# the median.
+BY_TILES = ("serial", "openmp", "cuda float", "cuda tiles")
 EVERY = ("serial", "openmp", "cuda float", "cuda tiles", "cuda regions")
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Blending a pixel's stack, and its depths."""
-from . import BACKENDS, EVERY, fault
+from . import BACKENDS, BY_TILES, EVERY, fault
 
 STACK_TEST = "tests/hard_cases/test_stack.cpp"
 DEPTH_TEST = "tests/hard_cases/test_depth.cpp"
@@ -52,7 +52,7 @@ FAULTS = [
     fault("depth_reference_of_the_last", "z_ref",
           "select((step.before >= L(S(1))) && (step.weight > L(S(0))), z, z_ref)",
           "select(step.weight > L(S(0)), z, z_ref)",
-          DEPTH_TEST, "N45_depth_definitions", "N47_depth_far", on=EVERY),
+          DEPTH_TEST, "N45_depth_definitions", "N47_depth_far", on=BY_TILES),
     fault("depth_of_the_centre", "make_splat_depth", "  if (camera.compat != Compat::none) return d;\n",
           "  return d;\n",
           DEPTH_TEST, "N46_depth_tilted_disk", "N47_depth_far", why="wrong by decimetres on tilted disks"),
@@ -64,7 +64,7 @@ FAULTS = [
     fault("depth_of_edge_on_divided", "ray_depth", DELTA, "  const L defined = delta;\n",
           "tests/hard_cases/test_determinant.cpp", "N06_det_flat_edge_on", why="0 / 0"),
     fault("median_of_the_last", "median", CROSSES, "select(step.after <= L(kMedianLevel<S>), z, median)",
-          DEPTH_TEST, "N45_depth_definitions", on=EVERY),
+          DEPTH_TEST, "N45_depth_definitions", on=BY_TILES),
     fault("median_before_the_crossing", "median", CROSSES, "select(step.before > L(kMedianLevel<S>), z, median)",
           DEPTH_TEST, "N48_depth_no_return", why="a pixel that stays half open has no median"),
     fault("median_alone_from_the_centre", "blend_drawn",
@@ -93,11 +93,11 @@ FAULTS = [
           "next_ = 1; restart_ = held_ =",
           STACK_TEST, "N41_single_opaque", on=("cuda regions",)),
     fault("behind_by_the_centre", "behind", "return d.z - d.reach > depth;", "return d.z > depth;",
-          MESH_TEST, "N50_mesh_straddle_cloud", on=EVERY, why="a splat that reaches through a mesh is before it"),
+          MESH_TEST, "N50_mesh_straddle_cloud", on=BY_TILES, why="a splat that reaches through a mesh is before it"),
     fault("lists_filled_up_with_a_splat", "blend_list", "list[i] = kNothing;", "list[i] = list[0];",
           CUT_TEST, "N63_determinism_100 of work that is cut"),
     fault("first_hit_of_the_last", "first_hit", FIRST, "select(step.after <= L(S(1) - first_hit_tau), z, first_hit)",
-          DEPTH_TEST, "N45_depth_definitions", on=EVERY),
+          DEPTH_TEST, "N45_depth_definitions", on=BY_TILES),
     fault("first_hit_before_the_crossing", "first_hit", FIRST,
           "select(step.before > L(S(1) - first_hit_tau), z, first_hit)",
           DEPTH_TEST, "N45_depth_definitions", "N48_depth_no_return"),
@@ -106,7 +106,7 @@ FAULTS = [
           "fma(alpha, state.z_ref, state.accumulated)",
           DEPTH_TEST, "N45_depth_definitions", "N48_depth_no_return", why="drawn towards the camera by what is clear"),
     fault("accumulated_from_the_camera", "accumulated", "accumulated = fma(step.weight, z - z_ref, accumulated);",
-          "accumulated = fma(step.weight, z, accumulated);", DEPTH_TEST, "N45_depth_definitions", on=EVERY),
+          "accumulated = fma(step.weight, z, accumulated);", DEPTH_TEST, "N45_depth_definitions", on=BY_TILES),
     fault("accumulated_without_reference", "pixel_accumulated_depth",
           "fma(pixel_alpha(state), state.z_ref, state.accumulated);",
           "state.accumulated;", DEPTH_TEST, "N45_depth_definitions"),
