@@ -74,8 +74,8 @@ def main() -> None:
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("--weights", type=pathlib.Path, default=WEIGHTS, help="checkpoint.pt, or a file of --save-weights")
     p.add_argument("--save-weights", type=pathlib.Path, metavar="FILE.npz", help="write the agent to a file and end")
-    p.add_argument("--episodes", type=number(int, 1), default=500, help="episodes in flats that no agent has seen")
-    p.add_argument("--batch", type=number(int, 1), default=256, help="episodes played at a time")
+    p.add_argument("--episodes", type=number(int, 1, 10**6), default=500, help="episodes in flats new to all agents")
+    p.add_argument("--batch", type=number(int, 1, 2**16), default=256, help="episodes played at a time")
     p.add_argument("--seed", type=number(int, 0), default=1, help="seed of the actions")
     p.add_argument("--policies", nargs="+", default=["agent", "greedy", "random", "follower"],
                    choices=["agent", "greedy", "random", "follower"], help="rows of the table")

@@ -206,8 +206,16 @@ def take_weights(agent: Agent, weights: dict[str, Tensor], path: pathlib.Path) -
         sys.exit(f"{path}: weights of another network: {' '.join(str(e).split())[:300]}")
 
 
-def begin_with(path: pathlib.Path, args: argparse.Namespace, agent: Agent) -> None:
+def say_ignored(path: pathlib.Path, args: argparse.Namespace, rank: int) -> None:
+    """Says that a run goes on from its own checkpoint, and not from another."""
+    if args.begin_with is not None and rank == 0:
+        print(f"{path}: goes on from here. --begin-with {args.begin_with} is of no use.", file=sys.stderr)
+
+
+def begin_with(path: pathlib.Path | None, args: argparse.Namespace, agent: Agent) -> None:
     """Gives a new agent the weights of a checkpoint, or of a file .npz, which has none of the value."""
+    if path is None:
+        return
     if path.suffix != ".npz":
         checkpoint_of(path, args, "--begin-with", agent)
         return

@@ -71,7 +71,7 @@ def main() -> None:
     args = p.parse_args()
     try:
         logs = {log.resolve(): read_run(log) for log in args.logs}
-    except (OSError, ValueError) as e:
+    except (OSError, ValueError, csv.Error) as e:
         sys.exit(f"pointnav_curves.py: {e}")
     folders = [log.parent for log in logs]
     names = [log.parent.name if folders.count(log.parent) == 1 else log.stem for log in logs]

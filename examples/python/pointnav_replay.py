@@ -179,7 +179,7 @@ def main() -> None:
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("--out", type=pathlib.Path, default="replay.webp", help="file to write, an animated WebP")
     p.add_argument("--weights", type=pathlib.Path, default=WEIGHTS, help="checkpoint.pt, or a file of --save-weights")
-    p.add_argument("--episodes", type=number(int, 0), nargs="+", default=[0], help="held-out episodes, from 0")
+    p.add_argument("--episodes", type=number(int, 0, 10**6), nargs="+", default=[0], help="held-out episodes, from 0")
     p.add_argument("--steps", type=number(int, 1), default=500, help="steps after which an episode is left")
     p.add_argument("--every", type=number(int, 1), default=1, help="steps from one picture to the next")
     p.add_argument("--milliseconds", type=number(int, 1), default=100, help="how long a picture is shown")

@@ -26,7 +26,7 @@ except ImportError:
 import numpy as np
 import torch.distributed as dist
 from pointnav_agent import (Agent, Mirror, Reorder, Rows, agreed, begin_with, checkpoint_of, clear, devices_of,
-                            hash_of, made_by, pieces, progress, set_determinism, write_log)
+                            hash_of, made_by, pieces, progress, say_ignored, set_determinism, write_log)
 from pointnav_policy import ACTIONS, CHANNELS, HIDDEN
 from pointnav_worlds import (METRICS, SUCCESS, TRAIN_SEEDS, Draw, Worlds, flats_argument, goals, mixed,
                              number, run_program, sensor_arguments, sensors_of, world_arguments)
@@ -283,9 +283,9 @@ def resume(learner: Learner, out: pathlib.Path) -> list[dict[str, float]]:
     """Goes on from the checkpoint, if there is one. Returns the log so far."""
     path = out / "checkpoint.pt"
     if not path.exists():
-        if learner.args.begin_with is not None:
-            begin_with(learner.args.begin_with, learner.args, learner.agent)
+        begin_with(learner.args.begin_with, learner.args, learner.agent)
         return []
+    say_ignored(path, learner.args, learner.rank)
     kept = checkpoint_of(path, learner.args, "folder for --out", learner.agent, KEPT)
     now, then = made_by(learner.device), kept.get("made_by")
     if then not in (None, now) and learner.rank == 0:
@@ -355,15 +355,15 @@ def arguments() -> argparse.Namespace:
     p.add_argument("--minutes", type=number(float, 0), default=math.inf, help="end at the first checkpoint after that")
     p.add_argument("--seed", type=number(int, 0, 2**32 - 1), default=1, help="seed of weights, episodes and actions")
     flats_argument(p, "flats to train in")
-    p.add_argument("--episodes-per-flat", type=number(int, 1), default=1000, help="number of episodes to draw from")
-    p.add_argument("--environments", type=number(int, 1), default=256, help="environments per rank")
-    p.add_argument("--rollout", type=number(int, 1), default=128, help="steps per update")
-    p.add_argument("--chunks", type=number(int, 1), default=4, help="minibatches: parts of a rollout in turn")
-    p.add_argument("--epochs", type=number(int, 1), default=3, help="passes over a rollout")
+    p.add_argument("--episodes-per-flat", type=number(int, 1, 10**6), default=1000, help="episodes to draw from")
+    p.add_argument("--environments", type=number(int, 1, 2**16), default=256, help="environments per rank")
+    p.add_argument("--rollout", type=number(int, 1, 10**5), default=128, help="steps per update")
+    p.add_argument("--chunks", type=number(int, 1, 10**5), default=4, help="minibatches: parts of a rollout in turn")
+    p.add_argument("--epochs", type=number(int, 1, 1000), default=3, help="passes over a rollout")
     p.add_argument("--lr", type=number(float, 0, 1), default=1e-3, help="learning rate of Adam at the beginning")
     p.add_argument("--critic-updates", type=number(int, 0), default=0, help="first updates, which learn values alone")
     p.add_argument("--horizon", type=number(float, 1, 1e15), default=1e8, help="steps until the rate is --lr / 10")
-    p.add_argument("--every", type=number(int, 1), default=50, help="updates from one checkpoint to the next")
+    p.add_argument("--every", type=number(int, 1, 10**9), default=50, help="updates from one checkpoint to the next")
     p.add_argument("--cut-off", type=number(float, 0, 1), default=1.0, help="fraction of ranks whose end ends the "
                    "rollouts of the others. DD-PPO has 0.6; below 1, runs on several ranks are not reproducible")
     p.add_argument("--mirror", action="store_true", help="swap left and right in every other environment")
