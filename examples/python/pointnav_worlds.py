@@ -121,7 +121,7 @@ def number(kind: type, least: float, most: float = math.inf) -> Callable[[str], 
         value = kind(text)
         if not least <= value <= most:
             raise argparse.ArgumentTypeError(f"{text} is not {least:g} or more" if most == math.inf else
-                                             f"{text} is not between {least:g} and {most:g}")
+                                             f"{text} is not between {least:,} and {most:,}")
         return value
     parse.__name__ = kind.__name__
     return parse

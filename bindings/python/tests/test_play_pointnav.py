@@ -25,7 +25,7 @@ def test_the_trained_agent_reaches_goals_in_flats_it_has_never_seen():
 
 def test_errors_say_what_to_do(tmp_path):
     assert "Train first" in play("--weights", tmp_path / "checkpoint.pt").stderr
-    assert "1 or more" in play("--episodes", "0").stderr
+    assert "between 1 and 1,000,000" in play("--episodes", "0").stderr
     assert "there are" in play("--device", "tpu").stderr
 
 
@@ -72,4 +72,4 @@ def test_a_replay_shows_the_path_step_by_step(tmp_path):
 def test_errors_of_the_replay_say_what_to_do():
     pytest.importorskip("matplotlib")
     assert "must end in .webp" in play("--out", "replay.mp4", script="pointnav_replay.py").stderr
-    assert "0 or more" in play("--episodes", "-1", script="pointnav_replay.py").stderr
+    assert "between 0 and 1,000,000" in play("--episodes", "-1", script="pointnav_replay.py").stderr
