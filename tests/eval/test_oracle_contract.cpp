@@ -52,7 +52,8 @@ TEST_CASE("oracle: one Gaussian on the axis, by its closed form") {
   const double reach = std::sqrt(2 * std::log(255 * o)) * sz;
   std::uint64_t drawn = 0;
   for (std::size_t p = 0; p < f.alpha.size(); ++p) {
-    const double dx = static_cast<double>(p % 65) - 32, dy = static_cast<double>(p / 65) - 32;
+    const double dx = static_cast<double>(p % kAxisSize) - kAxisMiddle,
+                 dy = static_cast<double>(p / kAxisSize) - kAxisMiddle;
     double alpha = o * std::exp(-0.5 * (dx * dx / a + dy * dy / c));
     if (alpha < 1.0 / 255) alpha = 0;
     CHECK(std::abs(f.alpha[p] - alpha) < 1e-13);
@@ -85,7 +86,7 @@ TEST_CASE("oracle: two layers, their depths and what is marked undecided") {
   config.rules.first_hit_tau = 0.8;
   config.rules.background = {1, 1, 1};
   const OracleFrames f = oracle({cloud.set()}, axis_camera(), config);
-  const std::size_t center = 32 * 65 + 32;
+  const std::size_t center = kAxisMiddle * (kAxisSize + 1);
   const double o1 = static_cast<double>(cloud.opacities[1]),
                o2 = static_cast<double>(cloud.opacities[0]);
   const double w1 = o1, w2 = (1 - o1) * o2, t = (1 - o1) * (1 - o2);
@@ -130,10 +131,10 @@ TEST_CASE("oracle: a pixel is closed by the Gaussian that takes T below the stop
   OracleConfig config;
   config.rules.quality.transmittance_min = 0.95e-4;  // the second layer's T is 1e-4
   const GaussianCloud cloud = cloud_of(layers);
-  const std::size_t center = 32 * 65 + 32;
+  const std::size_t center = kAxisMiddle * (kAxisSize + 1);
   const OracleFrames f = oracle({cloud.set()}, axis_camera(), config);
   CHECK(f.alpha[center] == doctest::Approx(1 - 1e-6).epsilon(1e-14));
-  config.crop = {32, 32, 33, 33};
+  config.crop = {kAxisMiddle, kAxisMiddle, kAxisMiddle + 1, kAxisMiddle + 1};
   CHECK(oracle({cloud.set()}, axis_camera(), config).counts.evaluations == 3);
   config.kind = OracleKind::untruncated;
   const OracleFrames u = oracle({cloud.set()}, axis_camera(), config);
@@ -148,7 +149,7 @@ TEST_CASE("oracle: keys that tie in float32 and not in float64") {
                                         gaussian({0, 0, 1}, wide, 0.7, {-1, 1, 0})});
   Camera camera = axis_camera();
   camera.viewmat.translation = {0, 0, 1000.3};
-  const std::size_t center = 32 * 65 + 32;
+  const std::size_t center = kAxisMiddle * (kAxisSize + 1);
   for (const SortOrder sort : {SortOrder::z_depth, SortOrder::camera_distance}) {
     OracleConfig config;
     config.rules.sort_order = sort;
@@ -309,7 +310,8 @@ TEST_CASE("oracle: what cannot be is named") {
   config = {};
   config.rules.quality.max_alpha = 2;
   CHECK(message(config).find("max_alpha") != std::string::npos);
-  for (const PixelRect crop : {PixelRect{3, 3, 3, 5}, PixelRect{0, 0, 66, 10}, PixelRect{-1, 0, 5, 5}}) {
+  for (const PixelRect crop :
+       {PixelRect{3, 3, 3, 5}, PixelRect{0, 0, kAxisSize + 1, 10}, PixelRect{-1, 0, 5, 5}}) {
     config = {};
     config.crop = crop;
     CHECK(message(config).find("crop") != std::string::npos);
@@ -321,5 +323,5 @@ TEST_CASE("oracle: what cannot be is named") {
   set.eps2d = 0;
   CHECK(eval::oracle_render(backend, set, axis_camera()).message().find("eps2d") != std::string::npos);
   const auto nothing = eval::oracle_render(backend, std::span<const GaussianSet>(), axis_camera());
-  CHECK(nothing.value().alpha == std::vector<double>(65 * 65, 0.0));
+  CHECK(nothing.value().alpha == std::vector<double>(kAxisSize * kAxisSize, 0.0));
 }

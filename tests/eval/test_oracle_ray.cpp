@@ -112,18 +112,19 @@ TEST_CASE("ray oracle: two disks that cut through each other are ordered at each
   OracleConfig by_center{.kind = OracleKind::ray, .order = OracleOrder::float32_key};
   const OracleFrames centers = oracle({cloud.set()}, camera, by_center);
   const TruthRay truth[2] = {TruthRay(truth_of(cloud, 0), camera), TruthRay(truth_of(cloud, 1), camera)};
-  for (const int x : {30, 34}) {
+  const double middle = kAxisMiddle + 0.5;
+  for (const int x : {kAxisMiddle - 2, kAxisMiddle + 2}) {
     CAPTURE(x);
-    const std::size_t p = 32 * 65 + static_cast<std::size_t>(x);
+    const std::size_t p = kAxisMiddle * kAxisSize + static_cast<std::size_t>(x);
     const auto composite = [&](std::size_t front) {
-      const double a = static_cast<double>(truth[front].alpha(x + 0.5L, 32.5L));
-      const double b = static_cast<double>(truth[1 - front].alpha(x + 0.5L, 32.5L));
+      const double a = static_cast<double>(truth[front].alpha(x + 0.5L, middle));
+      const double b = static_cast<double>(truth[1 - front].alpha(x + 0.5L, middle));
       return a * (0.5 + kSh0 * static_cast<double>(cloud.sh0[3 * front])) +
              (1 - a) * b * (0.5 + kSh0 * static_cast<double>(cloud.sh0[3 * (1 - front)]));
     };
-    const bool first_in_front = searched_depth(truth_of(cloud, 0), camera, x + 0.5L, 32.5L) <
-                                searched_depth(truth_of(cloud, 1), camera, x + 0.5L, 32.5L);
-    CHECK(first_in_front == (x == 34));
+    const bool first_in_front = searched_depth(truth_of(cloud, 0), camera, x + 0.5L, middle) <
+                                searched_depth(truth_of(cloud, 1), camera, x + 0.5L, middle);
+    CHECK(first_in_front == (x > kAxisMiddle));
     CHECK(std::abs(own.rgb[3 * p] - composite(first_in_front ? 0 : 1)) < 1e-9);
     CHECK(std::abs(centers.rgb[3 * p] - composite(0)) < 1e-9);  // one depth: file order
     CHECK(int{own.order_flip[p]} == (first_in_front ? 0 : 1));
@@ -137,7 +138,7 @@ TEST_CASE("ray oracle: one depth is ordered by stable id") {
       cloud_of({gaussian(mean, round, 0.5, {1, 0, -1}), gaussian(mean, round, 0.5),
                 gaussian(mean, round, 0.5, {-1, 0, 1})});
   const OracleFrames f = oracle({cloud.set()}, axis_camera(), {.kind = OracleKind::ray});
-  const std::size_t center = 32 * 65 + 32;
+  const std::size_t center = kAxisMiddle * (kAxisSize + 1);
   CHECK(f.rgb[3 * center] == doctest::Approx(0.5 * 0.875 + kSh0 * (0.5 - 0.125)).epsilon(1e-12));
   CHECK(f.rgb[3 * center + 2] == doctest::Approx(0.5 * 0.875 - kSh0 * (0.5 - 0.125)).epsilon(1e-12));
 }

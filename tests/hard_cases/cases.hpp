@@ -45,8 +45,12 @@ inline gsnav::GaussianCloud cloud_of(const std::vector<gsnav::RawGaussian>& gaus
   return builder.cloud();
 }
 
+/// Size of `axis_camera` in pixels, odd, and not above what lists of regions draw; the pixel on the
+/// axis.
+inline constexpr int kAxisSize = 63, kAxisMiddle = kAxisSize / 2;
+
 /// Camera at the origin that looks along +z; an odd size has a pixel centre on the axis.
-inline gsnav::Camera axis_camera(int size = 63, double f = 64) {
+inline gsnav::Camera axis_camera(int size = kAxisSize, double f = 64) {
   gsnav::Camera c;
   c.width = c.height = size;
   c.fx = c.fy = f;
