@@ -224,8 +224,8 @@ __device__ inline std::uint32_t used(unsigned long long count, std::uint32_t cap
 }
 
 __device__ inline SplatGeometry<float> geometry_of(const SplatRecord& r) {
-  return {static_cast<float>(r.ref & 0xffffu) + 0.5f,
-          static_cast<float>(r.ref >> 16) + 0.5f,
+  return {pixel_center<float>(r.ref & 0xffffu),
+          pixel_center<float>(r.ref >> 16),
           r.a,
           r.k,
           r.b,

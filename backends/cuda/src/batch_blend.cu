@@ -138,13 +138,13 @@ __global__ void __launch_bounds__(kThreads, Mesh ? Policy::kResidentWithMesh : P
 
   BlendState<float, kBlendedDepth<D>> state[kPixels];
   std::uint32_t median[kPixels];
-  const float px = static_cast<float>(x) + 0.5f;
+  const float px = pixel_center<float>(x);
   float py[kPixels], mesh[kPixels]{}, far = 0;
   bool inside[kPixels];
   for (int k = 0; k < kPixels; ++k) {
     median[k] = kNoSlot;
     inside[k] = x < a.grid.width && y + k * kRowsApart < a.grid.height;
-    py[k] = static_cast<float>(y + k * kRowsApart) + 0.5f;
+    py[k] = pixel_center<float>(y + k * kRowsApart);
     if (!inside[k]) state[k].transmittance = 0;
   }
   const auto pixel_of = [&](int k) {
@@ -236,7 +236,7 @@ __global__ void __launch_bounds__(kDepthThreads, policy::MedianDepth::kResident)
                     height = static_cast<std::size_t>(a.grid.height);
   float* const to =
       images + (blockIdx.z * height + static_cast<std::size_t>(y)) * width + static_cast<std::size_t>(x);
-  const float px = static_cast<float>(x) + 0.5f, py = static_cast<float>(y) + 0.5f;
+  const float px = pixel_center<float>(x), py = pixel_center<float>(y);
   const std::uint32_t slot = inside ? __float_as_uint(*to) : kNoSlot;
   if (a.depths != nullptr) {
     if (inside) *to = slot == kNoSlot ? 0.0f : ray_depth(a.depths[slot], px, py);

@@ -137,7 +137,7 @@ __global__ void __launch_bounds__(2 * kThreads, Policy::kResident)
 
   BlendState<float, kBlendedDepth<D>> state[1];
   std::uint32_t median[1] = {kNoSlot};
-  const float px = static_cast<float>(x) + 0.5f, py[1] = {static_cast<float>(y) + 0.5f};
+  const float px = pixel_center<float>(x), py[1] = {pixel_center<float>(y)};
   if (!inside) state[0].transmittance = 0;
   if (threadIdx.x < 2) s.chunks[threadIdx.x].splats[kChunk] = staged_nothing();
   const std::size_t width = static_cast<std::size_t>(a.grid.width),

@@ -105,9 +105,9 @@ class TileWarp {
       state_[k] = {};
       if (!inside_[k]) state_[k].transmittance = kNotMine;
       median_[k] = kNoSlot;
-      py_[k] = static_cast<float>(y + k) + 0.5f;
+      py_[k] = pixel_center<float>(y + k);
     }
-    px_ = static_cast<float>(x) + 0.5f;
+    px_ = pixel_center<float>(x);
     open_ = __ballot_sync(kAll, is_open());
     reader_.begin(camera_, tile_x_, tile_y_);
     waiting_ = staged_ = 0;

@@ -8,6 +8,7 @@
 #include "gsnav/detail/frame/blend_splat.hpp"
 #include "gsnav/detail/frame/splat.hpp"
 #include "gsnav/detail/image/mesh_layer.hpp"
+#include "gsnav/detail/image/pixel_center.hpp"
 #include "gsnav/math/functions.hpp"
 
 namespace gsnav {
@@ -166,8 +167,8 @@ struct PixelWalk {
   GSNAV_HD PixelWalk(const RasterArgs<S>& args, std::size_t pixel) noexcept {
     const std::size_t width = static_cast<std::size_t>(args.grid.width);
     const int x = static_cast<int>(pixel % width), y = static_cast<int>(pixel / width);
-    px = S(x) + S(0.5);
-    py = S(y) + S(0.5);
+    px = pixel_center<S>(x);
+    py = pixel_center<S>(y);
     splats = args.splats_of(args.grid.tile_of(x, y));
   }
 

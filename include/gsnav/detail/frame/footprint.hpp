@@ -2,6 +2,7 @@
 #pragma once
 
 #include "gsnav/detail/frame/splat.hpp"
+#include "gsnav/detail/image/pixel_center.hpp"
 #include "gsnav/math/functions.hpp"
 
 namespace gsnav {
@@ -155,7 +156,7 @@ class FootprintRows {
     fall_ = e.beta2 * e.inv_aa;
     slope_ = e.slope;
     left_ = g.ref_x + e.mean_x - 0.5f - x;
-    down_ = y + 0.5f - g.ref_y - e.mean_y;
+    down_ = pixel_center<float>(y) - g.ref_y - e.mean_y;
     pad_ = fma(abs(e.mean_x) + abs(e.slope) * (abs(e.mean_y) + far), 4e-6f, 2e-3f);
   }
 

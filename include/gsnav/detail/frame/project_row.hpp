@@ -8,6 +8,7 @@
 #include "gsnav/detail/frame/projection_camera.hpp"
 #include "gsnav/detail/frame/set_rows.hpp"
 #include "gsnav/detail/frame/splat.hpp"
+#include "gsnav/detail/image/pixel_center.hpp"
 #include "gsnav/math/functions.hpp"
 
 // Formulas that turn a row of a set into the records of its splat, for one row or a pack of rows. The
@@ -109,7 +110,7 @@ GSNAV_HD L reference_pixel(L x, int size) noexcept {
   // The same pixel with fewer instructions: on a GPU, conversions to integers saturate.
   if constexpr (std::is_same_v<L, double>) {
     const int pixel = static_cast<int>(x);
-    return (pixel < 0 ? 0 : pixel < size ? pixel : size - 1) + 0.5;
+    return pixel_center<double>(pixel < 0 ? 0 : pixel < size ? pixel : size - 1);
   } else
 #endif
   {

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "gsnav/detail/frame/footprint.hpp"
+#include "gsnav/detail/image/pixel_center.hpp"
 #include "gsnav/detail/lanes/isa.hpp"
 
 namespace gsnav::lanes {
@@ -32,7 +33,7 @@ inline void list_blocks(const SplatGeometry<float>* batch, int n, float log2_alp
   // For each row of blocks: range of the first columns of the blocks that a splat reaches.
   alignas(64) float first[kMaxTile / kBlockHeight][kBatch], last[kMaxTile / kBlockHeight][kBatch];
   const float size = static_cast<float>(tile_size - 1);
-  const F x0(static_cast<float>(tile_x) + 0.5f), y0(static_cast<float>(tile_y) + 0.5f);
+  const F x0(pixel_center<float>(tile_x)), y0(pixel_center<float>(tile_y));
   float numbers[kWidth];
   for (int l = 0; l < kWidth; ++l) numbers[l] = static_cast<float>(l);
   const F number = F::load(numbers);

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "gsnav/detail/frame/composite.hpp"
+#include "gsnav/detail/image/pixel_center.hpp"
 #include "gsnav/detail/lanes/block_lists.hpp"
 #include "gsnav/detail/lanes/tile_pixels.hpp"
 #include "gsnav/detail/lanes/write_tile.hpp"
@@ -117,7 +118,7 @@ class TileBlender {
                 pixels_.open, lists_);
     if constexpr (General) return;
     float x[kWidth];
-    for (int l = 0; l < kWidth; ++l) x[l] = static_cast<float>(l) + 0.5f;
+    for (int l = 0; l < kWidth; ++l) x[l] = pixel_center<float>(l);
     for (int from = 0; from < pixels_.size; from += kWidth) {
       const F px = F::load(x) + F(static_cast<float>(pixels_.left + from));
       Columns* const columns = &columns_[from / kColumns * kStride];

@@ -10,6 +10,7 @@
 
 #include "gsnav/detail/frame/composite.hpp"
 #include "gsnav/detail/frame/squares.hpp"
+#include "gsnav/detail/image/pixel_center.hpp"
 #include "gsnav/detail/lanes/block_lists.hpp"
 #include "gsnav/detail/lanes/write_tile.hpp"
 
@@ -47,8 +48,8 @@ class TilePixels {
         tile_(tile) {
     float x[kWidth], y[kWidth];
     for (int l = 0; l < kWidth; ++l) {
-      x[l] = static_cast<float>(l % kBlockWidth) + 0.5f;
-      y[l] = static_cast<float>(l / kBlockWidth) + 0.5f;
+      x[l] = pixel_center<float>(l % kBlockWidth);
+      y[l] = pixel_center<float>(l / kBlockWidth);
     }
     lane_x_ = F::load(x);
     lane_y_ = F::load(y);

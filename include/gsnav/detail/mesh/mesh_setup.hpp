@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "gsnav/core/view.hpp"
+#include "gsnav/detail/image/pixel_center.hpp"
 #include "gsnav/detail/mesh/mesh.hpp"
 #include "gsnav/detail/mesh/mesh_clip.hpp"
 
@@ -139,8 +140,8 @@ GSNAV_HD void interpolate_triangle(const MeshCamera& camera, const Vec3d& v0, co
   const double inverse = 1.0 / nv;
   // edge-on: use its nearest depth and its first corner's colour
   if (!(nn > 0) || !is_finite(inverse)) return;
-  const double px = out.x0 + 0.5 - camera.half_width - camera.cx,
-               py = out.y0 + 0.5 - camera.half_height - camera.cy;
+  const double px = pixel_center<double>(out.x0) - camera.half_width - camera.cx,
+               py = pixel_center<double>(out.y0) - camera.half_height - camera.cy;
   const auto plane = [&](const Vec3d& c) GSNAV_INLINED {
     const double x = c.x / camera.fx, y = c.y / camera.fy;
     return PixelPlane<double>{fma(x, px, fma(y, py, c.z)), x, y};

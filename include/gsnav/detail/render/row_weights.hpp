@@ -13,6 +13,7 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/detail/frame/blend.hpp"
+#include "gsnav/detail/image/pixel_center.hpp"
 #include "gsnav/render/render.hpp"
 
 namespace gsnav {
@@ -43,7 +44,7 @@ struct WeighTile {
           const float before = pixel.transmittance;
           if (!pixel.open(args.rules)) continue;
           blend_splat<false, DepthMode::none, Exp2::degree3, false>(
-              pixel, args.rules, splat, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+              pixel, args.rules, splat, pixel_center<float>(x), pixel_center<float>(y));
           weight = std::max(weight, before - pixel.transmittance);
           open -= pixel.open(args.rules) ? 0 : 1;
         }
