@@ -216,7 +216,7 @@ void dispatch_blending(const BlendArgs& b, const L& launch) {
   if (!b.raster.mesh.empty()) {
     dispatch_composite(b.raster, [&]<bool C, DepthMode D, bool General>() {
       // check_batch rejects more general cases.
-      if constexpr (!General) launch.template operator()<C, D, Exp2::degree5, Form::standard, true>();
+      if constexpr (!General) launch.template operator()<C, D, kMeshExp2, Form::standard, true>();
     });
     return;
   }

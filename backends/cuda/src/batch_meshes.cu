@@ -129,7 +129,6 @@ Status CudaBatchRenderer::State::place_meshes(std::span<const BatchCamera> camer
     separate_gaussians();
   } else {
     raster.mesh = meshes.layer;
-    raster.exp2_method = Exp2::degree5;  // The same as in other frames with meshes.
   }
   if (triangle_capacity == 0) {  // An estimate, as for slots.
     triangle_capacity = static_cast<std::uint32_t>(
@@ -145,8 +144,7 @@ void CudaBatchRenderer::State::separate_gaussians() {
   meshes.hard_depth_bytes = std::exchange(rgb8, nullptr);
   const bool missing_color = meshes.hard_depth_bytes != nullptr && alone.rgb == nullptr;
   meshes.gaussians.resize_discard((missing_color ? 5 : 2) * pixels);
-  if (alone.alpha == nullptr) alone.alpha = meshes.gaussians.data();
-  if (alone.expected_depth == nullptr) alone.expected_depth = meshes.gaussians.data() + pixels;
+  alone = images_before_mesh(alone, meshes.gaussians.data(), pixels);
   if (missing_color) alone.rgb = meshes.gaussians.data() + 2 * pixels;
   meshes.hard_depth.images.rgb = alone.rgb;
   meshes.hard_depth.alpha = alone.alpha;

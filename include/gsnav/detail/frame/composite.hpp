@@ -13,6 +13,9 @@
 
 namespace gsnav {
 
+/// The exponential of frames with meshes and of the Gaussians before fragments: never the cubic one.
+inline constexpr Exp2 kMeshExp2 = Exp2::degree5;
+
 /// Returns alpha where a splat lies in front of the mesh at depth `mesh`, and 0 where it lies behind.
 /// The exact depth is computed only if the splat's reach spans the mesh: its depth along any ray is
 /// within the reach, rounding included.
@@ -20,7 +23,7 @@ template <class L, class S>
 GSNAV_HD L alpha_before_mesh(L alpha, const SplatDepth<S>& depth, L mesh, L px, L py) noexcept {
   const auto unsure = may_reach_behind(L(farthest_depth(depth)), mesh);
   if (!any(unsure)) return alpha;
-  return select(unsure && (ray_depth(depth, px, py) > mesh), L(S(0)), alpha);
+  return select(unsure && behind(ray_depth(depth, px, py), mesh), L(S(0)), alpha);
 }
 
 /// Blends a mesh surface at depth z metres, also where the pixel is closed for Gaussians. Alpha 0 means
@@ -77,8 +80,7 @@ struct CompositePixel {
     const S mesh = args.mesh.depth[pixel];
     BlendState<S, D> state;
     walk.for_each_splat(args, state, [&](const SplatRecords<S>& splat) GSNAV_INLINED {
-      composite_splat<Color, D, Exp2::degree5, General>(state, args.rules, splat, mesh, walk.px,
-                                                        walk.py);
+      composite_splat<Color, D, kMeshExp2, General>(state, args.rules, splat, mesh, walk.px, walk.py);
     });
     close_by_mesh<Color>(state, args.rules, args.mesh, pixel);
     write_pixel(args, pixel, state);
@@ -120,11 +122,11 @@ struct FragmentPixel {
                              S py) const noexcept {
     const SplatDepth<S>& depth = *splat.depth;
     if (behind(depth, far) || !may_reach_behind(farthest_depth(depth), near)) return;
-    blend_splat<Color, D, Exp2::degree5, General>(state, args.rules, splat, px, py,
-                                                  [&](S alpha) GSNAV_INLINED {
-                                                    const S z = ray_depth(depth, px, py);
-                                                    return z > far || z <= near ? S(0) : alpha;
-                                                  });
+    blend_splat<Color, D, kMeshExp2, General>(state, args.rules, splat, px, py,
+                                              [&](S alpha) GSNAV_INLINED {
+                                                const S z = ray_depth(depth, px, py);
+                                                return behind(z, far) || !behind(z, near) ? S(0) : alpha;
+                                              });
   }
 };
 
@@ -135,6 +137,16 @@ void dispatch_composite(const RasterArgs<S>& args, const F& f) {
   dispatch_images(args, [&]<bool C, DepthMode D>() {
     args.general() ? f.template operator()<C, D, true>() : f.template operator()<C, D, false>();
   });
+}
+
+/// The images of the Gaussians alone that Composite::hard_depth reads: those of the caller, and where it
+/// asks for no alpha or no expected depth, planes of `scratch`.
+/// @param scratch [2 * pixels]
+template <class S>
+FrameImages<S> images_before_mesh(FrameImages<S> images, S* scratch, std::size_t pixels) noexcept {
+  if (images.alpha == nullptr) images.alpha = scratch;
+  if (images.expected_depth == nullptr) images.expected_depth = scratch + pixels;
+  return images;
 }
 
 /// Kernel of Composite::hard_depth. Converts the images of the Gaussians alone, rendered over black, to

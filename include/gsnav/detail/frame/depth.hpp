@@ -46,6 +46,12 @@ GSNAV_HD bool behind(const SplatDepth<S>& d, S depth) noexcept {
   return d.z - d.reach > depth;
 }
 
+/// True where a depth along the pixel's ray lies behind `surface`, metres.
+template <class L>
+GSNAV_HD mask_of<L> behind(const L& depth, const L& surface) noexcept {
+  return depth > surface;
+}
+
 /// True if a splat with this farthest_depth may lie behind `depth` at some pixel. If false, it is in
 /// front at all pixels.
 template <class L>

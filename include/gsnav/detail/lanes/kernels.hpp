@@ -20,7 +20,7 @@ inline void rasterize_tile_any(const RasterArgs<float>& args, std::size_t tile) 
 /// Blends one tile of a frame with a mesh.
 inline void composite_tile_any(const RasterArgs<float>& args, std::size_t tile) noexcept {
   dispatch_composite(args, [&]<bool C, DepthMode D, bool G>() {
-    TileBlender<C, D, Exp2::degree5, G, true>(args, tile).blend();
+    TileBlender<C, D, kMeshExp2, G, true>(args, tile).blend();
   });
 }
 

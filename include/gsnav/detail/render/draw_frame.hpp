@@ -65,9 +65,7 @@ Status draw_frame(B& backend, RenderWorkspace<S, B>& ws, std::span<const Gaussia
     const std::size_t pixels =
         static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
     ws.composite.resize_discard(2 * pixels);
-    FrameImages<S> alone = images;
-    if (alone.alpha == nullptr) alone.alpha = ws.composite.data();
-    if (alone.expected_depth == nullptr) alone.expected_depth = ws.composite.data() + pixels;
+    const FrameImages<S> alone = images_before_mesh(images, ws.composite.data(), pixels);
     RenderConfig black = config;
     black.background = {};
     if (Status s = detail::render_frame<S>(backend, ws, sets, camera, black, {}, alone, counted); !s)
