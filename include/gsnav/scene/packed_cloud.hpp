@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "gsnav/detail/core/huge_pages.hpp"
+#include "gsnav/detail/frame/row_bounds.hpp"
 #include "gsnav/detail/frame/set_rows.hpp"
 #include "gsnav/detail/math/smallest_three.hpp"
 #include "gsnav/detail/scene/load_report.hpp"
@@ -165,15 +166,10 @@ inline std::vector<ChunkBounds> packed_bounds(const PackedCloud& packed, std::si
   const ShapeRows& v = all.shape;
   std::vector<ChunkBounds> out((v.size + rows - 1) / rows);
   for (std::size_t c = 0; c < out.size(); ++c) {
-    Aabb<double> box;
-    for (std::size_t i = c * rows; i < std::min(v.size, (c + 1) * rows); ++i) {
-      box.add(all.origin_of(i) + vec_cast<double>(mean_of(v, i)));
-      const Vec3f s = scales_of(v, i);
-      out[c].scale_max = std::max({out[c].scale_max, s.x, s.y, s.z});
-      out[c].opacity_max = std::max(out[c].opacity_max, opacity_of(v, i));
-    }
-    out[c].low = box.low;
-    out[c].high = box.high;
+    RowBounds run;
+    for (std::size_t i = c * rows; i < std::min(v.size, (c + 1) * rows); ++i)
+      run.add(all.origin_of(i) + vec_cast<double>(mean_of(v, i)), scales_of(v, i), opacity_of(v, i));
+    out[c] = run.bounds();
   }
   return out;
 }

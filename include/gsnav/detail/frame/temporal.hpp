@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "gsnav/core/view.hpp"
+#include "gsnav/detail/frame/row_bounds.hpp"
 #include "gsnav/detail/frame/set_rows.hpp"
 #include "gsnav/frame/gaussians.hpp"
 #include "gsnav/frame/rules.hpp"
@@ -98,26 +99,17 @@ struct BoundChunkAt {
   GSNAV_HD void operator()(std::size_t c) const noexcept {
     const std::size_t begin = c * kProjectChunk;
     const std::size_t end = begin + kProjectChunk < rows.size ? begin + kProjectChunk : rows.size;
-    ChunkBounds b;
-    bool first = true;
+    RowBounds all;
     for (std::size_t i = begin; i < end; ++i) {
       const float opacity = opacity_of(rows, i);
       if (!(opacity > 0)) continue;
       const Vec3d origin = origin_of(rows.origin_ids, origins, i),
                   mean = vec_cast<double>(mean_of(rows, i));
-      const Vec3<float> scales = scales_of(rows, i);
-      for (int k = 0; k < 3; ++k) {
-        const double x = origin[k] + mean[k];
-        // culling assumes offsets within the lattice; these may be larger
-        const double pad = 1e-6 * abs(mean[k]);
-        b.low[k] = first ? x - pad : min(b.low[k], x - pad);
-        b.high[k] = first ? x + pad : max(b.high[k], x + pad);
-        b.scale_max = max(b.scale_max, scales[k]);
-      }
-      b.opacity_max = max(b.opacity_max, opacity);
-      first = false;
+      // Culling assumes offsets within the lattice; these may be larger.
+      const Vec3d pad{1e-6 * abs(mean.x), 1e-6 * abs(mean.y), 1e-6 * abs(mean.z)};
+      all.add(origin + mean, pad, scales_of(rows, i), opacity);
     }
-    bounds[c] = b;
+    bounds[c] = all.bounds();
   }
 };
 

@@ -148,15 +148,8 @@ class LodBuilder {
     for (std::size_t row = first + n; row < first + kProjectChunk; ++row)
       pad(row, n == 0 ? row : first + n - 1);
     node.error = std::max(node.error, static_cast<float>(moved.size()));
-    ChunkBounds& own = m.chunk_bounds[chunk];
-    Aabb<double> box;
-    for (std::size_t row = first; row < first + kProjectChunk; ++row) {
-      box.add(m.mean(row));
-      for (const auto& scale : m.scales) own.scale_max = std::max(own.scale_max, scale[row]);
-      own.opacity_max = std::max(own.opacity_max, m.opacities[row]);
-    }
-    own.low = box.low;
-    own.high = box.high;
+    const ChunkBounds own = bounds_of_rows(m, first, first + kProjectChunk);
+    m.chunk_bounds[chunk] = own;
     node.reach = both(node.reach, own);
   }
   static double sh_of(const GaussianCloud& c, std::size_t at) noexcept {

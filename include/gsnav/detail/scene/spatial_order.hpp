@@ -14,6 +14,7 @@
 #include "gsnav/detail/core/parallel.hpp"
 #include "gsnav/detail/core/permute.hpp"
 #include "gsnav/detail/core/pool_backend.hpp"
+#include "gsnav/detail/frame/row_bounds.hpp"
 #include "gsnav/frame/gaussians.hpp"
 #include "gsnav/math/aabb.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
@@ -127,20 +128,22 @@ std::vector<std::uint32_t> rows_by_code(B& backend, std::size_t n, const Code& c
 
 }  // namespace detail
 
+/// Bounds of the rows [begin, end).
+inline ChunkBounds bounds_of_rows(const GaussianCloud& cloud, std::size_t begin, std::size_t end) {
+  RowBounds all;
+  const auto& s = cloud.scales;
+  for (std::size_t i = begin; i < end; ++i)
+    all.add(cloud.mean(i), {s[0][i], s[1][i], s[2][i]}, cloud.opacities[i]);
+  return all.bounds();
+}
+
 /// Bounds of each run of `rows` rows.
 template <Backend B>
 std::vector<ChunkBounds> chunk_bounds_of(B& backend, const GaussianCloud& cloud,
                                          std::size_t rows = kProjectChunk) {
   std::vector<ChunkBounds> out((cloud.size() + rows - 1) / rows);
   backend.parallel_for(out.size(), [&](std::size_t c) {
-    Aabb<double> box;
-    for (std::size_t i = c * rows; i < std::min(cloud.size(), (c + 1) * rows); ++i) {
-      box.add(cloud.mean(i));
-      for (const auto& scale : cloud.scales) out[c].scale_max = std::max(out[c].scale_max, scale[i]);
-      out[c].opacity_max = std::max(out[c].opacity_max, cloud.opacities[i]);
-    }
-    out[c].low = box.low;
-    out[c].high = box.high;
+    out[c] = bounds_of_rows(cloud, c * rows, std::min(cloud.size(), (c + 1) * rows));
   });
   backend.synchronize().throw_if_error();
   return out;
