@@ -14,6 +14,13 @@ inline constexpr double kAlphaMin = 1.0 / 255;
 /// log2 of kAlphaMin.
 inline constexpr double kLog2AlphaMin = -7.99435343685885793770;
 
+/// Largest alpha of a Gaussian in the image contract.
+inline constexpr double kMaxAlpha = 0.99;
+/// The image contract closes a pixel once its transmittance is lower.
+inline constexpr double kTransmittanceMin = 1e-4;
+/// Alpha at which first-hit depth is taken unless another is asked for.
+inline constexpr double kFirstHitTau = 0.5;
+
 /// Images that a render can produce. Combine them with |. Images that are not requested are not
 /// computed.
 enum Output : unsigned {

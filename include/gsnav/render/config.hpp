@@ -27,9 +27,9 @@ struct Quality {
   /// Skip a Gaussian at a pixel where its alpha is lower. Range (0, 1); values below 2^-126 act as
   /// 2^-126.
   double alpha_min = kAlphaMin;
-  double max_alpha = 0.99;  ///< upper limit of a Gaussian's alpha, in (0, 1]
+  double max_alpha = kMaxAlpha;  ///< upper limit of a Gaussian's alpha, in (0, 1]
   /// Stop blending a pixel once its transmittance is lower. Range [0, 1).
-  double transmittance_min = 1e-4;
+  double transmittance_min = kTransmittanceMin;
   /// Treat a closed pixel as opaque: divide its colour and its accumulated depth by its alpha, then set
   /// its alpha to 1. The background does not show through it. A mesh behind the pixel takes the
   /// remaining transmittance before that, so nothing is divided there. Ignored with a Compat.
@@ -101,8 +101,8 @@ struct RenderConfig {
   unsigned outputs = kRgb | kAlpha | kMedianDepth;
   SortOrder sort_order = SortOrder::z_depth;  ///< key by which Gaussians are sorted
   Response response = Response::ewa;          ///< how a Gaussian spreads over the image
-  double first_hit_tau = 0.5;  ///< First-hit depth is taken where accumulated alpha reaches this. Range
-                               ///< (0, 1).
+  double first_hit_tau = kFirstHitTau;  ///< First-hit depth is taken where accumulated alpha reaches
+                                        ///< this. Range (0, 1).
   /// Color space in which Gaussians and meshes are blended; images and `background` use it too. Sets
   /// stored in the other space are converted per Gaussian, after SH evaluation. Convert linear images
   /// with srgb_encoded before you view them.

@@ -20,10 +20,10 @@ inline constexpr double kHabitatReturnAlpha = 0.01;
 /// Constants of blending, in the scalar of the kernel.
 template <class S>
 struct BlendRules {
-  S max_alpha{S(0.99)};
-  S transmittance_min{S(1e-4)};  ///< A pixel is closed by the Gaussian that makes its transmittance less
-                                 ///< than this.
-  S first_hit_tau{S(0.5)};
+  S max_alpha{S(kMaxAlpha)};
+  S transmittance_min{S(kTransmittanceMin)};  ///< A pixel is closed by the Gaussian that makes its
+                                              ///< transmittance less than this.
+  S first_hit_tau{S(kFirstHitTau)};
   S log2_alpha_min{S(kLog2AlphaMin)};  ///< log2 of the smallest alpha that is blended
   S return_alpha{S(0)};                ///< Expected depth is 0 (no return) unless alpha exceeds this.
   bool exclusive_stop = false;         ///< The Gaussian that closes a pixel is not blended (Compat).

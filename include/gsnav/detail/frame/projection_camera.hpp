@@ -83,7 +83,7 @@ struct ProjectionCamera {
   S fx{}, fy{}, cx{}, cy{};
   S u_min{}, u_max{}, v_min{}, v_max{};  ///< limits of x/z and y/z in the Jacobian
   int width = 0, height = 0;
-  float near_plane = 0.2f;
+  float near_plane = 0;
   S near_sigma{0};
   S eps2d{S(0.3)};
   S base_eps2d{0};        ///< GaussianSet::base_eps2d

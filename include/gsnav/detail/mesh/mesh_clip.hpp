@@ -42,7 +42,7 @@ struct MeshCamera {
   double fx = 1, fy = 1;
   double cx = 0, cy = 0;  ///< principal point, relative to the image's centre
   double half_width = 0, half_height = 0;
-  double near_plane = 0.2;
+  double near_plane = 0;
   int width = 0, height = 0;
 
   static MeshCamera of(const Camera& c) noexcept {
