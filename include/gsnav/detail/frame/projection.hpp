@@ -62,8 +62,7 @@ GSNAV_HD SplatAxes<L> splat_axes(const Mat3<scalar_of<L>>& rotation, const Vec3<
   SplatAxes<L> out;
   out.position = r * delta;
   out.factor = r * factor;
-  const Vec3<L> m0 = out.factor.column(0), m1 = out.factor.column(1), m2 = out.factor.column(2);
-  out.cofactors = transpose(Mat3<L>{{cross(m1, m2), cross(m2, m0), cross(m0, m1)}});
+  out.cofactors = transpose(cofactors(transpose(out.factor)));
   return out;
 }
 

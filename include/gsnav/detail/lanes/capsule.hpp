@@ -51,15 +51,6 @@ inline void gap_range(const CapsuleGapArgs<float>& args, std::size_t begin, std:
   for (std::size_t i = packs; i < end; ++i) one(i);
 }
 
-GSNAV_HD std::uint8_t sweep_outcome(std::uint32_t hit, std::uint32_t pushed, std::uint32_t closing,
-                                    int lane) noexcept {
-  const auto bit = [lane](std::uint32_t bits, unsigned flag) noexcept {
-    return (bits >> lane & 1u) != 0 ? flag : 0u;
-  };
-  return static_cast<std::uint8_t>(bit(hit, kSweepHit) | bit(pushed, kSweepPushed) |
-                                   bit(closing, kSweepAgentClosing));
-}
-
 /// Writes the first `lanes` lanes of `r`, lane l as pair row(l). `write(plane, values)` writes one
 /// plane.
 template <class Row, class Write>
@@ -71,7 +62,8 @@ GSNAV_HD void write_sweeps(const SweepArgs<float>& args, const SweepResult<F>& r
   for (std::uint32_t eventful = (hit | pushed | closing) & ((1u << lanes) - 1u); eventful != 0;
        eventful &= eventful - 1) {
     const int l = __builtin_ctz(eventful);
-    args.outcome[row(l)] = sweep_outcome(hit, pushed, closing, l);
+    args.outcome[row(l)] =
+        sweep_outcome((hit >> l & 1u) != 0, (pushed >> l & 1u) != 0, (closing >> l & 1u) != 0);
   }
   write(args.time, r.time);
   write(args.start_gap, r.start_gap);

@@ -77,6 +77,12 @@ struct GapOfPair {
   }
 };
 
+/// SweepArgs::outcome of a pair.
+GSNAV_HD constexpr std::uint8_t sweep_outcome(bool hit, bool pushed, bool agent_closing) noexcept {
+  return static_cast<std::uint8_t>((hit ? kSweepHit : 0) | (pushed ? kSweepPushed : 0) |
+                                   (agent_closing ? kSweepAgentClosing : 0));
+}
+
 /// Kernel that sweeps pair i.
 template <class S>
 struct SweepPair {
@@ -84,8 +90,7 @@ struct SweepPair {
 
   GSNAV_HD void operator()(std::size_t i) const noexcept {
     const SweepResult<S> r = sweep(args.agents[i], args.bodies[i], args.rules);
-    args.outcome[i] = static_cast<std::uint8_t>((r.hit ? kSweepHit : 0) | (r.pushed ? kSweepPushed : 0) |
-                                                (r.agent_closing ? kSweepAgentClosing : 0));
+    args.outcome[i] = sweep_outcome(r.hit, r.pushed, r.agent_closing);
     args.time[i] = r.time;
     args.start_gap[i] = r.start_gap;
     if (!args.asks_for_contact()) return;
