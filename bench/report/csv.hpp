@@ -18,7 +18,7 @@ namespace gsnav_report {
 /// Columns of the report in the order of the file; rows of all kinds share them. Lengths are metres,
 /// shares 0 to 1, memory bytes. A field that does not apply is empty. `key` identifies the measurement
 /// (commit, scene, settings) for --resume.
-inline constexpr std::array<std::string_view, 55> kColumns{"kind",
+inline constexpr std::array<std::string_view, 56> kColumns{"kind",
                                                            "machine",
                                                            "commit",
                                                            "date",
@@ -52,6 +52,7 @@ inline constexpr std::array<std::string_view, 55> kColumns{"kind",
                                                            "excluded",
                                                            "time_p50_ms",
                                                            "time_p99_ms",
+                                                           "time_over_exact",
                                                            "gaussians",
                                                            "visible",
                                                            "pairs",

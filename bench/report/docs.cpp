@@ -6,6 +6,7 @@
 
 #include "../../tools/common/html_text.hpp"
 #include "gsnav/core/replace_file.hpp"
+#include "plot_pareto.hpp"
 #include "table_budget.hpp"
 #include "table_targets.hpp"
 
@@ -64,7 +65,8 @@ std::string error_lines(const std::vector<std::string>& names, const RowRefs& ro
     cells.push_back(mean_worst(g.rows, "rgb_max", 255, false));
     cells.push_back(mean_worst(g.rows, "flip_mean", 1, false));
     cells.push_back(mean_worst(g.rows, "depth_p99", 1e3, false));
-    for (const char* column : {"time_p50_ms", "pairs", "evaluations"}) {
+    cells.push_back(format(time_ratio(g.rows, all)));
+    for (const char* column : {"pairs", "evaluations"}) {
       cells.push_back(format(ratio_to_exact(g.rows, all, column)));
     }
     out += line(cells);
@@ -130,6 +132,26 @@ std::string knob_part(const Table& table) {
     }
   }
   return out;
+}
+
+/// The settings that no other beats in both time and PSNR, per size and backend, with those that are
+/// beaten.
+std::string front_part(const Table& table) {
+  std::string out;
+  for (const Group& size : group_by(table.of_kind("render"), resolution)) {
+    const RowRefs rows = against_front_oracle(size.rows);
+    std::vector<ParetoPoint> points = pareto_points(rows, "rgb_psnr", true);
+    if (points.size() < 2) continue;
+    std::stable_sort(points.begin(), points.end(),
+                     [](const ParetoPoint& a, const ParetoPoint& b) { return a.error > b.error; });
+    out += "\n### " + size.name + "\n\n" +
+           header({"setting", "backend", "PSNR, dB", "time of exact", "views", "on the front"});
+    for (const ParetoPoint& p : points) {
+      out += line({plain(p.label), plain(p.backend), format(p.error, 3) + " / " + format(p.worst, 3),
+                   format(p.ratio), std::to_string(p.views), p.dominated ? "" : "yes"});
+    }
+  }
+  return out.empty() ? absent("two settings of a size") : out;
 }
 
 std::string ledger_part(const Table& table) {
@@ -204,6 +226,10 @@ std::string approximations_page(const Table& table, const std::string& command) 
   out += target_part(table);
   out += "\n## What each profile approximates\n\n" + ledger_part(table);
   out += "\n## One knob at a time\n\n" + knob_part(table);
+  out +=
+      "\n## Fronts\n\nSorted by PSNR. A setting is on the front if no other of its backend is at "
+      "least as fast and as accurate, and better in one of the two.\n" +
+      front_part(table);
   out += "\n## Skinning\n\n" + named_part(table, "skinning", "skinning");
   out += "\n## Capsule distances and sweeps\n\n" + named_part(table, "sweep", "sweep");
   out += "\n## Kernels\n\n" + named_part(table, "kernel", "kernel");

@@ -34,12 +34,15 @@ std::vector<Knob> knobs() {
       {"alpha_min",
        {"0.015625", "0.0078125", "0.00392156862745098", "0.001953125"},
        {Oracle::contract, Oracle::untruncated}},
-      {"transmittance_min", {"1e-2", "1e-3", "1e-4", "1e-5"}, {Oracle::contract, Oracle::untruncated}},
+      {"transmittance_min",
+       {"1e-2", "5e-3", "2e-3", "1e-3", "5e-4", "1e-4", "1e-5"},
+       {Oracle::contract, Oracle::untruncated}},
       {"max_sh_degree", {"0", "1", "2", "3"}, {Oracle::contract}},
-      {"key_bits", {"16", "20", "24", "32"}, {Oracle::contract}},
+      {"key_bits", {"16", "18", "20", "22", "24", "32"}, {Oracle::contract}},
       {"storage", {}, {Oracle::contract}},
       {"response", {"ewa", "tangent_plane", "ray"}, {Oracle::contract, Oracle::ray_key, Oracle::ray}},
-      {"compat", {"inria", "gsplat", "habitat_gs"}, {Oracle::contract}}};
+      {"compat", {"inria", "gsplat", "habitat_gs"}, {Oracle::contract}},
+      {"exponential", {"exact", "fast"}, {Oracle::contract}}};
   for (const StorageCodec& c : storage_codecs()) all[4].values.emplace_back(c.name);
   all[4].values.emplace_back(kPackedStorage);
   return all;
@@ -87,7 +90,7 @@ void add_knobs(const PlanOptions& o, std::size_t view, std::vector<Setting>& out
     if (!contains(o.knobs, knob.name)) continue;
     for (const std::string& value : knob.values) {
       if (knob.name == "max_sh_degree" && std::atoi(value.c_str()) > o.sh_degree) continue;
-      if (value == "shN_8" && o.sh_degree == 0) continue;
+      if (value.starts_with("shN_") && o.sh_degree == 0) continue;
       if (!o.knob_values.empty() && !contains(o.knob_values, value)) continue;
       Setting s{view, o.knob_size, o.sensors.front(), o.backends.front(), "exact", knob.name, value, {}};
       for (const Oracle q : knob.oracles) {
@@ -160,6 +163,9 @@ RenderConfig render_config(const Setting& s, SortOrder order) {
   if (s.knob == "transmittance_min") c.quality.transmittance_min = number;
   if (s.knob == "max_sh_degree") c.quality.max_sh_degree = static_cast<int>(number);
   if (s.knob == "key_bits") c.quality.key_bits = static_cast<int>(number);
+  if (s.knob == "exponential") {
+    c.quality.exponential = s.knob_value == "fast" ? Exponential::fast : Exponential::exact;
+  }
   if (s.knob == "response") {
     c.response = s.knob_value == "ray"             ? Response::ray
                  : s.knob_value == "tangent_plane" ? Response::tangent_plane

@@ -130,7 +130,7 @@ std::string knob_section(const Table& table) {
       plots += chart(knob.name + ": " + q.name, knob.name, values, curves, q.title, q.axis, series);
     }
     const std::vector<Curve> times = curves_of(knob.rows, values, [&](const RowRefs& rows, Curve& c) {
-      const std::optional<double> ratio = ratio_to_exact(rows, renders, "time_p50_ms");
+      const std::optional<double> ratio = time_ratio(rows, renders);
       if (!ratio) return;
       c.mean.back() = *ratio;
       c.tooltips.back() = c.name + ": " + format(*ratio) + " of exact's time";

@@ -11,7 +11,8 @@ namespace gsnav_report {
 /// A setting on one backend: its time and its error, over views.
 struct ParetoPoint {
   std::string label, backend, profile;
-  double time = 0.0;   ///< ms per frame, mean of the views' medians
+  double time = 0.0;   ///< ms per frame: `ratio` times the mean of `exact`'s medians over the views
+  double ratio = 0.0;  ///< time divided by that of `exact`
   double error = 0.0;  ///< mean over the views, in the unit of the column
   double worst = 0.0;  ///< error of the worst view
   std::size_t views = 0;
@@ -23,6 +24,10 @@ struct ParetoPoint {
 /// Sets `dominated` for all points, each compared with the points of its own backend.
 /// `higher_is_better`: true for measures such as PSNR.
 void mark_dominated(std::vector<ParetoPoint>& points, bool higher_is_better);
+
+/// The rows whose PSNR the fronts compare: those of the first sensor with colour, against the first of
+/// the contract's orders that was measured.
+RowRefs against_front_oracle(const RowRefs& rows);
 
 /// One point per (backend, setting) of `rows`, which must have the same resolution, sensor and oracle.
 /// Settings whose images equal those of `exact` are left out.

@@ -50,7 +50,7 @@ class SceneRunner {
  private:
   struct Outcome {
     gsnav::Frames<float> frames;
-    Timing timing;
+    PairedTiming timing;       ///< beside the profile exact of the whole cloud
     gsnav::CullCounts culled;  ///< zeros if a knob is set, and for arrays outside host memory
     std::size_t scratch_bytes = 0;
     std::uint64_t peak_memory = 0;

@@ -23,11 +23,13 @@ namespace {
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr double kHalfSqrt2 = 0.70710678118654752440;
 
-constexpr std::array<StorageCodec, 8> kCodecs{{
+constexpr std::array<StorageCodec, 12> kCodecs{{
     {"position_fp16", "positions as float16 offsets from the 64 m lattice", 0x1p-10, -65504, 65504, 16,
      3},
     {"position_fixed24", "positions in 24 bit, 12 of them fraction (SPZ)", 1.0 / 4096, -kInf, kInf, 24,
      3},
+    {"position_fixed26", "positions in 26 bit, 14 of them fraction", 1.0 / 16384, -kInf, kInf, 26, 3},
+    {"position_fixed28", "positions in 28 bit, 16 of them fraction", 1.0 / 65536, -kInf, kInf, 28, 3},
     {"position_u16_8m", "positions in 16 bit within cells of 8 m", 8.0 / 65536, -kInf, kInf, 16, 3},
     {"log_scale_8", "log-scales in 8 bit, steps of 1/16 from -10 (SPZ)", 1.0 / 16, -10, 255.0 / 16 - 10,
      8, 3},
@@ -37,6 +39,8 @@ constexpr std::array<StorageCodec, 8> kCodecs{{
     {"sh0_8", "degree-0 colour in 8 bit, scale 0.15 (SPZ)", 1 / (0.15 * 255), -0.5 / 0.15, 0.5 / 0.15, 8,
      3},
     {"shN_8", "higher SH in 8 bit, steps of 1/128 (SPZ)", 1.0 / 128, -1, 127.0 / 128, 8, -1},
+    {"shN_10", "higher SH in 10 bit, steps of 1/512", 1.0 / 512, -1, 511.0 / 512, 10, -1},
+    {"shN_12", "higher SH in 12 bit, steps of 1/2048", 1.0 / 2048, -1, 2047.0 / 2048, 12, -1},
 }};
 
 /// The nearest point of the grid low + k step within the range; if low is infinite, of the grid k step.

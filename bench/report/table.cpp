@@ -180,4 +180,15 @@ std::optional<double> ratio_to_exact(const RowRefs& rows, const RowRefs& all, st
   return std::exp(logs / static_cast<double>(count));
 }
 
+std::optional<double> time_ratio(const RowRefs& rows, const RowRefs& all) {
+  double logs = 0;
+  for (const Row* row : rows) {
+    const std::optional<double> ratio = row->number("time_over_exact");
+    if (!ratio || !(*ratio > 0)) return ratio_to_exact(rows, all, "time_p50_ms");
+    logs += std::log(*ratio);
+  }
+  if (rows.empty()) return std::nullopt;
+  return std::exp(logs / static_cast<double>(rows.size()));
+}
+
 }  // namespace gsnav_report

@@ -82,4 +82,8 @@ bool same_as_exact(const RowRefs& rows, const RowRefs& all);
 /// and threads; nothing if no pair has two positive numbers.
 std::optional<double> ratio_to_exact(const RowRefs& rows, const RowRefs& all, std::string_view column);
 
+/// Geometric mean of the times divided by those of `exact`: `time_over_exact`, which was measured by
+/// turns, where all rows have it, else ratio_to_exact of their medians.
+std::optional<double> time_ratio(const RowRefs& rows, const RowRefs& all);
+
 }  // namespace gsnav_report

@@ -54,6 +54,24 @@ TEST_CASE("docs: every approximation has its error and what it buys") {
                   "0.500 | 0.100 |") != std::string::npos);
 }
 
+TEST_CASE("docs: the front has what no setting beats, by times that were taken by turns") {
+  std::vector<Row> rows;
+  const auto add = [&](const char* profile, const char* knob, double psnr, double ms, double ratio) {
+    Row r;
+    r.set("kind", "render").set("profile", profile).set("backend", "openmp").set("oracle", "contract");
+    r.set("sensor", "rgb").set("width", 64).set("height", 48).set("view", "0").set("threads", 2);
+    r.set("knob", knob).set("knob_value", std::string(knob) == "none" ? "" : "20");
+    rows.push_back(r.set("rgb_psnr", psnr).set("time_p50_ms", ms).set("time_over_exact", ratio));
+  };
+  add("exact", "none", 120, 4, 1);
+  add("fast", "none", 80, 9, 0.75);  // taken in a busy minute
+  add("exact", "key_bits", 70, 3.5, 0.875);
+  const std::string page = approximations_page(Table(rows, {}), "x");
+  CHECK(page.find("| exact | openmp | 120 / 120 | 1.00 | 1 | yes |") != std::string::npos);
+  CHECK(page.find("| fast | openmp | 80.0 / 80.0 | 0.750 | 1 | yes |") != std::string::npos);
+  CHECK(page.find("| key\\_bits = 20 | openmp | 70.0 / 70.0 | 0.875 | 1 |  |") != std::string::npos);
+}
+
 TEST_CASE("docs: targets stand beside what was found, the ledger names what it is of") {
   Row r;
   r.set("kind", "render")

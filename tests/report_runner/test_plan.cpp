@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <set>
 #include <vector>
@@ -60,6 +61,11 @@ TEST_CASE("plan: a knob's config differs from exact in that knob") {
   s.knob = "alpha_min";
   s.knob_value = "0.015625";
   CHECK(render_config(s, SortOrder::z_depth).quality.alpha_min == 1.0 / 64);
+  s = {};
+  s.knob = "exponential";
+  s.knob_value = "fast";
+  CHECK(render_config(s, SortOrder::z_depth).quality.exponential == Exponential::fast);
+  CHECK(render_config(s, SortOrder::z_depth).quality.transmittance_min == Quality{}.transmittance_min);
   s = {};
   s.knob = "response";
   s.knob_value = "ray";
@@ -185,4 +191,22 @@ TEST_CASE("levels of detail are judged by the photo, beside fast, and drawn by i
   CHECK(fast == 2 * 2);
   o.backends = {"cuda"};
   for (const Setting& s : plan(o)) CHECK(s.profile != "lod");
+}
+
+TEST_CASE("timing: two functions are called by turns, and their times are divided run by run") {
+  std::string calls;
+  const auto spin = [&](char name, int microseconds) {
+    calls += name;
+    const auto end = std::chrono::steady_clock::now() + std::chrono::microseconds(microseconds);
+    while (std::chrono::steady_clock::now() < end) {
+    }
+  };
+  const PairedTiming t =
+      measure_beside([&] { spin('f', 3000); }, [&] { spin('g', 1000); }, 4, /*budget_s=*/60);
+  CHECK(calls == "fgfgfggffggf");
+  CHECK(t.timing.runs == 4);
+  CHECK(t.timing.p50_ms >= 3);
+  CHECK(t.ratio > 0);
+  calls.clear();
+  CHECK(measure_beside([&] { spin('f', 1); }, [&] { spin('g', 1); }, 9, 0).timing.runs == 3);
 }
