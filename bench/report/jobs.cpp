@@ -44,7 +44,8 @@ std::vector<Knob> knobs() {
       {"compat", {"inria", "gsplat", "habitat_gs"}, {Oracle::contract}},
       {"exponential", {"exact", "fast"}, {Oracle::contract}}};
   for (const StorageCodec& c : storage_codecs()) all[4].values.emplace_back(c.name);
-  all[4].values.emplace_back(kPackedStorage);
+  for (const std::string_view drawn : {kCompactStorage, kPackedStorage})
+    all[4].values.emplace_back(drawn);
   return all;
 }
 

@@ -7,6 +7,7 @@
 
 #include "../../tools/common/html_text.hpp"
 #include "plot_style.hpp"
+#include "storage.hpp"
 
 namespace gsnav_report {
 
@@ -28,10 +29,15 @@ const Measure kMeasures[] = {
     {"flip_mean", "FLIP, mean", "", 1, false, {"rgbd", "rgb", ""}},
 };
 
-/// Whether a row measures an approximation. The knobs `response` and `compat` change the correct image,
-/// so that their difference from the contract is no error.
+/// Whether a row measures an approximation with a time of its own. The knobs `response` and `compat`
+/// change the correct image, so that their difference from the contract is no error. Codecs of single
+/// fields are drawn from floats, as `exact` is.
 bool is_approximation(const Row& r) {
-  return is_plain(r) || (r.get("knob") != "response" && r.get("knob") != "compat");
+  if (is_plain(r)) return true;
+  const std::string& knob = r.get("knob");
+  if (knob == "storage")
+    return r.get("knob_value") == kPackedStorage || r.get("knob_value") == kCompactStorage;
+  return knob != "response" && knob != "compat";
 }
 
 /// Rows of the first sensor that has the column, against the first of the contract's orders that was

@@ -50,9 +50,9 @@ bool is_exact(const Setting& s) { return s.profile == "exact" && s.knob == "none
 
 }  // namespace
 
-template <class B>
-Result<SceneRunner::Outcome> SceneRunner::render_on(B& backend, const Setting& s,
-                                                    const GaussianCloud& cloud, int runs) {
+template <class B, class Cloud>
+Result<SceneRunner::Outcome> SceneRunner::render_on(B& backend, const Setting& s, const Cloud& cloud,
+                                                    int runs) {
   Outcome out;
   const GaussianArrays<B> arrays(backend, cloud);
   GaussianSet set = arrays.set();
@@ -62,11 +62,11 @@ Result<SceneRunner::Outcome> SceneRunner::render_on(B& backend, const Setting& s
     out.cell_known = cell.has_value();
     if (cell) set.selection.seen = scene_.visible->seen_from(*cell);
   }
-  BasicRenderer<float, B> renderer(backend, render_config(s, cloud.sort_order));
+  BasicRenderer<float, B> renderer(backend, render_config(s, scene_.cloud.sort_order));
   const Result<const LodTree*> tree = tree_of(s);
   if (!tree) return tree.status();
   std::optional<LodCut> cut;
-  if (*tree != nullptr) cut.emplace(**tree, cloud);
+  if (*tree != nullptr) cut.emplace(**tree, scene_.cloud);
   Status status;
   const auto draw = [&] {
     const std::span<const GaussianSet> sets = cut ? cut->select(c) : std::span(&set, 1);
@@ -126,8 +126,8 @@ std::uint64_t SceneRunner::row_bytes(const GaussianCloud& cloud, const std::stri
   return sizeof(float) * (11 + (sensor == "depth" ? 0 : colors));
 }
 
-Result<SceneRunner::Outcome> SceneRunner::render(const Setting& s, const GaussianCloud& cloud,
-                                                 int runs) {
+template <class Cloud>
+Result<SceneRunner::Outcome> SceneRunner::render(const Setting& s, const Cloud& cloud, int runs) {
 #if defined(GSNAV_HAS_CUDA)
   if (s.backend == "cuda") {
     if (CudaBackend::device_count() == 0)
@@ -168,32 +168,31 @@ Status SceneRunner::run(const Setting& s) {
     if (!csv_.has(key(s, q))) missing.push_back(q);
   }
   if (missing.empty()) return {};
+  const bool packed = s.knob == "storage" && s.knob_value == kPackedStorage;
   GaussianCloud encoded;
   const GaussianCloud* cloud = &scene_.cloud;
-  std::size_t cloud_bytes = cloud->bytes(), band_bytes = sizeof(float) * cloud->shN.size();
-  std::uint64_t read_peak = 0;
-  if (s.knob == "storage" && s.knob_value == kPackedStorage) {
-    if (!packed_) {
-      Result<PackedThrough> packed = scene_.path.empty()
-                                         ? Result<PackedThrough>(through_packing(pack_cloud(*cloud)))
-                                         : read_packed(scene_.path);
-      if (!packed) return packed.status();
-      packed_ = std::move(*packed);
-    }
-    cloud_bytes = packed_->bytes;
-    band_bytes = packed_->band_bytes;
-    read_peak = packed_->read_peak;
-    cloud = &packed_->cloud;
-  } else if (s.knob == "storage") {
-    Result<GaussianCloud> stored = through_storage(*cloud, s.knob_value);
+  if (packed && !packed_) {
+    Result<StoredPacked> stored = scene_.path.empty()
+                                      ? Result<StoredPacked>(StoredPacked{pack_cloud(scene_.cloud)})
+                                      : read_packed(scene_.path);
+    if (!stored) return stored.status();
+    packed_ = std::move(*stored);
+  } else if (s.knob == "storage" && !packed) {
+    Result<GaussianCloud> stored = through_storage(scene_.cloud, s.knob_value);
     if (!stored) return stored.status();
     encoded = std::move(*stored);
-    for (const StorageCodec& c : storage_codecs()) {
-      if (c.name == s.knob_value) cloud_bytes = stored_bytes(*cloud, c);
-    }
     cloud = &encoded;
   }
-  const Result<Outcome> outcome = render(s, *cloud, options_.runs);
+  std::size_t cloud_bytes = packed ? packed_->cloud.bytes() : cloud->bytes(),
+              bands = packed ? band_bytes(packed_->cloud)
+                             : sizeof(float) * cloud->shN.size() +
+                                   sizeof(std::uint16_t) * cloud->shN_half.size();
+  const std::uint64_t read_peak = packed ? packed_->read_peak : 0;
+  for (const StorageCodec& c : storage_codecs()) {
+    if (s.knob == "storage" && c.name == s.knob_value) cloud_bytes = stored_bytes(scene_.cloud, c);
+  }
+  const Result<Outcome> outcome =
+      packed ? render(s, packed_->cloud, options_.runs) : render(s, *cloud, options_.runs);
   if (!outcome) return outcome.status();
   if (s.profile == "lod") cloud_bytes += tree_->bytes();
   if (s.profile == "visible") cloud_bytes += scene_.visible->bytes();
@@ -216,8 +215,9 @@ Status SceneRunner::run(const Setting& s) {
         .set("pairs", stats.tile_intersections);
     if (outcome->culled.rows != 0)
       row.set("touched", outcome->culled.touched).set("emitting", outcome->culled.emitting);
-    row.set("row_bytes", row_bytes(*cloud, s.sensor)).set("cloud_bytes", std::uint64_t{cloud_bytes});
-    row.set("band_bytes", std::uint64_t{band_bytes});
+    row.set("row_bytes", row_bytes(scene_.cloud, s.sensor))
+        .set("cloud_bytes", std::uint64_t{cloud_bytes});
+    row.set("band_bytes", std::uint64_t{bands});
     // Pairs that the contract needs; knobs have other counts of their own.
     if (s.knob == "none" && q == Oracle::contract) row.set("evaluations", named->reference->evaluations);
     row.set("bytes", static_cast<std::uint64_t>(outcome->scratch_bytes + cloud_bytes));

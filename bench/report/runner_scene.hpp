@@ -69,10 +69,11 @@ class SceneRunner {
   /// The scene's levels of detail, read from the file beside the scene's or built. Null if the setting
   /// does not use them.
   gsnav::Result<const gsnav::LodTree*> tree_of(const Setting& s);
-  gsnav::Result<Outcome> render(const Setting& s, const gsnav::GaussianCloud& cloud, int runs);
-  template <class B>
-  gsnav::Result<Outcome> render_on(B& backend, const Setting& s, const gsnav::GaussianCloud& cloud,
-                                   int runs);
+  /// @param cloud that of the scene, or the same in another storage
+  template <class Cloud>
+  gsnav::Result<Outcome> render(const Setting& s, const Cloud& cloud, int runs);
+  template <class B, class Cloud>
+  gsnav::Result<Outcome> render_on(B& backend, const Setting& s, const Cloud& cloud, int runs);
   gsnav::Result<Named> reference(const Setting& s, Oracle oracle);
   gsnav::Status save_worst_view(const ImageSize& size, const std::string& profile);
 
@@ -85,7 +86,7 @@ class SceneRunner {
   gsnav::SerialBackend serial_;
   Judge judge_;
   std::optional<gsnav::LodTree> tree_;
-  std::optional<PackedThrough> packed_;
+  std::optional<StoredPacked> packed_;
   std::deque<Named> recent_;  // references of the current view
 };
 

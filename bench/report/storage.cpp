@@ -81,25 +81,26 @@ float round_to_half(float x) noexcept {
   return static_cast<float>(std::clamp(std::nearbyint(v / step) * step, -65504.0, 65504.0));
 }
 
-PackedThrough through_packing(const PackedCloud& packed) {
-  const GaussianCloud& rest = packed.rest;
-  return {unpack_cloud(packed), packed.bytes(),
-          packed.shN.size() + sizeof(float) * rest.shN.size() +
-              sizeof(std::uint16_t) * rest.shN_half.size()};
+std::size_t band_bytes(const PackedCloud& packed) noexcept {
+  return packed.shN.size() + sizeof(float) * packed.rest.shN.size() +
+         sizeof(std::uint16_t) * packed.rest.shN_half.size();
 }
 
-Result<PackedThrough> read_packed(const std::string& path) {
+Result<StoredPacked> read_packed(const std::string& path) {
   reset_peak_memory();
   const std::uint64_t before = peak_memory();
   Result<io::LoadedPackedCloud> loaded = io::load_packed_scene(path);
   if (!loaded) return loaded.status();
   const std::uint64_t peak = peak_memory() - before;
-  PackedThrough out = through_packing(loaded->cloud);
-  out.read_peak = peak;
-  return out;
+  return StoredPacked{std::move(loaded->cloud), peak};
 }
 
 Result<GaussianCloud> through_storage(const GaussianCloud& cloud, std::string_view name) {
+  if (name == kCompactStorage) {
+    GaussianCloud out = cloud;
+    compact_sh(out);
+    return out;
+  }
   const auto codec =
       std::find_if(kCodecs.begin(), kCodecs.end(), [&](const auto& c) { return c.name == name; });
   if (codec == kCodecs.end()) {

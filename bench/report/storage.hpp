@@ -29,19 +29,18 @@ std::span<const StorageCodec> storage_codecs() noexcept;
 
 /// Value of the knob `storage` that packs all fields at once (scene/packed_cloud.hpp).
 inline constexpr std::string_view kPackedStorage = "packed";
+/// SH bands as binary16 (compact_sh), which renderers draw as they are.
+inline constexpr std::string_view kCompactStorage = "compact";
 
-/// A cloud that was packed and unpacked again. `bytes` is its packed size; `band_bytes` is the part of
-/// it in SH bands from 1 on.
-struct PackedThrough {
-  gsnav::GaussianCloud cloud;
-  std::size_t bytes = 0, band_bytes = 0;
+/// A packed cloud.
+struct StoredPacked {
+  gsnav::PackedCloud cloud;
   std::uint64_t read_peak = 0;  ///< peak memory while it was read, bytes; 0: not known
 };
-/// Unpacks a cloud.
-PackedThrough through_packing(const gsnav::PackedCloud& packed);
-/// Reads the packed cloud of a path (io::load_packed_scene) and unpacks it. Errors: those of that
-/// function.
-gsnav::Result<PackedThrough> read_packed(const std::string& path);
+/// Bytes of the SH bands from 1 on.
+std::size_t band_bytes(const gsnav::PackedCloud& packed) noexcept;
+/// Reads the packed cloud of a path (io::load_packed_scene). Errors: those of that function.
+gsnav::Result<StoredPacked> read_packed(const std::string& path);
 
 /// `cloud` after being stored by the codec `name` and read back; all other fields keep their bits.
 /// Errors: invalid_argument for an unknown name, with the known ones.

@@ -129,7 +129,7 @@ TEST_CASE("report: a tiny scene from nothing, again from the cache, and resumed"
     }
   }
   CHECK(exact == 2 * (3 + 1));  // views x (openmp by sensor, serial)
-  CHECK(knobs == 2 * (3 * 3 + 13));
+  CHECK(knobs == 2 * (3 * 3 + 14));
   CHECK(picture);
   for (const char* target : {"culling: Gaussians touched", "depth alone: times faster",
                              "depth alone: fewer bytes", "packed: bytes per Gaussian"}) {

@@ -69,6 +69,9 @@ TEST_CASE("storage: values come back within half a step") {
   CHECK(a.bytes() - stored_bytes(a, codec("position_fp16")) == a.size() * 3 * 2);
   CHECK(a.bytes() - stored_bytes(a, codec("quat_10")) == a.size() * 12);  // 32 bits are left of 128
   CHECK(a.bytes() - stored_bytes(a, codec("shN_8")) == a.size() * 45 * 3);
+  const GaussianCloud compact = through_storage(a, kCompactStorage).value();
+  CHECK(compact.compact());
+  CHECK(compact.means[0] == a.means[0]);
   CHECK(through_storage(a, "zip").message().find("position_fp16") != std::string::npos);
 }
 
