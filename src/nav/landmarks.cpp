@@ -17,6 +17,16 @@ float rounded_up(double x) noexcept {
   return static_cast<double>(f) >= x ? f : std::nextafter(f, std::numeric_limits<float>::infinity());
 }
 
+/// Adds `one` to the `count` elements whose `key` is largest, from the largest down, if it is among the
+/// first N. Of equal ones, the earlier stays.
+template <class T, std::size_t N, class Key>
+void keep_largest(std::array<T, N>& kept, std::size_t& count, const T& one, const Key& key) noexcept {
+  if (count == N && key(one) <= key(kept[N - 1])) return;
+  std::size_t at = count < N ? count++ : N - 1;
+  for (; at > 0 && key(one) > key(kept[at - 1]); --at) kept[at] = kept[at - 1];
+  kept[at] = one;
+}
+
 /// Part of an edge that is reached in a straight line from a root, in metres along the edge.
 struct Reach {
   double low = 0, high = 0;
@@ -78,12 +88,8 @@ double most_above(const AlongEdge& e, double low, double high, double a, double 
     std::size_t m = 0;
     const double line_x = a + slope * (x - low), line_y = a + slope * (y - low);
     const auto take = [&](double at_x, double at_y) {
-      const std::pair<double, double> one{at_x - line_x, at_y - line_y};
-      std::size_t k = m < kTaken ? m++ : kTaken;
-      const auto sum = [](const auto& p) { return p.first + p.second; };
-      if (k == kTaken && !(sum(one) < sum(over[--k]))) return;
-      for (; k > 0 && sum(one) < sum(over[k - 1]); --k) over[k] = over[k - 1];
-      over[k] = one;
+      keep_largest(over, m, {at_x - line_x, at_y - line_y},
+                   [](const auto& p) { return -(p.first + p.second); });
     };
     take(e.from_low + x, e.from_low + y);
     take(e.from_high + e.length - x, e.from_high + e.length - y);
@@ -272,14 +278,11 @@ LandmarkLead::LandmarkLead(const Landmarks& marks, const UnfoldedMesh& mesh, con
     return marks.corners_.data() + mesh.edges[best].vertex * marks.count_;
   };
   const float *a = nearest(start), *b = nearest(goal);
+  const auto gain_of = [](const auto& candidate) { return candidate.first; };
   std::array<std::pair<float, std::uint32_t>, kTried> tried;
   std::size_t n = 0;
   for (std::uint32_t k = 0; k < marks.count_; ++k) {
-    const float d = std::abs(a[k] - b[k]);
-    if (n == kTried && d <= tried[n - 1].first) continue;
-    std::size_t i = n < kTried ? n++ : n - 1;
-    for (; i > 0 && d > tried[i - 1].first; --i) tried[i] = tried[i - 1];
-    tried[i] = {d, k};
+    keep_largest(tried, n, {std::abs(a[k] - b[k]), k}, gain_of);
   }
   std::array<std::pair<double, One>, kLeads> best;
   for (std::size_t i = 0; i < n; ++i) {
@@ -290,10 +293,7 @@ LandmarkLead::LandmarkLead(const Landmarks& marks, const UnfoldedMesh& mesh, con
     const double gain = behind ? from.low - to.high : to.low - from.high;
     const One one{marks.lines_.data() + k * marks.edges_, behind ? 1.0 : -1.0,
                   behind ? -to.high : to.low};
-    if (count_ == kLeads && gain <= best[count_ - 1].first) continue;
-    std::size_t at = count_ < kLeads ? count_++ : count_ - 1;
-    for (; at > 0 && gain > best[at - 1].first; --at) best[at] = best[at - 1];
-    best[at] = {gain, one};
+    keep_largest(best, count_, {gain, one}, gain_of);
   }
   for (std::size_t i = 0; i < count_; ++i) leads_[i] = best[i].second;
   if (count_ > 0) least_ = max(least_, best[0].first);
