@@ -35,7 +35,6 @@
 namespace {
 
 using namespace gsnav;
-using gsnav_render::DepthChoice;
 using gsnav_render::fail;
 using gsnav_render::Options;
 using gsnav_render::Scene;
@@ -74,19 +73,36 @@ std::vector<std::uint8_t> depth_picture(const std::vector<float>& metres, const 
   return io::colorize_depth(metres, near, far);
 }
 
+/// The image of a kind of depth. Compilers warn where a kind is missing here.
+template <class S>
+const std::vector<S>* depth_of(const Frames<S>& f, Output kind) {
+  switch (kind) {
+    case kMedianDepth:
+      return &f.median_depth;
+    case kExpectedDepth:
+      return &f.expected_depth;
+    case kAccumulatedDepth:
+      return &f.accumulated_depth;
+    case kFirstHitDepth:
+      return &f.first_hit_depth;
+    case kRgb:
+    case kAlpha:
+      break;
+  }
+  return nullptr;
+}
+
 /// Writes the files of one camera.
 template <class S>
 Status write_images(const Frames<S>& f, const Camera& camera, std::size_t index, const Options& o) {
-  const DepthChoice& depth = o.depth_choice;
-  const std::vector<S>& z = depth.output == kMedianDepth        ? f.median_depth
-                            : depth.output == kExpectedDepth    ? f.expected_depth
-                            : depth.output == kAccumulatedDepth ? f.accumulated_depth
-                                                                : f.first_hit_depth;
+  const std::vector<S>* const z = depth_of(f, o.depth_choice.output);
+  if (z == nullptr)
+    return Status(Errc::invalid_argument, "--depth " + o.depth + ": not a kind of depth");
   char number[24];
   std::snprintf(number, sizeof number, "%04zu", index);
   const std::filesystem::path stem = std::filesystem::path(o.out) / number;
   const std::vector<float> rgb(f.rgb.begin(), f.rgb.end()), alpha(f.alpha.begin(), f.alpha.end()),
-      metres(z.begin(), z.end());
+      metres(z->begin(), z->end());
   const std::vector<std::size_t> image{f.height, f.width}, color{f.height, f.width, 3};
   Status s;
   const auto keep = [&](Status next) {

@@ -13,7 +13,7 @@ using namespace gsnav;
 
 /// Image that --depth selects. First-hit depth may have its own tau.
 struct DepthChoice {
-  unsigned output = kMedianDepth;
+  Output output = kMedianDepth;
   double tau = 0.5;
 };
 
