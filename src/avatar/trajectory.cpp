@@ -8,6 +8,7 @@
 
 #include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/detail/math/angles.hpp"
+#include "gsnav/detail/math/easing.hpp"
 #include "gsnav/math/quat.hpp"
 
 namespace gsnav {
@@ -206,7 +207,7 @@ TrajectorySample WalkTrajectory::sample(double t) const {
     out.yaw = heading(leg, s);
   } else if (leg.turn_time > 0) {
     const double u = clamp((t - leg.walk_time) / leg.turn_time, 0.0, 1.0);
-    const double eased = u * u * (3 - 2 * u);
+    const double eased = smoothstep(u);
     out.yaw += leg.turn * eased;
     out.turned += abs(leg.turn) * eased;
     out.turning = min(1.0, min(u, 1 - u) * leg.turn_time / 0.15) * min(1.0, abs(leg.turn));

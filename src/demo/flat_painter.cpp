@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "gsnav/detail/math/curves.hpp"
+#include "gsnav/detail/math/easing.hpp"
 
 namespace gsnav::flat {
 Vec3d srgb(unsigned hex) noexcept {
@@ -28,8 +29,7 @@ double hash01(int a, int b, int c) noexcept {
 double noise(double x, double y, int seed) noexcept {
   const double fx = std::floor(x), fy = std::floor(y);
   const int i = static_cast<int>(fx), j = static_cast<int>(fy);
-  const auto smooth = [](double t) { return t * t * (3.0 - 2.0 * t); };
-  const double u = smooth(x - fx), v = smooth(y - fy);
+  const double u = smoothstep(x - fx), v = smoothstep(y - fy);
   const double low = hash01(i, j, seed) * (1 - u) + hash01(i + 1, j, seed) * u;
   const double high = hash01(i, j + 1, seed) * (1 - u) + hash01(i + 1, j + 1, seed) * u;
   return low * (1 - v) + high * v;

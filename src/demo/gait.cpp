@@ -9,6 +9,7 @@
 
 #include "gsnav/detail/core/field_check.hpp"
 #include "gsnav/detail/math/angles.hpp"
+#include "gsnav/detail/math/easing.hpp"
 
 namespace gsnav {
 
@@ -22,10 +23,7 @@ Quatd about_x(double degrees) noexcept { return axis_angle(Vec3d{1, 0, 0}, degre
 Quatd about_y(double degrees) noexcept { return axis_angle(Vec3d{0, 1, 0}, degrees * kTwoPi / 360); }
 Quatd about_z(double degrees) noexcept { return axis_angle(Vec3d{0, 0, 1}, degrees * kTwoPi / 360); }
 
-double smooth(double u) noexcept {
-  u = clamp(u, 0.0, 1.0);
-  return u * u * (3 - 2 * u);
-}
+double smooth(double u) noexcept { return smoothstep(clamp(u, 0.0, 1.0)); }
 
 // The rotation that takes the bind pose's bone direction `from` to `to`, and the bind pose's +X, made
 // perpendicular to the bone, to `hinge`.

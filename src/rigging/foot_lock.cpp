@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "gsnav/detail/math/easing.hpp"
 #include "gsnav/math/quat.hpp"
 
 namespace gsnav {
@@ -153,7 +154,7 @@ Result<FootLockReport> lock_feet(const Skeleton& skeleton, const std::vector<Foo
       const Vec3d a = offsets[s == 0 ? to : from], b = offsets[s == spans.size() ? from : to];
       for (std::size_t t = from; t <= to && to > from; ++t) {
         const double u = static_cast<double>(t - from) / static_cast<double>(to - from);
-        offsets[t] = lerp(a, b, u * u * (3 - 2 * u));
+        offsets[t] = lerp(a, b, smoothstep(u));
       }
     }
     for (std::size_t t = 0; t < count; ++t) {
