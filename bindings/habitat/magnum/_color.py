@@ -8,6 +8,8 @@ from ._angle import Deg, _Angle
 from ._vector import Vector3, Vector4, _is_number
 
 
+# The curve of IEC 61966-2-1, as in gsnav/detail/math/curves.hpp. It stands here too because the package gsnav has no
+# function for it: its images are encoded already, and nothing else in Python converts colours.
 def _linear(srgb: float) -> float:
     return srgb / 12.92 if srgb <= 0.04045 else ((srgb + 0.055) / 1.055) ** 2.4
 

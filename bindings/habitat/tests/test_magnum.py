@@ -188,7 +188,10 @@ def test_ranges():
 def test_colours():
     assert mn.Color4(1, 0.5, 0.25) == [1, 0.5, 0.25, 1] and mn.Color4(0.5) == [0.5, 0.5, 0.5, 1]
     assert mn.Color4(mn.Color3.green(), 0.5) == [0, 1, 0, 0.5] and mn.Color4.magenta() == [1, 0, 1, 1]
+    assert all(mn.Color3.from_srgb_int(v * 0x10101).to_srgb_int() == v * 0x10101 for v in range(256))
     assert mn.Color3.from_srgb_int(0x336699).to_srgb_int() == 0x336699
+    # Both parts of the curve of IEC 61966-2-1.
+    assert np.allclose(list(mn.Color3.from_srgb_int(0x800AFF)), [0.21586050011, 10 / 255 / 12.92, 1], rtol=1e-10)
     assert mn.Color3.from_linear_rgb_int(0xFF0080) == [1, 0, 128 / 255]
     assert mn.Color3.from_hsv(mn.Deg(240), 1, 0.5) == [0, 0, 0.5]
 
