@@ -316,9 +316,21 @@ def parse_options():
     options.cache = (options.cache or options.build / "cpu_table").resolve()
     options.cache.mkdir(parents=True, exist_ok=True)
     options.out = options.out or options.cache / "table.md"
+    if not options.out.absolute().parent.is_dir():
+        stop(f"--out {options.out}: there is no folder {options.out.parent}")
     options.threads = sorted(int(t) for t in options.threads.split(","))
     options.sizes = [tuple(int(n) for n in s.split("x")) for s in options.sizes.split(",")]
     return options
+
+
+def write(path, text):
+    """Writes a file beside its place and renames it. After an error, nothing of it is left."""
+    part = path.with_name(f".part-{path.name}")
+    try:
+        part.write_text(text)
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def main():
@@ -334,8 +346,8 @@ def main():
     rows = measure(options, scenes, baselines)
     names = [b[0] for b in baselines]
     text = caption(options, names) + "\n\n" + table(rows, options.threads, names)
-    options.out.write_text(text + "\n")
-    options.out.with_suffix(".json").write_text(json.dumps(rows, indent=1) + "\n")
+    write(options.out, text + "\n")
+    write(options.out.with_suffix(".json"), json.dumps(rows, indent=1) + "\n")
     print(text + "\n\n" + summary(rows, options.threads, names))
 
 
