@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import argparse
 import csv
-import os
 import pathlib
 import sys
 from collections.abc import Mapping, Sequence
+
+from pointnav_files import aside, line_of
 
 Run = Sequence[Mapping[str, float]]  # rows of log.csv
 
@@ -44,6 +45,10 @@ def plot(runs: Mapping[str, Run], axes: Sequence[Sequence[str]], out: pathlib.Pa
     import matplotlib
     matplotlib.use("agg")
     from matplotlib import pyplot
+    from matplotlib.backend_bases import FigureCanvasBase
+    endings = [f".{name}" for name in sorted(FigureCanvasBase.get_supported_filetypes())]
+    if out.suffix.lower() not in endings:
+        raise ValueError(f"{out}: the name must end in {', '.join(endings[:-1])} or {endings[-1]}")
     figure, drawn = pyplot.subplots(1, len(axes), figsize=(5 * len(axes), 4), squeeze=False)
     for axis, metrics in zip(drawn[0], axes):
         for run, rows in runs.items():
@@ -56,10 +61,11 @@ def plot(runs: Mapping[str, Run], axes: Sequence[Sequence[str]], out: pathlib.Pa
         axis.grid(True)
         axis.legend()
     figure.tight_layout()
-    part = out.with_name(f"part-{out.name}")
-    figure.savefig(part, dpi=100)
-    os.replace(part, out)
-    pyplot.close(figure)
+    try:
+        with aside(out) as part:
+            figure.savefig(part, dpi=100)
+    finally:
+        pyplot.close(figure)
 
 
 def main() -> None:
@@ -86,8 +92,8 @@ def main() -> None:
         plot(runs, [[metric] for metric in args.metrics], args.out, args.mean)
     except ImportError:
         sys.exit("pointnav_curves.py needs matplotlib: pip install matplotlib")
-    except (OSError, ValueError) as e:  # a folder that is missing, an ending that is no format of pictures
-        sys.exit(f"pointnav_curves.py: {e}")
+    except (OSError, RuntimeError, ValueError) as e:  # RuntimeError: .pgf needs LaTeX
+        sys.exit(f"pointnav_curves.py: --out {line_of(e)}")
 
 
 if __name__ == "__main__":

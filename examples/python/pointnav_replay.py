@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import copy
 import dataclasses
-import os
 import pathlib
 import sys
 from collections.abc import Iterator
@@ -21,6 +20,7 @@ except ImportError:
     sys.exit("pointnav_replay.py needs matplotlib: pip install matplotlib")
 import numpy as np
 from play_pointnav import WEIGHTS, sensor_of
+from pointnav_files import aside
 from pointnav_policy import HIDDEN, Policy, load
 from pointnav_worlds import (HELD_OUT_SEEDS, Worlds, device_of, goals, images_of, number, run_program, sensors_of,
                              world_arguments)
@@ -195,10 +195,9 @@ def main() -> None:
     policy = load(args.weights)
     args.size, args.sensor = policy.size, sensor_of(policy)
     pictures, times = zip(*frames(args, policy))
-    aside = args.out.with_suffix(".part")  # A program that is stopped leaves an older picture as it was.
-    pictures[0].save(aside, "WEBP", save_all=True, append_images=pictures[1:], duration=list(times), loop=0,
-                     quality=args.compression, method=6)
-    os.replace(aside, args.out)
+    with aside(args.out) as part:  # A program that is stopped leaves an older picture as it was.
+        pictures[0].save(part, "WEBP", save_all=True, append_images=pictures[1:], duration=list(times), loop=0,
+                         quality=args.compression, method=6)
     print(f"{args.out}: {len(pictures)} pictures, {args.out.stat().st_size:,} bytes")
 
 

@@ -69,3 +69,34 @@ def test_errors_name_the_file_and_the_field(tmp_path):
                         ((good, "--metrics", "spl", "--mean", "0"), "--mean is 0")]:
         tried = run(*words)
         assert tried.returncode == 1 and text in tried.stderr and "Traceback" not in tried.stderr, tried.stderr
+
+
+def test_pictures_that_cannot_be_written_leave_nothing(tmp_path):
+    pytest.importorskip("matplotlib")
+    good = log_of(tmp_path / "good", [0.5] * 12)
+    (tmp_path / "folder.png").mkdir()
+    (tmp_path / "old.png").write_text("old")
+    for name, text in (("curves", ".pdf, .pgf, .png, "), ("curves.mp4", ".svgz, .tif, .tiff or .webp"),
+                       ("none/curves.png", "there is no folder"), ("folder.png", "is a folder"), ("x.", "must end in")):
+        tried = run(good, "--metrics", "spl", "--out", tmp_path / name)
+        assert tried.returncode == 1 and tried.stderr.startswith(f"pointnav_curves.py: --out {tmp_path / name}"), tried
+        assert text in tried.stderr and tried.stderr.count("\n") == 1, tried.stderr
+        assert sorted(p.name for p in tmp_path.iterdir()) == ["folder.png", "good", "old.png"], name
+    assert run(good, "--metrics", "spl", "--out", tmp_path / "UPPER.PNG").returncode == 0
+
+
+def test_a_file_is_whole_or_as_it_was(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(FOLDER)
+    from pointnav_files import aside
+
+    path = tmp_path / "log.csv"
+    path.write_text("old")
+    for error in (OSError, KeyboardInterrupt):
+        with pytest.raises(error), aside(path) as part:
+            part.write_text("ne")
+            raise error
+        assert [p.name for p in tmp_path.iterdir()] == ["log.csv"] and path.read_text() == "old"
+    with aside(path) as part:
+        assert part.suffix == ".csv" and part.parent == tmp_path
+        part.write_text("new")
+    assert [p.name for p in tmp_path.iterdir()] == ["log.csv"] and path.read_text() == "new"
