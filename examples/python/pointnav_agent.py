@@ -15,7 +15,8 @@ import numpy as np
 import torch
 import torch.distributed as dist
 from pointnav_curves import plot
-from pointnav_policy import ACTIONS, CHANNELS, HIDDEN, STRIDES, load, read_checkpoint
+from pointnav_files import aside
+from pointnav_policy import ACTIONS, HIDDEN, STRIDES
 from pointnav_worlds import LEFT, RIGHT, device_of
 from torch import Tensor, nn
 
@@ -185,48 +186,6 @@ def agreed(decision: bool, device: torch.device) -> bool:
     return bool(there)
 
 
-def checkpoint_of(path: pathlib.Path, args: argparse.Namespace, option: str, agent: Agent,
-                  names: tuple[str, ...] = ("size", "blind", "sensor")) -> dict[str, Any]:
-    """Reads a checkpoint and gives the agent its weights. Ends the program if an argument of `names` differs."""
-    kept = read_checkpoint(path)
-    for name in names:
-        then = kept["args"].get(name, getattr(args, name))
-        if getattr(args, name) != then:
-            sys.exit(f"--{name.replace('_', '-')} {getattr(args, name)}: {path} was trained with {then}. Use that, or "
-                     f"another {option}.")
-    take_weights(agent, kept["agent"], path)
-    return kept
-
-
-def take_weights(agent: Agent, weights: dict[str, Tensor], path: pathlib.Path) -> None:
-    """Gives the agent the weights that `path` has. Ends the program if they are those of another network."""
-    try:
-        agent.load_state_dict(weights)
-    except RuntimeError as e:
-        sys.exit(f"{path}: weights of another network: {' '.join(str(e).split())[:300]}")
-
-
-def say_ignored(path: pathlib.Path, args: argparse.Namespace, rank: int) -> None:
-    """Says that a run goes on from its own checkpoint, and not from another."""
-    if args.begin_with is not None and rank == 0:
-        print(f"{path}: goes on from here. --begin-with {args.begin_with} is of no use.", file=sys.stderr)
-
-
-def begin_with(path: pathlib.Path | None, args: argparse.Namespace, agent: Agent) -> None:
-    """Gives a new agent the weights of a checkpoint, or of a file .npz, which has none of the value."""
-    if path is None:
-        return
-    if path.suffix != ".npz":
-        checkpoint_of(path, args, "--begin-with", agent)
-        return
-    policy = load(path)
-    sensors = {0: "--blind", **{c: f"--sensor {name}" for name, c in CHANNELS.items()}}
-    if (policy.size, policy.channels) != (args.size, agent.shape[0]):
-        sensor = sensors.get(policy.channels, f"{policy.channels} channels")
-        sys.exit(f"--begin-with {path}: an agent of --size {policy.size} {sensor}. Use these, or another file.")
-    take_weights(agent, agent.state_dict() | {name: torch.from_numpy(w) for name, w in policy.weights.items()}, path)
-
-
 def progress(log: list[dict[str, float]], updates: int, rate: float) -> None:
     """Prints a line: means over the episodes of the last ten updates."""
     recent, row = log[-10:], log[-1]
@@ -238,11 +197,10 @@ def progress(log: list[dict[str, float]], updates: int, rate: float) -> None:
 
 def write_log(out: pathlib.Path, log: list[dict[str, float]]) -> None:
     """Writes log.csv, and its curves as curves.png."""
-    with open(out / "log.tmp", "w", newline="") as file:
+    with aside(out / "log.csv") as part, open(part, "w", newline="") as file:
         writer = csv.DictWriter(file, log[0].keys())
         writer.writeheader()
         writer.writerows(log)
-    os.replace(out / "log.tmp", out / "log.csv")
     try:
         plot({"": log}, (("success", "spl"), ("reward", "entropy")), out / "curves.png")
     except ImportError:

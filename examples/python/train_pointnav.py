@@ -25,8 +25,10 @@ except ImportError:
     sys.exit("train_pointnav.py needs PyTorch: pip install torch")
 import numpy as np
 import torch.distributed as dist
-from pointnav_agent import (Agent, Mirror, Reorder, Rows, agreed, begin_with, checkpoint_of, clear, devices_of,
-                            hash_of, made_by, pieces, progress, say_ignored, set_determinism, write_log)
+from pointnav_agent import (Agent, Mirror, Reorder, Rows, agreed, clear, devices_of, hash_of, made_by, pieces,
+                            progress, set_determinism, write_log)
+from pointnav_checkpoint import begin_with, resumed, say_ignored
+from pointnav_files import aside
 from pointnav_policy import ACTIONS, CHANNELS, HIDDEN
 from pointnav_worlds import (METRICS, SUCCESS, TRAIN_SEEDS, Draw, Worlds, flats_argument, goals, mixed,
                              number, run_program, sensor_arguments, sensors_of, world_arguments)
@@ -272,10 +274,10 @@ def save(learner: Learner, log: list[dict[str, float]], out: pathlib.Path) -> No
     if learner.rank:
         return
     kept = {name: getattr(learner.args, name) for name in KEPT}
-    torch.save({"agent": learner.agent.state_dict(), "optimizer": learner.optimizer.state_dict(), "log": log,
-                "update": learner.update_count, "digests": digests, "args": kept, "made_by": made_by(learner.device)},
-               out / "checkpoint.tmp")
-    os.replace(out / "checkpoint.tmp", out / "checkpoint.pt")
+    state = {"agent": learner.agent.state_dict(), "optimizer": learner.optimizer.state_dict(), "log": log,
+             "update": learner.update_count, "digests": digests, "args": kept, "made_by": made_by(learner.device)}
+    with aside(out / "checkpoint.pt") as part:
+        torch.save(state, part)
     write_log(out, log)
 
 
@@ -285,12 +287,9 @@ def resume(learner: Learner, out: pathlib.Path) -> list[dict[str, float]]:
     if not path.exists():
         begin_with(learner.args.begin_with, learner.args, learner.agent)
         return []
-    say_ignored(path, learner.args, learner.rank)
-    kept = checkpoint_of(path, learner.args, "folder for --out", learner.agent, KEPT)
-    now, then = made_by(learner.device), kept.get("made_by")
-    if then not in (None, now) and learner.rank == 0:
-        print(f"{path}: made by {then}, goes on by {now}. Bits may differ from those of one run.", file=sys.stderr)
-    learner.optimizer.load_state_dict(kept["optimizer"])
+    kept = resumed(path, learner.args, learner.agent, learner.optimizer, KEPT)
+    if learner.rank == 0:
+        say_ignored(path, kept, learner.args, learner.device)
     learner.update_count, learner.digest = kept["update"], kept["digests"][learner.rank]
     if learner.rank == 0:
         write_log(out, list(kept["log"]))
