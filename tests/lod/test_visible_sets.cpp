@@ -117,6 +117,25 @@ TEST_CASE("row weights: of a few Gaussians, what an image of each alone in white
         Errc::invalid_argument);
 }
 
+TEST_CASE("row weights: the same bits in lanes and without, in slices of depth and without") {
+  SerialBackend serial;
+  OpenMPBackend one(1), three(3);
+  RowWeightsWorkspace<SerialBackend> generic(serial);
+  RowWeightsWorkspace<OpenMPBackend> alone(one), together(three);
+  const GaussianCloud cloud = two_rooms(2, 4000);
+  const std::vector<Vec3d> eyes = places_in_rooms();
+  for (const Camera& camera : detail::cube_cameras(eyes[3], 1, 22, 0.2, 0)) {  // no whole blocks
+    std::vector<float> a(cloud.size()), b(a.size()), c(a.size());
+    REQUIRE(add_row_weights(serial, generic, cloud.set(), camera, a).ok());
+    REQUIRE(add_row_weights(one, alone, cloud.set(), camera, b).ok());
+    REQUIRE(add_row_weights(three, together, cloud.set(), camera, c).ok());
+    CHECK(a == b);
+    CHECK(a == c);
+    CHECK(std::count_if(a.begin(), a.end(), [](float w) { return w > 1e-3f; }) > 20);
+    CHECK(alone.render.slices.count() > 1);
+  }
+}
+
 TEST_CASE(
     "rows that may be seen are drawn as if the others were transparent: whole, in lanes, in slices, in "
     "double") {

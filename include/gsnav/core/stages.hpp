@@ -84,8 +84,9 @@ namespace stage {
 
 /// Runs a kernel once per item: kernel(i) for i in [0, n). A backend with precompiled kernels overloads
 /// `run` on the kernel's type. Those types, each of float, are ProjectMeshVertices, CountMeshTriangles,
-/// ScanMeshTriangles, WriteMeshTriangles, RasterizeMeshTile, ShadeMeshRow, CountTileIntersections and
-/// ScatterTileIntersections.
+/// ScanMeshTriangles, WriteMeshTriangles, RasterizeMeshTile, ShadeMeshRow, CountTileIntersections,
+/// ScatterTileIntersections and WeighTile. For WeighTile, a backend that draws in slices of depth must
+/// obey the progress in its arguments, as its Blend does.
 struct Each {
   /// Calls backend.parallel_for.
   template <Backend B, class Kernel>

@@ -15,7 +15,7 @@
 #include "gsnav/detail/frame/color_space.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
-#include "gsnav/detail/render/composite_steps.hpp"
+#include "gsnav/detail/render/blend_projected.hpp"
 #include "gsnav/detail/render/order_visible.hpp"
 #include "gsnav/detail/render/render_workspace.hpp"
 #include "gsnav/detail/render/rules.hpp"
@@ -85,6 +85,7 @@ void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> 
     chunks += set.drawn_chunk_count();
     ranked = ranked || !set.gaussians.row_ids.empty();
   }
+  ws.visible.by_rank = ranked;
   const std::size_t slots = chunks * kProjectChunk;
   const bool color = images.rgb != nullptr;
   const bool depth = meshes || images.depth_mode() != DepthMode::none;
@@ -92,7 +93,7 @@ void prepare_projection(RenderWorkspace<S, B>& ws, std::span<const GaussianSet> 
   ws.geometry.resize_discard(slots);
   ws.bounds.resize_discard(slots);
   ws.visible.chunk_keys.resize_discard(slots);
-  ws.visible.ranks.resize_discard(ranked ? slots : 0);
+  ws.visible.ranks.resize_discard(ranked || !ws.weights.empty() ? slots : 0);
   ws.colors.resize_discard(color ? slots : 0);
   ws.depths.resize_discard(depth ? slots : 0);
   ws.perspectives.resize_discard(config.response != Response::ewa ? slots : 0);
@@ -218,11 +219,7 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   raster.images = images;
   raster.progress = progress;
   raster.mesh = mesh;
-  if (mesh.empty()) {
-    run(backend, stage::Blend{}, raster);
-  } else {
-    detail::rasterize_composite(backend, raster);
-  }
+  blend_projected(backend, ws, config, raster);
 
   stats.visible += visible;
   stats.tile_intersections += intersections;

@@ -9,8 +9,8 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/status.hpp"
-#include "gsnav/detail/render/row_weights.hpp"
 #include "gsnav/detail/scene/seen_cells.hpp"
+#include "gsnav/detail/scene/seen_viewpoints.hpp"
 #include "gsnav/detail/scene/view_cells.hpp"
 #include "gsnav/detail/scene/visible_settings.hpp"
 #include "gsnav/image/camera.hpp"
@@ -108,12 +108,8 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
   const auto [sample, order, sampled] =
       detail::order_viewpoints(out.cells(), viewpoints.size(), with_sample, counts_for);
 
-  const GaussianSet set = cloud.set(world_from_asset);
-  RowWeightsWorkspace<B> workspace(backend);
-  std::vector<float> most(cloud.size());
-  std::vector<detail::RowBits> rows(out.cloud_chunks);
-  for (std::size_t done = 0; done < order.size(); ++done) {
-    const std::size_t v = order[done];
+  detail::SeenFromViewpoints<B> seen(backend, cloud.set(world_from_asset), viewpoints, settings);
+  for (std::size_t done = 0; done < order.size();) {
     if (done == sampled && !sample.empty()) {
       const double share = detail::sampled_share(found, sample, cloud.size());
       if (share > settings.most_share) {
@@ -122,22 +118,19 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
         return out;
       }
     }
-    std::fill(most.begin(), most.end(), 0.0f);
-    for (const Camera& camera : detail::cube_cameras(viewpoints[v], v, settings.face,
-                                                     settings.near_plane, settings.near_sigma)) {
-      if (Status s = add_row_weights(backend, workspace, set, camera, most); !s) return s;
-    }
-    backend.parallel_for(rows.size(), [&](std::size_t i) {
-      rows[i] = detail::seen_rows(most, i, settings.rows, settings.min_weight);
-    });
+    const std::size_t end = done < sampled ? sampled : order.size();
+    const auto which = std::span(order).subspan(done, std::min(seen.at_once(), end - done));
+    if (Status s = seen.look(which); !s) return s;
     backend.parallel_for(out.cells(), [&](std::size_t c) {
-      if (!counts_for(c, v)) return;
-      for (std::size_t i = 0; i < rows.size(); ++i) {
-        if (rows[i] != detail::RowBits{}) found[c].add(i, rows[i]);
+      for (std::size_t k = 0; k < which.size(); ++k) {
+        if (counts_for(c, which[k])) found[c].add(seen.rows(k));
       }
     });
-    if (settings.progress)
-      settings.progress(static_cast<double>(done + 1) / static_cast<double>(order.size()));
+    for (std::size_t k = 0; k < which.size(); ++k) {
+      ++done;
+      if (settings.progress)
+        settings.progress(static_cast<double>(done) / static_cast<double>(order.size()));
+    }
   }
   for (detail::SeenOfCell& of_cell : found) {
     of_cell.append_to(out.bits, settings.rows != 0);

@@ -31,6 +31,7 @@
 #include "gsnav/detail/frame/composite.hpp"
 #include "gsnav/detail/frame/project_chunk.hpp"
 #include "gsnav/detail/frame/tiles.hpp"
+#include "gsnav/detail/frame/weigh.hpp"
 #include "gsnav/detail/mesh/mesh_shade.hpp"
 #include "gsnav/detail/render/draw_frame.hpp"
 #include "gsnav/detail/render/instantiate.hpp"
@@ -73,6 +74,8 @@ struct LaneKernels {
   void (*rasterize_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
   /// Blends a tile of a frame with meshes.
   void (*composite_tile)(const RasterArgs<float>&, std::size_t tile) noexcept;
+  /// Weighs the Gaussians of a tile.
+  void (*weigh_tile)(const WeighTile&, std::size_t tile) noexcept;
   /// Projects a chunk of mesh vertices.
   void (*project_mesh_vertices)(const ProjectMeshVertices<float>&, std::size_t chunk) noexcept;
   /// Counts the visible pieces of a chunk of triangles.
@@ -180,6 +183,10 @@ class OpenMPBackend : public HostMemory {
   /// Blends a frame with meshes.
   void run(stage::BlendWithMeshes, const RasterArgs<float>& args) {
     parallel_for(args.grid.count(), Compiled{args, lane_kernels().composite_tile});
+  }
+  /// Weighs the Gaussians of a frame, also in slices of depth.
+  void run(stage::Each, std::size_t n, const WeighTile& k) {
+    parallel_for(n, Compiled{k, lane_kernels().weigh_tile});
   }
   /// Projects the vertices of meshes.
   void run(stage::Each, std::size_t n, const ProjectMeshVertices<float>& k) {

@@ -24,6 +24,13 @@ inline void composite_tile_any(const RasterArgs<float>& args, std::size_t tile) 
   });
 }
 
+/// Weighs the Gaussians of one tile.
+inline void weigh_tile(const WeighTile& kernel, std::size_t tile) noexcept {
+  TileBlender<false, DepthMode::none, Exp2::degree3, false, false, true>(kernel.args.raster, tile,
+                                                                         &kernel.args)
+      .blend();
+}
+
 /// Table of this instruction set's kernels (LaneKernels of backends/openmp.hpp).
 template <class Table>
 constexpr Table kernel_table(const char* name) noexcept {
@@ -36,6 +43,7 @@ constexpr Table kernel_table(const char* name) noexcept {
           .scatter_tiles_before_mesh = &scatter_tiles_before_mesh,
           .rasterize_tile = &rasterize_tile_any,
           .composite_tile = &composite_tile_any,
+          .weigh_tile = &weigh_tile,
           .project_mesh_vertices = &project_mesh_vertices,
           .count_mesh_triangles = &count_mesh_triangles,
           .write_mesh_triangles = &write_mesh_triangles,

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 #include "gsnav/detail/frame/composite.hpp"
+#include "gsnav/detail/frame/weigh.hpp"
 #include "gsnav/detail/image/pixel_center.hpp"
 #include "gsnav/detail/lanes/block_lists.hpp"
 #include "gsnav/detail/lanes/tile_pixels.hpp"
@@ -22,11 +25,11 @@ inline namespace GSNAV_LANES_TAG {
 /// tile ends when all blocks are closed.
 ///
 /// Per pixel, order and arithmetic equal those of RasterizePixel (of CompositePixel with `Mesh`), and so
-/// do the bits.
-template <bool Color, DepthMode D, Exp2 M, bool General, bool Mesh = false>
+/// do the bits. With `Weigh` it writes no image, but the largest weight of each splat (WeighTile).
+template <bool Color, DepthMode D, Exp2 M, bool General, bool Mesh = false, bool Weigh = false>
 class TileBlender {
   static constexpr DepthMode kLoop = TilePixels<Color, D, Mesh>::kLoop;
-  static constexpr bool kNeedsId = D != DepthMode::none || General || Mesh;
+  static constexpr bool kNeedsId = D != DepthMode::none || General || Mesh || Weigh;
 
   /// Values of a splat that blending reads, besides its column terms.
   struct Row {
@@ -47,8 +50,8 @@ class TileBlender {
   static constexpr int kNothing = kBatch, kStride = kBatch + 1;
 
  public:
-  TileBlender(const RasterArgs<float>& args, std::size_t tile) noexcept
-      : args_(args), tile_(tile), pixels_(args, tile) {}
+  TileBlender(const RasterArgs<float>& args, std::size_t tile, const WeighArgs* weigh = nullptr) noexcept
+      : args_(args), weigh_(weigh), tile_(tile), pixels_(args, tile) {}
 
   void blend() noexcept {
     const TileProgress<float>& progress = args_.progress;
@@ -73,10 +76,11 @@ class TileBlender {
           blend_list<false>(block, x, y);
         }
       });
+      if constexpr (Weigh) raise_weights(static_cast<int>(end - first < kBatch ? end - first : kBatch));
     }
     const bool done = progress.last || pixels_.open_count == 0;
     if (done) {
-      pixels_.write();
+      if constexpr (!Weigh) pixels_.write();
     } else {
       pixels_.keep();
     }
@@ -94,6 +98,7 @@ class TileBlender {
       if (static_cast<std::uint64_t>(j) + kAhead < left) {
         const std::uint32_t next = ids[static_cast<std::uint64_t>(j) + kAhead];
         __builtin_prefetch(&args_.geometry[next]);
+        if constexpr (Weigh) __builtin_prefetch(&weigh_->ranks[next]);
         if constexpr (Color) __builtin_prefetch(&args_.colors[next]);
       }
       const SplatGeometry<float>& g = args_.geometry[ids[j]];
@@ -101,7 +106,13 @@ class TileBlender {
       rows_[j].ref_y = g.ref_y;
       rows_[j].b = g.b;
       if constexpr (Color) rows_[j].color = args_.colors[ids[j]];
-      if constexpr (kNeedsId) ids_[j] = ids[j];
+      if constexpr (Weigh) {
+        ids_[j] = weigh_->ranks[ids[j]];
+        __builtin_prefetch(&weigh_->most[ids_[j]], 1);
+        weights_[j] = F(0.0f);
+      } else if constexpr (kNeedsId) {
+        ids_[j] = ids[j];
+      }
       if constexpr (Mesh) rows_[j].far = farthest_depth(args_.depths[ids[j]]);
     }
     if constexpr (kNeedsId) ids_[kNothing] = ids[0];  // unused, but must be a valid index
@@ -152,9 +163,11 @@ class TileBlender {
         }
       }
       if constexpr (Near) last = last_above_half(state.transmittance, F(rows[j].number), last);
+      [[maybe_unused]] const F open = state.transmittance;
       blend_alpha<Color, kLoop, General>(state, rules, alpha, &rows[j].color,
                                          kLoop == DepthMode::none ? nullptr : &args_.depths[ids_[j]], px,
                                          py);
+      if constexpr (Weigh) weights_[j] = max(weights_[j], open - state.transmittance);
     };
     if constexpr (General) {
       for (int i = 0; i < n; ++i) {
@@ -203,14 +216,27 @@ class TileBlender {
     }
   }
 
+  /// Hands out the weights of a batch of n splats.
+  void raise_weights(int n) noexcept {
+    for (int j = 0; j < n; ++j) {
+      // Weights are not negative, so that their order is that of their bits.
+      std::uint32_t bits[kWidth], largest = 0;
+      std::memcpy(bits, &weights_[j], sizeof bits);
+      for (const std::uint32_t b : bits) largest = largest > b ? largest : b;
+      weigh_->raise(ids_[j], std::bit_cast<float>(largest));
+    }
+  }
+
   const RasterArgs<float>& args_;
+  const WeighArgs* weigh_;
   std::size_t tile_;
   TilePixels<Color, D, Mesh> pixels_;
   Unset<SplatGeometry<float>, kBatch> geometry_;
   Unset<Row, kStride> rows_;
-  std::uint32_t ids_[kNeedsId ? kStride : 1];
+  std::uint32_t ids_[kNeedsId ? kStride : 1];  // slots, or ranks if splats are weighed
   Unset<Columns, General ? 1 : kParts * kStride> columns_;
   BlockLists lists_;
+  Unset<F, Weigh ? kStride : 1> weights_;  ///< of each splat of the batch, in each lane
 };
 
 }  // namespace GSNAV_LANES_TAG

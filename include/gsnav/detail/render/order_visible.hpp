@@ -52,6 +52,7 @@ struct VisibleOrder {
   Buffer<std::uint64_t, B> offsets;  ///< [chunks], first index of each chunk; used if the host cannot
                                      ///< read `counts`
   SortScratch<B> sort;
+  bool by_rank = false;  ///< Equal keys go by rank. Otherwise they go by slot, whatever the ranks.
   std::vector<std::uint32_t> host_counts;
   std::vector<std::uint64_t> host_offsets;
 
@@ -239,7 +240,7 @@ Result<std::size_t> order_visible(B& backend, VisibleOrder<B>& v, std::uint32_t 
                                                    v.offsets.view(), v.keys.view(), v.order.view()});
     sort_pairs(backend, v.keys, v.order, v.sort, bits);
   }
-  if (v.ranks.size() != 0)
+  if (v.by_rank)
     detail::sort_ties(backend, detail::PairTies{v.keys.view(), v.ranks.view(), v.order.view()});
   return visible;
 }
@@ -271,8 +272,10 @@ requires is_host_backend<B> View<const std::uint64_t> order_entries(B& backend, 
   detail::sort_visible(backend, v, {v.counts.view(), v.taken.view(), visible}, range, base,
                        detail::EntryRecord{entry, v.words.view(), dropped}, entry.key_shift(), bits,
                        detail::RecordSink{entries});
-  if (dropped != 0 || v.ranks.size() != 0)
-    detail::sort_ties(backend, detail::EntryTies{v.chunk_keys.view(), v.ranks.view(), entry, entries});
+  if (dropped != 0 || v.by_rank) {
+    const View<const std::uint32_t> ranks = v.by_rank ? v.ranks.view() : View<std::uint32_t>();
+    detail::sort_ties(backend, detail::EntryTies{v.chunk_keys.view(), ranks, entry, entries});
+  }
   return {entries.data, entries.size};
 }
 

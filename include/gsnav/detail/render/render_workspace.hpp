@@ -38,6 +38,9 @@ struct RenderWorkspace : ScratchMemory<RenderWorkspace<S, B>> {
                                             ///< has the state of each pixel
   Buffer<S, B> states{*backend};
   DepthSlices slices;
+  /// If not empty: render_frame draws no images, but raises these values of all rows to the largest
+  /// share of a pixel that each contributes (WeighArgs). Host backends only, in float, without meshes.
+  View<float> weights;
   MeshWorkspace<S, B> mesh{*backend};
   FragmentWorkspace<S, B> fragments{*backend};
   /// Alpha and depth of the Gaussians alone, for Composite::hard_depth.

@@ -89,6 +89,13 @@ class SeenOfCell {
     for (std::size_t k = 0; k < kSeenRowWords; ++k) to[k] |= rows[k];
   }
 
+  /// Adds the rows of all chunks, [chunks].
+  void add(std::span<const RowBits> rows) {
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      if (rows[i] != RowBits{}) add(i, rows[i]);
+    }
+  }
+
   /// Number of Gaussians seen.
   std::size_t count() const noexcept {
     std::size_t sum = 0;

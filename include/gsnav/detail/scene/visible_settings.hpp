@@ -43,7 +43,7 @@ struct VisibleSettings {
     near_sigma = camera.near_sigma;
   }
   /// Called after each viewpoint with the share of the work that is done, in [0, 1], by the calling
-  /// thread.
+  /// thread. Several threads look from several viewpoints first, and the calls for these come together.
   std::function<void(double)> progress{};
 };
 
