@@ -23,14 +23,18 @@ Run = Sequence[Mapping[str, float]]  # rows of log.csv
 def read_run(log: pathlib.Path) -> list[dict[str, float]]:
     """Rows of a log.csv."""
     rows: list[dict[str, float]] = []
-    with open(log, newline="") as file:
-        for line in csv.DictReader(file):
-            rows.append({})
-            for name, value in line.items():
-                try:
-                    rows[-1][name] = float(value)
-                except (TypeError, ValueError):
-                    raise ValueError(f"{log}, row {len(rows)}: {name} is {value!r}, not a number") from None
+    try:
+        with open(log, newline="") as file:
+            lines = list(csv.DictReader(file))
+    except (UnicodeError, csv.Error) as e:
+        raise ValueError(f"{log}: no table of numbers: {e}") from None
+    for line in lines:
+        rows.append({})
+        for name, value in line.items():
+            try:
+                rows[-1][name] = float(value)
+            except (TypeError, ValueError):
+                raise ValueError(f"{log}, row {len(rows)}: {name} is {value!r}, not a number") from None
     if not rows:
         raise ValueError(f"{log} has no rows")
     return rows
@@ -77,7 +81,7 @@ def main() -> None:
     args = p.parse_args()
     try:
         logs = {log.resolve(): read_run(log) for log in args.logs}
-    except (OSError, ValueError, csv.Error) as e:
+    except (OSError, ValueError) as e:
         sys.exit(f"pointnav_curves.py: {e}")
     folders = [log.parent for log in logs]
     names = [log.parent.name if folders.count(log.parent) == 1 else log.stem for log in logs]

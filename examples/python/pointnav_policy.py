@@ -114,8 +114,9 @@ def load(path: pathlib.Path, option: str = "--weights") -> Policy:
 def arrays_of(path: pathlib.Path) -> dict[str, Array]:
     """The arrays of a file .npz."""
     arrays: dict[str, Array] = {}
-    if not zipfile.is_zipfile(path):
-        raise ValueError("it is no file .npz, or only a part of one")
+    with open(path, "rb") as opened:
+        if not zipfile.is_zipfile(opened):
+            raise ValueError("it is no file .npz, or only a part of one")
     with np.load(path, allow_pickle=False) as file:
         for name in file.files:
             try:
@@ -190,5 +191,5 @@ def checked(weights: dict[str, Array], size: int) -> Policy:
 def save(policy: Policy, path: pathlib.Path) -> None:
     """Writes the weights as numbers of 16 bits, without those of the value, to a file .npz."""
     kept: dict[str, Any] = {name: w.astype(np.float16) for name, w in policy.weights.items() if name[:5] != "value"}
-    with aside(path) as part:
-        np.savez_compressed(part, **kept, size=np.int32(policy.size))
+    with aside(path) as part, open(part, "wb") as file:
+        np.savez_compressed(file, **kept, size=np.int32(policy.size))

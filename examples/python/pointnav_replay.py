@@ -191,6 +191,8 @@ def main() -> None:
         p.error(f"--out {args.out}: the name must end in .webp")
     if not args.out.absolute().parent.is_dir():
         p.error(f"--out {args.out}: there is no folder {args.out.parent}")
+    if args.out.is_dir():
+        p.error(f"--out {args.out}: is a folder")
     args.device = device_of(args.device).name
     policy = load(args.weights)
     args.size, args.sensor = policy.size, sensor_of(policy)

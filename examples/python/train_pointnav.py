@@ -274,6 +274,7 @@ def save(learner: Learner, log: list[dict[str, float]], out: pathlib.Path) -> No
     if learner.rank:
         return
     kept = {name: getattr(learner.args, name) for name in KEPT}
+    # resume() reads all of it, and pointnav_checkpoint.py checks it there.
     state = {"agent": learner.agent.state_dict(), "optimizer": learner.optimizer.state_dict(), "log": log,
              "update": learner.update_count, "digests": digests, "args": kept, "made_by": made_by(learner.device)}
     with aside(out / "checkpoint.pt") as part:

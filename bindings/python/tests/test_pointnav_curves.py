@@ -62,9 +62,11 @@ def test_no_run_is_lost_where_names_are_equal(tmp_path, lines_of):
 
 def test_errors_name_the_file_and_the_field(tmp_path):
     good, word = log_of(tmp_path / "good", [0.5] * 12), log_of(tmp_path / "word", [0.5, "high"])
-    empty = log_of(tmp_path / "empty", [])
+    empty, binary = log_of(tmp_path / "empty", []), log_of(tmp_path / "binary", [])
+    binary.write_bytes(b"frames,spl\n\xff\xfe,1\n")
     for words, text in [((good,), "has no column success"), ((word, "--metrics", "spl"), "row 2: spl is 'high'"),
-                        ((empty,), "has no rows"), ((tmp_path / "none.csv",), "No such file"),
+                        ((empty,), "has no rows"), ((binary,), f"{binary}: no table of numbers: 'utf-8' codec"),
+                        ((tmp_path / "none.csv",), "No such file"),
                         ((good, "--metrics", "spl", "--mean", "13"), "--mean is 13"),
                         ((good, "--metrics", "spl", "--mean", "0"), "--mean is 0")]:
         tried = run(*words)
