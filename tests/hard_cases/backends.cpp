@@ -116,11 +116,28 @@ void expect_regions() {
   (void)once;
 }
 
-/// Renders by CudaBatchRenderer: by tiles, or by lists of regions where the frame allows them. What no
-/// batch supports is rendered by BasicRenderer.
+/// How a batch is drawn: by the small tiles of few cameras, by the tiles of many cameras, or by lists of
+/// regions where the frame allows them.
+enum class BatchWay { few, many, regions };
+
+/// The most tiles of a call of few cameras with small images, on any GPU or on the emulated one.
+std::size_t most_of_few() { return is_emulated() ? 32 * 4 : 32 * 192; }
+
+/// Cameras that see nothing, so many that a call with them and `cameras` is none of few cameras. An
+/// image of more than 512 tiles never is.
+std::vector<Camera> blind_cameras(const std::vector<Camera>& cameras) {
+  const std::size_t tiles = TileGrid::of(cameras[0].width, cameras[0].height, 16).count();
+  const std::size_t wanted = (most_of_few() + tiles) / tiles;
+  if (tiles > 512 || wanted <= cameras.size()) return {};
+  Camera blind = cameras[0];
+  blind.near_plane = 1e30;
+  return std::vector<Camera>(wanted - cameras.size(), blind);
+}
+
+/// Renders by CudaBatchRenderer. What no batch supports is rendered by BasicRenderer.
 class BatchCases final : public CaseImages<float> {
  public:
-  BatchCases(const char* name, bool by_regions) : CaseImages<float>(name), by_regions_(by_regions) {}
+  BatchCases(const char* name, BatchWay way) : CaseImages<float>(name), way_(way) {}
 
   using CaseImages<float>::render;
   Frames<float> render(const std::vector<Placed>& scene, const std::vector<Camera>& cameras,
@@ -146,17 +163,26 @@ class BatchCases final : public CaseImages<float> {
       renderer.set_meshes(meshes.instances);
       return renderer.render(sets, cameras).value();
     }
+    std::vector<Camera> all = cameras;
+    if (way_ == BatchWay::many) {
+      const std::vector<Camera> blind = blind_cameras(cameras);
+      all.insert(all.end(), blind.begin(), blind.end());
+    }
     const auto drawn = [&](unsigned outputs, bool by_regions) {
       CudaBatchRenderer renderer(cuda_, config);
-      renderer.set_least_of_regions(by_regions ? 1 : cameras.size() + 1, 0);
-      Batch batch = draw_batch(cuda_, renderer, sets, cameras, {}, outputs, false,
-                               std::vector<MeshFrame>(cameras.size(), meshes));
+      renderer.set_least_of_regions(by_regions ? 1 : all.size() + 1, 0);
+      Batch batch = draw_batch(cuda_, renderer, sets, all, {}, outputs, false,
+                               std::vector<MeshFrame>(all.size(), meshes));
       if (batch.stats.by_regions) by_regions_somewhere = true;
+      for_each_image(batch.frames, batch.frames, [&](std::vector<float>& image, const auto&) {
+        image.resize(image.size() / all.size() * cameras.size());
+      });
       return std::move(batch.frames);
     };
     // Regions draw no depths but the median, so that the others are drawn by tiles.
-    const unsigned by_tiles = by_regions_ ? config.outputs & kAnyDepth & ~kMedianDepth : 0u;
-    Frames<float> frames = drawn(config.outputs & ~by_tiles, by_regions_);
+    const bool regions = way_ == BatchWay::regions;
+    const unsigned by_tiles = regions ? config.outputs & kAnyDepth & ~kMedianDepth : 0u;
+    Frames<float> frames = drawn(config.outputs & ~by_tiles, regions);
     if (by_tiles != 0) {
       Frames<float> rest = drawn(by_tiles, false);
       frames.expected_depth = std::move(rest.expected_depth);
@@ -170,7 +196,7 @@ class BatchCases final : public CaseImages<float> {
     return frames;
   }
 
-  bool by_regions_;
+  BatchWay way_;
   CudaBackend cuda_;
 };
 
@@ -207,8 +233,9 @@ void visit_renderers(const std::function<void(CaseImages<float>&)>& in_float,
     return;
   }
   expect_regions();
-  run_if_wanted(BatchCases("cuda tiles float", false), in_float);
-  run_if_wanted(BatchCases("cuda regions float", true), in_float);
+  run_if_wanted(BatchCases("cuda tiles float", BatchWay::few), in_float);
+  run_if_wanted(BatchCases("cuda many float", BatchWay::many), in_float);
+  run_if_wanted(BatchCases("cuda regions float", BatchWay::regions), in_float);
 #endif
 }
 
