@@ -284,6 +284,9 @@ TEST_CASE("N53_tile_max_mesh_cull of chunks, before they are projected") {
       532, {.count = 1500, .sh_degree = 1, .scale = 0.3, .center = {0, 0, 6}, .extent = 4}));
   const GaussianCloud placed = sorted(random_cloud(533, {.count = 4000, .sh_degree = 0, .scale = 0.05}));
   const Similarity place{{0.8, 0.2, -0.5, 0.26457513110645907}, {0.3, -0.2, 4}, 1.5};
+  // Chunks beside the window that the wall cuts: none of them is hidden.
+  const GaussianCloud cut = sorted(random_cloud(
+      534, {.count = 1500, .sh_degree = 0, .scale = 0.1, .center = {-1.9, 0, 2.8}, .extent = 0.6}));
   SurfaceMesh wall;
   wall.two_sided = true;
   for (const auto& [x0, x1] : {std::pair{-9.0f, 0.4f}, std::pair{0.9f, 9.0f}}) {
@@ -299,7 +302,7 @@ TEST_CASE("N53_tile_max_mesh_cull of chunks, before they are projected") {
   for (const double f : {30.0, 64.0, 200.0}) {
     const Camera camera = axis_camera(90, f);
     CaseRenderer<float, SerialBackend> reference("serial float");
-    const std::vector<Placed> scene{&rooms, &large, {&placed, place}};
+    const std::vector<Placed> scene{&rooms, &large, {&placed, place}, &cut};
     const auto all =
         reference.render(scene, {camera}, config, mesh.instances);  // which projects every chunk
     for_each_renderer([&](auto& renderer) {

@@ -182,8 +182,11 @@ TEST_CASE("N06_det_flat_edge_on") {
     CHECK(worst < 2e-6);
     MESSAGE(name << ": det is off by " << worst);
   });
+}
 
-  // The images of a disk edge-on, and of points, are finite; along its plane the depth is the centre's.
+TEST_CASE("N06_det_flat_edge_on in images") {
+  // Those of a disk edge-on, and of points, are finite; along its plane the depth is the centre's.
+  const Camera camera = axis_camera(63, 64);
   RawGaussian disk = gaussian({0, 0, 3}, {0, 0.2, 0.2}, 0.9);
   const GaussianCloud cloud = cloud_of({disk, gaussian({0.5, 0.5, 3}, {2e-9, 2e-9, 2e-9}, 0.9),
                                         gaussian({-0.5, 0.5, 3}, {0, 0, 0}, 0.9)});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// N21 to N24, N77 to N79: which Gaussian is in front.
+// N21 to N24, N77 to N80: which Gaussian is in front.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -9,6 +9,7 @@
 #include "gsnav/detail/math/pack_double.hpp"
 #include "hard_cases/backends.hpp"
 #include "hard_cases/cases.hpp"
+#include "hard_cases/truth.hpp"
 #include "support/oracle.hpp"
 #include "support/sanitized.hpp"
 #include "support/scenes.hpp"
@@ -272,8 +273,10 @@ TEST_CASE("N23_key_wide_range") {
     const double few = image_error(renderer.render({&cloud}, camera, config).rgb, full.rgb, 3).psnr;
     MESSAGE(renderer.name() << ": key of 24 bits " << psnr << " dB, of 16 bits " << few << " dB");
   });
-  // What is compared is the key from the near plane on, to 2^16 times as far and beyond: never out of
-  // order.
+}
+
+TEST_CASE("N23_key_wide_range of codes: never out of order") {
+  // What is compared is the key from the near plane on, to 2^16 times as far and beyond.
   for (const int bits : {8, 16, 20, 24, 27, 30, 31, 32}) {
     const KeyCode code = KeyCode::of(bits, 0.2f);
     std::uint32_t last = 0;
@@ -290,6 +293,78 @@ TEST_CASE("N23_key_wide_range") {
     if (bits < 32) CHECK(code(std::nextafter(0.2f, 0.0f)) == 0);
     CHECK(code(std::nextafter(0.2f, 0.0f)) <= code(0.2f));
   }
+}
+
+TEST_CASE("N80_two_scales: sets in the order of depth, or of distance") {
+  // Wide Gaussians over a wide image, where depth and distance differ by a third. The camera is at the
+  // origin, so that a set keeps its image when it is placed larger, and its centres move away.
+  Rng rng(74);
+  const Camera camera = [] {
+    Camera c;
+    c.set_hfov(40, 30, 100);
+    return c;
+  }();
+  const auto some = [&rng] {
+    std::vector<RawGaussian> gs;
+    for (int i = 0; i < 14; ++i) {
+      const double z = rng.uniform(2, 4);
+      gs.push_back(gaussian({rng.uniform(-1, 1) * z, rng.uniform(-0.7, 0.7) * z, z}, {z, z, 0.1}, 0.25,
+                            {static_cast<float>(rng.normal()), static_cast<float>(rng.normal()), 0}));
+      gs.back().quat = random_rotation(rng);
+    }
+    return cloud_of(gs);
+  };
+  const GaussianCloud small = some(), large = some();
+  constexpr double kScale = 1.5;
+  struct Layer {
+    Real key;
+    Truth2d shape;
+    Real red;
+  };
+  std::vector<double> reds[2];
+  for (const SortOrder order : {SortOrder::z_depth, SortOrder::camera_distance}) {
+    std::vector<Layer> layers;
+    for (const auto& [cloud, scale] : {std::pair{&small, 1.0}, std::pair{&large, kScale}}) {
+      for (std::size_t i = 0; i < cloud->size(); ++i) {
+        const Vec3d at = cloud->mean(i) * scale;
+        layers.push_back({order == SortOrder::z_depth ? at.z : norm(at),
+                          truth_project(truth_of(*cloud, i), camera),
+                          std::max(0.0L, 0.5L + static_cast<Real>(kSh0) * cloud->sh0[3 * i])});
+      }
+    }
+    std::sort(layers.begin(), layers.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
+    std::vector<double>& red = reds[order == SortOrder::z_depth ? 0 : 1];
+    std::vector<bool> undecided;
+    for (int p = 0; p < camera.width * camera.height; ++p) {
+      Real sum = 0, transmittance = 1;
+      bool at_threshold = false;
+      for (const Layer& l : layers) {
+        const Real alpha = l.shape.alpha(p % camera.width + 0.5L, p / camera.width + 0.5L);
+        at_threshold = at_threshold || std::abs(alpha * 255 - 1) < 1e-3L;
+        if (alpha * 255 < 1) continue;
+        sum += alpha * transmittance * l.red;
+        transmittance *= 1 - alpha;
+      }
+      REQUIRE(transmittance > 1e-4L);
+      red.push_back(static_cast<double>(sum));
+      undecided.push_back(at_threshold);
+    }
+    RenderConfig config;
+    config.sort_order = order;
+    const Placed placed(&large, {{}, {}, kScale});
+    render_everywhere({&small, placed}, camera, config, [&](const auto& f, const auto& renderer) {
+      double worst = 0;
+      for (std::size_t p = 0; p < red.size(); ++p) {
+        if (!undecided[p]) worst = std::max(worst, std::abs(static_cast<double>(f.rgb[3 * p]) - red[p]));
+      }
+      CHECK(worst < renderer.bound(1e-5, 1e-9));
+    });
+  }
+  // The orders differ, and so do the images.
+  double apart = 0;
+  for (std::size_t p = 0; p < reds[0].size(); ++p)
+    apart = std::max(apart, std::abs(reds[0][p] - reds[1][p]));
+  CHECK(apart > 0.01);
 }
 
 TEST_CASE("N24_neg_zero_depth") {
