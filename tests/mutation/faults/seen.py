@@ -5,6 +5,8 @@ from . import fault
 VISIBLE_TEST = "tests/lod/test_visible_sets.cpp"
 DRAWN = "rows that may be seen are drawn*"
 RUNS = "visible sets: rows in runs*"
+WALL = "visible sets: what is behind a wall*"
+WEIGHTS = "row weights: the same bits*"
 
 FAULTS = [
     fault("rows_of_lanes_all_seen", "bits",
@@ -25,4 +27,11 @@ FAULTS = [
     fault("a_chunk_by_its_last_viewpoint", "add",
           "    for (std::size_t k = 0; k < kSeenRowWords; ++k) to[k] |= rows[k];\n", "    to = rows;\n",
           VISIBLE_TEST, "visible sets: a further viewpoint*", why="the last that looked counts alone"),
+    fault("weights_of_the_last_block", "blend_list",
+          "weights_[j] = max(weights_[j], open - state.transmittance);", "weights_[j] = open - state.transmittance;",
+          VISIBLE_TEST, WEIGHTS, why="the largest weight is wanted, not that of the block that comes last"),
+    fault("weights_of_viewpoints_before", "look_from",
+          "worker.most.assign(set_.gaussians.size(), 0.0f);", "worker.most.resize(set_.gaussians.size());",
+          VISIBLE_TEST, WALL, why="a thread looks from many viewpoints, one after the other"),
+    fault("viewpoints_share_their_rows", "look", "rows_[k]", "rows_[0]", VISIBLE_TEST, WALL),
 ]
