@@ -10,12 +10,13 @@ so nothing is built before. A .cu needs the emulated CUDA runtime, and a fault t
 backend. First every named case must pass on the sources as they are; then the cases of each fault must fail, on each
 backend by itself where the fault names backends. Exit status: 0 all faults are caught, 1 one is missed, 2 no verdict
 (the tokens do not stand in the function exactly once, a fault does not compile, a case fails without a fault).
---check only looks whether each fault has its place, and whether headers of tests declare nothing that another file
-instantiates: a second, and a test of every build. With `--cxx "ccache c++"`, what a fault does not change is compiled
-once.
+--check only looks whether each fault has its place and its cases, and whether headers of tests declare nothing that
+another file instantiates: a second, and a test of every build. With `--cxx "ccache c++"`, what a fault does not change
+is compiled once.
 """
 import argparse
 import concurrent.futures
+import fnmatch
 import importlib
 import os
 import pathlib
@@ -184,6 +185,14 @@ def misplaced(sources, fault):
     return next((why for e in fault.edits if (why := place_of(sources, e)[1])), "")
 
 
+def absent_cases(fault):
+    """The cases of a fault that its test does not have."""
+    string = r'"((?:[^"\\]|\\.)*)"'
+    written = re.findall(rf"\bTEST_CASE\(\s*((?:{string}\s*)+)\)", (ROOT / fault.source).read_text())
+    names = ["".join(re.findall(string, parts)) for parts, _ in written]
+    return [f"{fault.name}: {fault.source} has no case {c}" for c in fault.cases if not fnmatch.filter(names, c)]
+
+
 def apply(tree, fault):
     for e in fault.edits:
         place, why = place_of(Sources(tree), e)
@@ -252,6 +261,7 @@ def main():
     if args.check:
         sources = Sources(ROOT)
         wrong = [f"{f.name}: {w}" for f in faults if (w := misplaced(sources, f))] + left_declarations()
+        wrong += sum(map(absent_cases, faults), [])
         print("\n".join(wrong) or f"{len(faults)} faults have their place")
         return 2 if wrong else 0
     if not faults:

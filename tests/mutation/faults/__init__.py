@@ -2,8 +2,10 @@
 """Seeded faults, and the test cases that must notice them (tests/mutation/mutate.py).
 
 Each module here has a list FAULTS. The tokens to replace stand once in the function, whatever its file. A fault of a
-rule that several backends use names them in `on`: the cases must fail on each of them alone. A test that is device
-code (.cu) runs on the emulated CUDA runtime.
+rule that several backends use names them in `on`: the cases must fail on each of them alone. A fault names none if its
+rule comes before a backend is asked (files, motion), if its case judges a formula in every lane type without a
+renderer, or if its case compares backends with each other. A test that is device code (.cu) runs on the emulated CUDA
+runtime.
 """
 from __future__ import annotations
 
@@ -16,6 +18,10 @@ BACKENDS = ("serial", "openmp", "cuda float")
 # the median.
 BY_TILES = ("serial", "openmp", "cuda float", "cuda tiles")
 EVERY = ("serial", "openmp", "cuda float", "cuda tiles", "cuda regions")
+# Small images of few cameras have small tiles, lists in bins and a kernel of their own. "cuda many" draws the same
+# images among many cameras, as large images are drawn.
+BY_ALL_TILES = (*BY_TILES, "cuda many")
+EVERY_WAY = (*EVERY, "cuda many")
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Naive ways of drawing meshes, and of putting them among Gaussians (docs/reference/composition.md)."""
-from . import fault
+from . import BACKENDS, BY_ALL_TILES, fault
 
 MESH = "tests/ops/test_mesh.cpp"
 CASES = "tests/hard_cases/test_composite.cpp"
@@ -23,24 +23,26 @@ FAULTS = [
           "x(fma(L(lens.fx), u, L(lens.cx) + L(scalar_of<L>(0.5))))", MESH, RAYS),
     fault("mesh_ignored", "alpha_before_mesh", "behind(ray_depth(depth, px, py), mesh)",
           "behind(ray_depth(depth, px, py), mesh + L(S(1e9)))",
-          CASES, "N49_mesh_between_layers", "N50_mesh_straddle_cloud", why="Gaussians behind a mesh are seen"),
+          CASES, "N50_mesh_straddle_cloud", why="Gaussians behind a mesh are seen",
+          on=BY_ALL_TILES),
     fault("mesh_by_centres", "alpha_before_mesh", "behind(ray_depth(depth, px, py), mesh)", "behind(L(depth.z), mesh)",
-          CASES,
-          "N50_mesh_straddle_cloud", "N51_avatar_touching_wall", why="one depth a splat, wherever the ray meets it"),
+          CASES, "N50_mesh_straddle_cloud", "N51_avatar_touching_wall",
+          why="one depth a splat, wherever the ray meets it", on=BY_ALL_TILES),
     fault("fragment_by_centres", "blend_within", "const S z = ray_depth(depth, px, py);",
-          "const S z = depth.z;", PANES, "N73_pane_cuts_splats", "N74_panes_any",
-          why="a pane is before or behind a whole splat"),
+          "const S z = depth.z;", PANES, "N73_pane_cuts_splats*",
+          why="a pane is before or behind a whole splat", on=BACKENDS),
     fault("fragments_unsorted", "insert", "i > 0 && list[i - 1].depth > f.depth", "false", PANES,
-          "N71_panes_between_layers", "N74_panes_any", "N76_many_panes"),
+          "N71_panes_between_layers*", "N76_many_panes*", on=BACKENDS),
     fault("fragments_behind", "for_each_fragment", "z <= args.behind[pixel] && ", "", PANES,
-          "N71_panes_between_layers"),
+          "N71_panes_between_layers*", on=BACKENDS),
     fault("mask_ignored", "mesh_hole", "return t.masked && surface_hole", "return false && surface_hole", PANES,
-          "holes that a mask cuts", "N74_panes_any"),
+          "holes that a mask cuts*"),
     fault("mesh_leaves_alpha", "blend_surface",
           "state.transmittance = select(state.transmittance < L(S(0)), -after, after);", "",
           CASES,
-          "N49_mesh_between_layers"),
-    fault("mesh_cull_by_centre", "behind", "d.z - d.reach > depth", "d.z > depth", CASES, "N53_tile_max_mesh_cull"),
+          "N49_mesh_between_layers", on=BY_ALL_TILES),
+    fault("mesh_cull_by_centre", "behind", "d.z - d.reach > depth", "d.z > depth", CASES, "N53_tile_max_mesh_cull",
+          on=BACKENDS),
     fault("mesh_chunk_without_reach", "nearest_reach", "* (1 - 1e-6) - reach * (1 + 1e-5);",
-          "+ reach;", CASES, "N53_tile_max_mesh_cull of chunks, before they are projected"),
+          "+ reach;", CASES, "N53_tile_max_mesh_cull of chunks, before they are projected", on=("openmp",)),
 ]

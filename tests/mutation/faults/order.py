@@ -1,31 +1,34 @@
 # SPDX-License-Identifier: Apache-2.0
 """Footprints, keys and order."""
-from . import BY_TILES, EVERY, fault
+from . import BY_TILES, EVERY, EVERY_WAY, fault
 
 FOOTPRINT = "tests/hard_cases/test_footprint.cpp"
 ORDER = "tests/hard_cases/test_order.cpp"
 KEYS = "tests/hard_cases/test_keys.cpp"
 CULLING = "tests/hard_cases/test_culling.cpp"
+STACK = "tests/hard_cases/test_stack.cpp"
+NORMALIZED = "normalize_closed: a closed pixel is divided by its alpha, an open one is not"
+TWO_SCALES = "N80_two_scales: sets in the order of depth, or of distance"
 N11_ALPHA = "N11_tile_cover_conservative in images: few needles*"
 
 FAULTS = [
     fault("three_sigma_box", "project",
           "    const L radius = sqrt(max(out.s_max, L(S(0))));\n",
           "    const L radius(S(3 * kWhitenScale));\n",
-          FOOTPRINT, "N11_tile_cover_conservative",
-          why="3 sigma is less than alpha = 1/255 of an opaque Gaussian"),
+          FOOTPRINT, N11_ALPHA,
+          why="3 sigma is less than alpha = 1/255 of an opaque Gaussian", on=EVERY),
     fault("mean_radius_box", "project",
           "out.half_width = fma(radius / out.a, L(S(1.00001)), pad_x);",
           "out.half_width = fma(radius * sqrt(L(S(0.5)) * (big_a + big_c)) * L(S(1.0 / kWhitenScale)), "
           "L(S(1.00001)), pad_x);",
-          FOOTPRINT, "N11_tile_cover_conservative"),
+          FOOTPRINT, N11_ALPHA, on=EVERY),
     fault("strip_edges_only", "columns",
           "    const L y_right = select(negative_k_, at_k, against_k);\n"
           "    const L y_left = select(negative_k_, against_k, at_k);\n",
           "    const L y_right = select(negative_k_, high, low);\n"
           "    const L y_left = select(negative_k_, low, high);\n",
-          FOOTPRINT, "N11_tile_cover_conservative",
-          why="the widest point of an ellipse may lie inside the strip"),
+          FOOTPRINT, N11_ALPHA,
+          why="the widest point of an ellipse may lie inside the strip", on=BY_TILES),
     fault("strip_turned_wrong", "columns",
           "    const L y_right = select(negative_k_, at_k, against_k);\n",
           "    const L y_right = select(negative_k_, against_k, at_k);\n",
@@ -34,7 +37,7 @@ FAULTS = [
           "    const double reach = axis.f * bounds.scale_max * axis.slant();\n",
           "    const double reach = 0 * axis.f * bounds.scale_max * axis.slant();\n",
           CULLING, "N65_cull_invariance of chunks in space",
-          why="a Gaussian beside the image reaches into it"),
+          why="a Gaussian beside the image reaches into it", on=EVERY),
     fault("side_of_the_image_by_means", "ImageSide", "extent - c + margin", "c - extent + margin",
           CULLING, "N65_cull_invariance of chunks in space", on=EVERY),
     fault("slice_of_the_middle", "bucket_of",
@@ -54,19 +57,19 @@ FAULTS = [
     fault("ties_in_sorted_order", "sort_run",
           "  sort_in_place(ties.items.data + i, after - i,\n"
           "                [&ties](auto a, auto b) GSNAV_INLINED { return ties.less(a, b); });\n", "",
-          CULLING, "N21_depth_ties_keep_file_order when rows are sorted in space"),
+          CULLING, "N21_depth_ties_keep_file_order when rows are sorted in space", on=("openmp",)),
     fault("perspective_box_centred", "add_perspective",
           "  out.center_x = select(ellipse, center_x, zero);\n"
           "  out.center_y = select(ellipse, center_y, zero);\n",
           "  out.center_x = select(ellipse, out.mean_x, zero);\n"
           "  out.center_y = select(ellipse, out.mean_y, zero);\n",
-          FOOTPRINT, "N11_tile_cover_conservative",
-          why="under perspective the mean is a focus, not the centre"),
+          FOOTPRINT, "N19_offscreen_rod_fan",
+          why="under perspective the mean is a focus, not the centre", on=BY_TILES),
     fault("key_rounded_early", "depth_key",
           "  return dot(Vec3<D>{D(row.x), D(row.y), D(row.z)}, delta) * D(camera.scale);\n",
           "  const Mat3<float> r = mat_cast<float>(camera.rotation);\n"
           "  return dot(Vec3<D>{D(r(2, 0)), D(r(2, 1)), D(r(2, 2))}, delta) * D(camera.scale);\n",
-          ORDER, "N22_depth_tie_grid", why="a float32 rotation moves keys by several of their roundings"),
+          ORDER, "N79_near_ties*", why="a float32 rotation moves keys by several of their roundings", on=EVERY),
     fault("key_in_float", "row_key",
           "  return {delta64, mean + row.rounded_offset(offset), static_cast<F>(depth_key(camera, delta64))};\n",
           "  const Mat3<float> r = mat_cast<float>(camera.rotation);\n"
@@ -74,7 +77,7 @@ FAULTS = [
           "  const F z = dot(Vec3<F>{F(r(2, 0)), F(r(2, 1)), F(r(2, 2))}, delta) * "
           "F(static_cast<float>(camera.scale));\n"
           "  return {delta64, delta, z};\n",
-          ORDER, "N77_quantised_capture*", "N79_near_ties*", why="the chain in float32 swaps near ties"),
+          ORDER, "N79_near_ties*", why="the chain in float32 swaps near ties", on=EVERY),
     fault("key_of_a_rounded_offset", "row_key", "static_cast<F>(depth_key(camera, delta64))",
           "static_cast<F>(depth_key(camera, vec_cast<D>(mean + row.rounded_offset(offset))))",
           ORDER, "N79_near_ties*", on=EVERY, why="the offset in float32 swaps near ties as the key in float32 does"),
@@ -89,19 +92,19 @@ FAULTS = [
     fault("key_top_bits", "KeyCode",
           "    const std::uint32_t code = (bits > base ? bits - base : 0u) >> shift;",
           "    const std::uint32_t code = largest == 0xffffffffu ? bits : bits >> 16;",
-          ORDER, "N23_key_wide_range", why="bits spent on depths that no scene has"),
+          ORDER, "N23_key_wide_range", why="bits spent on depths that no scene has", on=BY_TILES),
     fault("key_below_near", "KeyCode",
           "    const std::uint32_t code = (bits > base ? bits - base : 0u) >> shift;",
           "    const std::uint32_t code = (bits - base) >> shift;",
-          ORDER, "N23_key_wide_range", why="the nearest Gaussian comes last"),
+          ORDER, "N23_key_wide_range", why="the nearest Gaussian comes last", on=("serial", "openmp")),
     fault("ties_reversed", "GatherRecords",
           "out[i] = record(k[i] - base, slot + i);\n",
           "out[n - 1 - i] = record(k[i] - base, slot + i);\n",
-          ORDER, "N21_depth_tie_stack", "N22_depth_tie_grid"),
+          ORDER, "N21_depth_tie_stack", "N22_depth_tie_grid", on=("serial",)),
     fault("ties_dropped", "GatherRecords",
           "out[i] = record(k[i] - base, slot + i);\n",
           "out[i] = record(i > 0 && k[i] == k[i - 1] ? 0x7ffffffu : k[i] - base, slot + i);\n",
-          ORDER, "N22_depth_tie_grid"),
+          ORDER, "N22_depth_tie_grid", on=("serial",)),
     fault("ties_by_the_upper_bits_of_a_key", "less",
           "    if (keys[x] != keys[y]) return keys[x] < keys[y];\n", "",
           ORDER, "N79_near_ties*", on=("openmp",), why="of wide ranges an entry has no room for the whole key"),
@@ -113,12 +116,14 @@ FAULTS = [
           FOOTPRINT, N11_ALPHA, on=("openmp",)),
     fault("last_tile_of_a_row_lost", "of",
           "tile_of(box.x1 - one)", "tile_of(box.x1 - one - one)",
-          FOOTPRINT, "N11_tile_cover_conservative"),
+          FOOTPRINT, N11_ALPHA, on=BY_TILES),
     fault("last_tile_of_a_list_lost", "TileColumns",
           "tile_of(pixels.end - L(scalar_of<L>(1)))", "tile_of(pixels.end - L(scalar_of<L>(2)))",
           FOOTPRINT, N11_ALPHA, on=BY_TILES),
     fault("distance_of_the_asset", "distance_key", "norm(delta) * D(camera.scale)", "norm(delta)",
-          ORDER, "N22_depth_tie_grid", why="an asset that is placed larger is farther away, too"),
+          ORDER, TWO_SCALES, why="an asset that is placed larger is farther away, too", on=BY_TILES),
+    fault("order_by_distance_ignored", "sort_key", "if (camera.sort_order == SortOrder::z_depth) return key.z;",
+          "return key.z;", ORDER, TWO_SCALES, on=BY_TILES, why="regions are ordered by depth alone"),
     fault("last_pixel_of_a_box_lost", "pixel_range", "select(l > last, l - one, l) + one",
           "select(l > last, l - one, l)",
           ORDER, "N22_depth_tie_grid", on=EVERY),
@@ -130,5 +135,5 @@ FAULTS = [
           CULLING, "N21_depth_ties_keep_file_order when rows are sorted in space", on=("openmp",)),
     fault("background_forgotten", "pixel_color",
           "return {fma(t, L(args.background.x), state.r),", "return {state.r,",
-          KEYS, "N26_pair_count_zero"),
+          STACK, NORMALIZED, on=EVERY_WAY),
 ]

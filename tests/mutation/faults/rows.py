@@ -77,7 +77,7 @@ FAULTS = [
           "  return (table.empty() ? Vec3d{} : table[o]) - args.camera64.position;\n",
           "  return vec_cast<double>(vec_cast<float>(table.empty() ? Vec3d{} : table[o]) -\n"
           "                          vec_cast<float>(args.camera64.position));\n",
-          WORLD, "N28_world_1e6", why="a difference of two large floats"),
+          WORLD, "N28_world_1e6", why="a difference of two large floats", on=EVERY),
     fault("eye_in_the_world", "position_in", "return inverse(world_from_asset) * position();", "return position();",
           WORLD, "N28_world_1e6", on=EVERY, why="the offset of an asset that is placed elsewhere"),
     fault("cell_of_the_first", "push",

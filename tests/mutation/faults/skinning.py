@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Skinning, poses between keys, and shapes that are no rotated ellipsoids'."""
-from . import BACKENDS, fault
+from . import BACKENDS, BY_TILES, fault
 
 SKIN_TEST = "tests/hard_cases/test_skin.cpp"
 POSE_TEST = "tests/hard_cases/test_pose.cpp"
 FACTOR_TEST = "tests/hard_cases/test_factor.cpp"
+FACTOR_DET = "N62_psd_factor: det > 0 and accurate, whatever the factor"
+FACTOR_IMAGES = "N62_psd_factor in images"
 
 POLAR = "  const Quat<L> turn = quat_direction(scaled_polar_rotation(blend.linear)), turned = turn * quat;\n"
 USABLE = "> L(static_cast<S>(kMinBlendDeterminant));"
@@ -86,13 +88,13 @@ FAULTS = [
           why="Newton's iteration keeps the determinant's sign"),
     fault("cofactors_by_plain_products", "difference_of_products",
           "  return fma(a, b, -cd) + error;\n", "  return (a * b - cd) + error * L(0);\n",
-          FACTOR_TEST, "N62_psd_factor"),
+          FACTOR_TEST, FACTOR_DET, why="no image is as exact"),
     fault("factor_det_ac_minus_b2", "project",
           "const L det = fma(h, (a0 + c0) + h, det0);",
           "const L det = (a0 + h) * (c0 + h) - b0 * b0;",
-          FACTOR_TEST, "N62_psd_factor"),
+          FACTOR_TEST, FACTOR_DET),
     fault("factor_area_signed", "project",
           "const L det0 = dot(area, area);", "const L det0 = dot(area, area) * select(dot(m.row[0], "
           "axes.cofactors.row[0]) < L(S(0)), L(S(-1)), L(S(1)));",
-          FACTOR_TEST, "N62_psd_factor", why="a mirrored factor has a covariance too"),
+          FACTOR_TEST, FACTOR_IMAGES, why="a mirrored factor has a covariance too", on=BY_TILES),
 ]
