@@ -286,7 +286,7 @@ TEST_CASE("N53_tile_max_mesh_cull of chunks, before they are projected") {
   const Similarity place{{0.8, 0.2, -0.5, 0.26457513110645907}, {0.3, -0.2, 4}, 1.5};
   // Chunks beside the window that the wall cuts: none of them is hidden.
   const GaussianCloud cut = sorted(random_cloud(
-      534, {.count = 1500, .sh_degree = 0, .scale = 0.1, .center = {-1.9, 0, 2.8}, .extent = 0.6}));
+      534, {.count = 1500, .sh_degree = 0, .scale = 0.04, .center = {-2.2, 0, 2.9}, .extent = 0.4}));
   SurfaceMesh wall;
   wall.two_sided = true;
   for (const auto& [x0, x1] : {std::pair{-9.0f, 0.4f}, std::pair{0.9f, 9.0f}}) {
