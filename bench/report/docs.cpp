@@ -148,7 +148,10 @@ std::string front_part(const Table& table) {
            header({"setting", "backend", "PSNR, dB", "time of exact", "views", "on the front"});
     for (const ParetoPoint& p : points) {
       out += line({plain(p.label), plain(p.backend), format(p.error, 3) + " / " + format(p.worst, 3),
-                   format(p.ratio), std::to_string(p.views), p.dominated ? "" : "yes"});
+                   format(p.ratio), std::to_string(p.views),
+                   p.partial     ? "fewer views"
+                   : p.dominated ? ""
+                                 : "yes"});
     }
   }
   return out.empty() ? absent("two settings of a size") : out;

@@ -128,8 +128,8 @@ void mark_dominated(std::vector<ParetoPoint>& points, bool higher_is_better) {
   const auto worse = [&](double a, double b) { return higher_is_better ? a < b : a > b; };
   for (ParetoPoint& p : points) {
     p.dominated = std::any_of(points.begin(), points.end(), [&](const ParetoPoint& q) {
-      return !q.partial && q.backend == p.backend && q.time <= p.time && !worse(q.error, p.error) &&
-             (q.time < p.time || worse(p.error, q.error));
+      return !q.partial && q.backend == p.backend && q.threads == p.threads && q.time <= p.time &&
+             !worse(q.error, p.error) && (q.time < p.time || worse(p.error, q.error));
     });
   }
 }
@@ -150,11 +150,11 @@ std::vector<ParetoPoint> pareto_points(const RowRefs& rows, const std::string& c
       return is_plain(r) && r.get("profile") == "exact" && r.get("backend") == first.get("backend") &&
              r.get("threads") == first.get("threads");
     });
-    // Other work of the machine changes times from minute to minute, but not a ratio measured by turns.
+    // Other work of the machine changes times from minute to minute. A ratio by turns changes less.
     const double base = spread(exact, "time_p50_ms").mean, ratio = time_ratio(g.rows, rows).value_or(0);
-    points.push_back({setting_label(first), first.get("backend"), first.get("profile"),
-                      base > 0 && ratio > 0 ? base * ratio : time.mean, ratio, error.mean,
-                      higher_is_better ? error.min : error.max, error.count, false, false});
+    points.push_back({setting_label(first), first.get("backend"), first.get("threads"),
+                      first.get("profile"), base > 0 && ratio > 0 ? base * ratio : time.mean, ratio,
+                      error.mean, higher_is_better ? error.min : error.max, error.count, false, false});
     most = std::max(most, error.count);
   }
   for (ParetoPoint& p : points) p.partial = p.views < most;

@@ -10,18 +10,18 @@ namespace gsnav_report {
 
 /// A setting on one backend: its time and its error, over views.
 struct ParetoPoint {
-  std::string label, backend, profile;
+  std::string label, backend, threads, profile;
   double time = 0.0;   ///< ms per frame: `ratio` times the mean of `exact`'s medians over the views
   double ratio = 0.0;  ///< time divided by that of `exact`
   double error = 0.0;  ///< mean over the views, in the unit of the column
   double worst = 0.0;  ///< error of the worst view
   std::size_t views = 0;
   bool partial = false;    ///< measured on fewer views than others; such a point dominates no other
-  bool dominated = false;  ///< another setting on the backend is at least as fast and as accurate, and
-                           ///< better in one of the two
+  bool dominated = false;  ///< another setting on the backend, with as many threads, is at least as fast
+                           ///< and as accurate, and better in one of the two
 };
 
-/// Sets `dominated` for all points, each compared with the points of its own backend.
+/// Sets `dominated` for all points, each compared with those of its backend and number of threads.
 /// `higher_is_better`: true for measures such as PSNR.
 void mark_dominated(std::vector<ParetoPoint>& points, bool higher_is_better);
 

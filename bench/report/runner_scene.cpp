@@ -74,6 +74,8 @@ Result<SceneRunner::Outcome> SceneRunner::render_on(B& backend, const Setting& s
     if (Status next = renderer.render(sets, std::span(&c, 1), out.frames); !next) status = next;
   };
   reset_peak_memory();
+  draw();
+  out.peak_memory = peak_memory();
   if (runs > 0 && is_exact(s)) {
     out.timing = {measure(draw, runs, options_.max_seconds), 1};
   } else if (runs > 0) {
@@ -88,10 +90,7 @@ Result<SceneRunner::Outcome> SceneRunner::render_on(B& backend, const Setting& s
       if (Status next = exact.render(std::span(&all, 1), std::span(&c, 1), frames); !next) status = next;
     };
     out.timing = measure_beside(draw, draw_exact, runs, options_.max_seconds);
-  } else {
-    draw();
   }
-  out.peak_memory = peak_memory();
   if constexpr (is_host_backend<B>) {
     if (s.knob == "none") {
       out.culled = count_culled(backend, cut ? cut->sets() : std::span(&set, 1), c, renderer.config());

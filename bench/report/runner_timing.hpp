@@ -48,36 +48,42 @@ Timing measure(const F& f, int runs, double budget_s) {
 
 struct PairedTiming {
   Timing timing;     ///< of the first function
-  double ratio = 0;  ///< median over the runs of its time divided by that of the second
+  double ratio = 0;  ///< its least time divided by that of the second: other work only adds to a time
 };
 
+/// Seconds of a clock that never goes back.
+inline double steady_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
 /// Times two functions by turns, so that other work of the machine slows both. Otherwise as `measure`.
-template <class F, class G>
-PairedTiming measure_beside(const F& f, const G& g, int runs, double budget_s) {
-  using Clock = std::chrono::steady_clock;
-  const auto timed = [](const auto& what) {
-    const auto start = Clock::now();
-    what();
-    return 1e3 * std::chrono::duration<double>(Clock::now() - start).count();
-  };
-  const auto begin = Clock::now();
-  const auto spent = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
-  for (int warm = 0; warm < 2 && (warm == 0 || spent() < budget_s); ++warm) {
+/// @param now returns seconds
+template <class F, class G, class Now = double (*)()>
+PairedTiming measure_beside(const F& f, const G& g, int runs, double budget_s,
+                            const Now& now = steady_seconds) {
+  const double begin = now();
+  for (int warm = 0; warm < 2 && (warm == 0 || now() - begin < budget_s); ++warm) {
     f();
     g();
   }
-  std::vector<double> ms, ratios;
-  while (static_cast<int>(ms.size()) < runs && (ms.size() < 3 || spent() < budget_s)) {
-    // Each goes first in every second run.
-    double other = 0;
-    if (ms.size() % 2 != 0) other = timed(g);
-    ms.push_back(timed(f));
-    if (ms.size() % 2 != 0) other = timed(g);
-    ratios.push_back(ms.back() / other);
+  std::vector<double> ms, others;
+  const auto time = [&](const auto& what, std::vector<double>& to) {
+    const double start = now();
+    what();
+    to.push_back(1e3 * (now() - start));
+  };
+  while (static_cast<int>(ms.size()) < runs && (ms.size() < 3 || now() - begin < budget_s)) {
+    if (ms.size() % 2 == 0) {
+      time(f, ms);
+      time(g, others);
+    } else {
+      time(g, others);
+      time(f, ms);
+    }
   }
   PairedTiming t;
+  t.ratio = *std::min_element(ms.begin(), ms.end()) / *std::min_element(others.begin(), others.end());
   t.timing.runs = static_cast<int>(ms.size());
-  t.ratio = percentile(ratios, 0.5);
   t.timing.p50_ms = percentile(ms, 0.5);
   t.timing.p99_ms = percentile(ms, 0.99);
   return t;

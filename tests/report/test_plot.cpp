@@ -23,7 +23,7 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 ParetoPoint at(const char* label, double time, double error, const char* backend = "serial") {
-  return {label, backend, "exact", time, error, error, 4, false, false};
+  return {label, backend, "2", "exact", time, time, error, error, 4, false, false};
 }
 
 }  // namespace
@@ -122,7 +122,9 @@ TEST_CASE("plot: a whisker reaches from the mean to the worst, on the axis' scal
 TEST_CASE("pareto: dominated is what another setting of the backend beats in both") {
   std::vector<ParetoPoint> p{at("best", 1, 50),           at("slower and worse", 2, 40),
                              at("slower, better", 3, 60), at("as slow, worse", 3, 55),
-                             at("twin", 1, 50),           at("elsewhere", 9, 10, "openmp")};
+                             at("twin", 1, 50),           at("elsewhere", 9, 10, "openmp"),
+                             at("on one thread", 8, 20)};
+  p.back().threads = "1";
   mark_dominated(p, true);
   for (const ParetoPoint& q : p) {
     CAPTURE(q.label);
