@@ -112,7 +112,8 @@ def table(found):
             files = {}
             for f, file, _ in entries:
                 files.setdefault(file, {}).setdefault(f.split(":")[-1])
-            where = "; ".join(", ".join(f"`{f}`" for f in names) + f" in `{file.name}`" for file, names in files.items())
+            where = "; ".join(", ".join(f"`{f}`" for f in names) + f" in `{file.name}`"
+                              for file, names in files.items())
             on = [b for b in mutate.fault_lists.EVERY_WAY if any(b in fault.on for *_, fault in entries)]
             number = len({fault.name for *_, fault in entries})
             lines.append(f"| {rule} | {where} | {number} | {', '.join(on) or 'the tests together'} |")
