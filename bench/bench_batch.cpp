@@ -3,8 +3,8 @@
 // and the memory.
 //
 //   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_batch [--size 256x256]
-//       [--compact] [--balls 8] [--rgb] [--depth] [--visible] [--visible-rows 8]
-//       [--visible-weight 0.001] [batch sizes...]        (or --device: prints the name of the GPU)
+//       [--compact] [--balls 8] [--rgb] [--depth] [--visible] [--visible-rows 8] [--visible-margin 0.5]
+//       [--visible-weight 0.00001] [batch sizes...]      (or --device: prints the name of the GPU)
 //
 // Without the variables, the scene is the embedded flat from its four viewpoints. A batch larger than
 // the number of views repeats the views from slightly different places. Times are measured on the
@@ -14,7 +14,7 @@
 // --balls N: N meshes of 4000 triangles stand in front of the first cameras, and all cameras see them.
 // --rgb: colours alone. --depth: median depth alone. Errors of images that are not drawn are nan.
 // --visible: each camera draws only the Gaussians that are visible from its cell (VisibleSettings::rows,
-// min_weight). The images of all views are then compared with images of the whole scene.
+// min_weight, margin). The images of all views are then compared with images of the whole scene.
 #include <cuda_runtime.h>
 
 #include <algorithm>
@@ -295,6 +295,9 @@ int main(int argc, char** argv) {
     } else if (std::string(argv[i]) == "--visible-weight" && i + 1 < argc) {
       sets_of.min_weight = std::atof(argv[++i]);
       continue;
+    } else if (std::string(argv[i]) == "--visible-margin" && i + 1 < argc) {
+      sets_of.margin = std::atof(argv[++i]);
+      continue;
     } else if (chooses_images(argv[i])) {
       continue;
     } else if (std::string(argv[i]) == "--balls" && i + 1 < argc) {
@@ -308,7 +311,7 @@ int main(int argc, char** argv) {
     }
     std::fprintf(stderr,
                  "bench_batch: '%s' is no size (256x256), batch size, --compact, --rgb, --depth, "
-                 "--visible, --visible-rows, --visible-weight, --device or --balls\n",
+                 "--visible, --visible-rows, --visible-margin, --visible-weight, --device or --balls\n",
                  argv[i]);
     return 2;
   }
