@@ -289,15 +289,12 @@ int main(int argc, char** argv) {
     } else if (const std::string o = argv[i]; o == "--compact" || o == "--visible") {
       (o == "--compact" ? compact : visible) = true;
       continue;
-    } else if (std::string(argv[i]) == "--visible-rows" && i + 1 < argc) {
-      sets_of.rows = std::atoi(argv[++i]);
-      continue;
-    } else if (std::string(argv[i]) == "--visible-weight" && i + 1 < argc) {
-      sets_of.min_weight = std::atof(argv[++i]);
-      continue;
-    } else if (std::string(argv[i]) == "--visible-margin" && i + 1 < argc) {
-      sets_of.margin = std::atof(argv[++i]);
-      continue;
+    } else if (o.starts_with("--visible-") && i + 1 < argc) {
+      const double value = std::atof(argv[++i]);
+      if (o == "--visible-rows") sets_of.rows = static_cast<int>(value);
+      if (o == "--visible-weight") sets_of.min_weight = value;
+      if (o == "--visible-margin") sets_of.margin = value;
+      if (const auto s = o.substr(10); s == "rows" || s == "weight" || s == "margin") continue;
     } else if (chooses_images(argv[i])) {
       continue;
     } else if (std::string(argv[i]) == "--balls" && i + 1 < argc) {
