@@ -86,7 +86,7 @@ TEST_CASE("oracle: two layers, their depths and what is marked undecided") {
   config.rules.first_hit_tau = 0.8;
   config.rules.background = {1, 1, 1};
   const OracleFrames f = oracle({cloud.set()}, axis_camera(), config);
-  const std::size_t center = kAxisMiddle * (kAxisSize + 1);
+  const std::size_t center = kAxisPixel;
   const double o1 = static_cast<double>(cloud.opacities[1]),
                o2 = static_cast<double>(cloud.opacities[0]);
   const double w1 = o1, w2 = (1 - o1) * o2, t = (1 - o1) * (1 - o2);
@@ -131,7 +131,7 @@ TEST_CASE("oracle: a pixel is closed by the Gaussian that takes T below the stop
   OracleConfig config;
   config.rules.quality.transmittance_min = 0.95e-4;  // the second layer's T is 1e-4
   const GaussianCloud cloud = cloud_of(layers);
-  const std::size_t center = kAxisMiddle * (kAxisSize + 1);
+  const std::size_t center = kAxisPixel;
   const OracleFrames f = oracle({cloud.set()}, axis_camera(), config);
   CHECK(f.alpha[center] == doctest::Approx(1 - 1e-6).epsilon(1e-14));
   config.crop = {kAxisMiddle, kAxisMiddle, kAxisMiddle + 1, kAxisMiddle + 1};
@@ -149,7 +149,7 @@ TEST_CASE("oracle: keys that tie in float32 and not in float64") {
                                         gaussian({0, 0, 1}, wide, 0.7, {-1, 1, 0})});
   Camera camera = axis_camera();
   camera.viewmat.translation = {0, 0, 1000.3};
-  const std::size_t center = kAxisMiddle * (kAxisSize + 1);
+  const std::size_t center = kAxisPixel;
   for (const SortOrder sort : {SortOrder::z_depth, SortOrder::camera_distance}) {
     OracleConfig config;
     config.rules.sort_order = sort;

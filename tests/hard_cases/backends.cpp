@@ -123,8 +123,8 @@ enum class BatchWay { few, many, regions };
 /// The most tiles of a call of few cameras with small images, on any GPU or on the emulated one.
 std::size_t most_of_few() { return is_emulated() ? 32 * 4 : 32 * 192; }
 
-/// Cameras that see nothing, so many that a call with them and `cameras` is none of few cameras. An
-/// image of more than 512 tiles never is.
+/// Cameras that see nothing. With them, a call of `cameras` counts as one of many cameras. Images of
+/// more than 512 tiles need none.
 std::vector<Camera> blind_cameras(const std::vector<Camera>& cameras) {
   const std::size_t tiles = TileGrid::of(cameras[0].width, cameras[0].height, 16).count();
   const std::size_t wanted = (most_of_few() + tiles) / tiles;

@@ -48,6 +48,7 @@ inline gsnav::GaussianCloud cloud_of(const std::vector<gsnav::RawGaussian>& gaus
 /// Size of `axis_camera` in pixels, odd, and not above what lists of regions draw; the pixel on the
 /// axis.
 inline constexpr int kAxisSize = 63, kAxisMiddle = kAxisSize / 2;
+inline constexpr std::size_t kAxisPixel = kAxisMiddle * (kAxisSize + 1);
 
 /// Camera at the origin that looks along +z; an odd size has a pixel centre on the axis.
 inline gsnav::Camera axis_camera(int size = kAxisSize, double f = 64) {

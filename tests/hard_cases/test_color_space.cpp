@@ -41,7 +41,7 @@ constexpr std::array<ColorSpace, 2> kSpaces{ColorSpace::display, ColorSpace::lin
 }  // namespace
 
 TEST_CASE("N52_srgb_vs_linear_flag") {
-  const std::size_t p = 3 * (31 * 63 + 31);
+  const std::size_t p = 3 * kAxisPixel;
   // White of alpha 1/2 over black: half of the display's value, or half of the light.
   for (const ColorSpace space : kSpaces) {
     RenderConfig config;

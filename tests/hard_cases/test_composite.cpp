@@ -137,7 +137,7 @@ TEST_CASE("N49_mesh_between_layers") {
     render_everywhere(
         {&cloud}, axis_camera(), all_outputs(),
         [&](const auto& f, const auto&) {
-          const std::size_t p = 31 * 63 + 31;
+          const std::size_t p = kAxisPixel;
           for (std::size_t c = 0; c < 3; ++c) {
             CHECK(std::abs(static_cast<double>(f.rgb[3 * p + c]) -
                            (opacity * front[c] + (1 - opacity) * k[c])) < 1e-6);
@@ -383,12 +383,13 @@ TEST_CASE("moved instances, no Gaussians, and a backend with a form of its own o
   for (const double x : {-0.4, 0.0, 0.7}) {
     const MeshInstance instance = scene.instance(0, {{}, {x, 0, 3}, 1});
     renderer.set_meshes({&instance, 1});
-    const auto f = renderer.render({}, std::vector<Camera>{axis_camera(63, 64)}).value();
-    const std::size_t at = 31 * 63 + static_cast<std::size_t>(std::lround(31 + 64 * x / 3));
+    const auto f = renderer.render({}, std::vector<Camera>{axis_camera()}).value();
+    const std::size_t at =
+        kAxisMiddle * kAxisSize + static_cast<std::size_t>(std::lround(kAxisMiddle + 64 * x / 3));
     CHECK(f.alpha[at] == 1);
     const double z = 3 * (1 - 0.5 / std::sqrt(9 + x * x));  // where the ray through its centre meets it
     CHECK(static_cast<double>(f.median_depth[at]) == doctest::Approx(z).epsilon(0.003));
-    CHECK(f.alpha[31 * 63] == 0);
+    CHECK(f.alpha[kAxisMiddle * kAxisSize] == 0);
     CHECK(f.stats[0].meshes.triangles == scene.mesh(0).geometry.triangles.size());
   }
   // Blending with meshes is another stage than blending without: its generic form runs.
@@ -399,10 +400,10 @@ TEST_CASE("moved instances, no Gaussians, and a backend with a form of its own o
   const MeshInstance instance = scene.instance(0, {{}, {0, 0, 3}, 1});
   renderer.set_meshes({&instance, 1});
   other.set_meshes({&instance, 1});
-  const std::vector<Camera> cameras{axis_camera(63, 64)};
+  const std::vector<Camera> cameras{axis_camera()};
   const auto expected = renderer.render({}, cameras).value();
   const auto frames = other.render({}, cameras).value();
-  CHECK(expected.alpha[31 * 63 + 31] == 1);
+  CHECK(expected.alpha[kAxisPixel] == 1);
   CHECK(frames.rgb == expected.rgb);
   CHECK(frames.alpha == expected.alpha);
   CHECK(frames.median_depth == expected.median_depth);

@@ -17,7 +17,7 @@ using namespace gsnav_test;
 
 namespace {
 
-constexpr std::size_t kCenter = 31 * 63 + 31;
+constexpr std::size_t kCenter = kAxisPixel;
 
 template <class S>
 double at_center(const std::vector<S>& image) {
@@ -76,7 +76,7 @@ TEST_CASE("N46_depth_tilted_disk") {
       // The contract's clamp: k standard deviations along the view axis.
       const double sigma_z = 0.2 * std::sqrt(1 - normal.z * normal.z);
       const double reach = std::sqrt(2 * std::log(255 * 0.95)) * sigma_z;
-      Camera camera = axis_camera(63, 128);
+      Camera camera = axis_camera(kAxisSize, 128);
       RenderConfig config = all_outputs();
       config.first_hit_tau = 0.02;
       render_everywhere({&cloud}, camera, config, [&](const auto& f, const auto&) {
@@ -84,8 +84,8 @@ TEST_CASE("N46_depth_tilted_disk") {
         double worst = 0;
         for (std::size_t p = 0; p < f.alpha.size(); ++p) {
           if (f.alpha[p] == 0) continue;
-          const Vec3d ray{(static_cast<double>(p % 63) + 0.5 - camera.cx) / camera.fx,
-                          (static_cast<double>(p / 63) + 0.5 - camera.cy) / camera.fy, 1};
+          const Vec3d ray{(static_cast<double>(p % kAxisSize) + 0.5 - camera.cx) / camera.fx,
+                          (static_cast<double>(p / kAxisSize) + 0.5 - camera.cy) / camera.fy, 1};
           const double z = dot(normal, mean) / dot(normal, ray);
           const bool inside = std::abs(z - mean.z) < reach && z > 0;
           (inside ? plane : clamped) += 1;

@@ -128,7 +128,7 @@ double det_error(const std::vector<Factor>& factors, const Camera& camera, const
 }  // namespace
 
 TEST_CASE("N62_psd_factor: det > 0 and accurate, whatever the factor") {
-  const Camera camera = axis_camera(63, 64);
+  const Camera camera = axis_camera();
   const GaussianCloud none;
   struct Row {
     double size, decades;
@@ -151,7 +151,7 @@ TEST_CASE("N62_psd_factor: det > 0 and accurate, whatever the factor") {
 }
 
 TEST_CASE("N62_psd_factor in images") {
-  const Camera camera = axis_camera(63, 64);
+  const Camera camera = axis_camera();
   SUBCASE("alpha against long double, one factor at a time") {
     const auto factors = random_factors(63, 300, 1, 6);
     std::vector<double> worst(2, 0.0);
@@ -171,7 +171,8 @@ TEST_CASE("N62_psd_factor in images") {
           CHECK(image.alpha == reference);
         }
         for (std::size_t p = 0; p < image.alpha.size(); ++p) {
-          const Real x = static_cast<Real>(p % 63) + 0.5L, y = static_cast<Real>(p / 63) + 0.5L;
+          const Real x = static_cast<Real>(p % kAxisSize) + 0.5L,
+                     y = static_cast<Real>(p / kAxisSize) + 0.5L;
           const double raw =
               static_cast<double>(truth.alpha(static_cast<Real>(cloud.opacities[0]), x, y));
           if (std::abs(raw * 255 - 1) < 1e-3) continue;

@@ -279,7 +279,7 @@ TEST_CASE("N11_tile_cover_conservative in images: few needles at a time have the
 }
 
 TEST_CASE("N18_screen_filling") {
-  const Camera camera = axis_camera(63, 64);
+  const Camera camera = axis_camera();
   RenderConfig config = all_outputs();
   config.tuning.tile_size = 16;
   for (const double sigma_px : {5000.0, 1e5, 1e8}) {
@@ -290,7 +290,8 @@ TEST_CASE("N18_screen_filling") {
     render_everywhere({&cloud}, camera, config, [&](const auto& f, const auto& renderer) {
       double worst = 0;
       for (std::size_t p = 0; p < f.alpha.size(); ++p) {
-        const Real x = static_cast<Real>(p % 63) + 0.5L, y = static_cast<Real>(p / 63) + 0.5L;
+        const Real x = static_cast<Real>(p % kAxisSize) + 0.5L,
+                   y = static_cast<Real>(p / kAxisSize) + 0.5L;
         worst = std::max(
             worst, std::abs(static_cast<double>(f.alpha[p]) - static_cast<double>(truth.alpha(x, y))));
       }

@@ -178,7 +178,7 @@ TEST_CASE("N21_depth_tie_stack") {
     }
     transmittance *= 1 - alpha;
   }
-  const std::size_t center = 31 * 63 + 31;
+  const std::size_t center = kAxisPixel;
   render_everywhere({&cloud}, axis_camera(), all_outputs(), [&](const auto& f, const auto& renderer) {
     for (std::size_t k = 0; k < 3; ++k) {
       CHECK(static_cast<double>(f.rgb[3 * center + k]) ==

@@ -154,7 +154,7 @@ TEST_CASE("N34_opacity_inf") {
     REQUIRE(cloud.size() == 1);
     CHECK(cloud.opacities[0] == 1.0f);
     render_everywhere({&cloud}, axis_camera(), all_outputs(), [&](const auto& f, const auto&) {
-      CHECK(static_cast<double>(f.alpha[31 * 63 + 31]) == doctest::Approx(0.99).epsilon(1e-6));
+      CHECK(static_cast<double>(f.alpha[kAxisPixel]) == doctest::Approx(0.99).epsilon(1e-6));
     });
   }
   for (const double gone : {-kInf, -1e308, -5.6}) {  // sigmoid(-5.6) < 1/255

@@ -82,7 +82,7 @@ TEST_CASE("N28_world_1e6") {
     const GaussianCloud near = cloud_of(gs), far = shifted(gs, shift);
     REQUIRE(near.origins.empty());
     REQUIRE(far.origins.size() == 2);  // zero, and the cell
-    Camera camera = axis_camera(63, 64);
+    Camera camera = axis_camera();
     camera.viewmat.translation = {0.125, -0.25, 0.5};
     Camera sideways = camera;  // turned by whole axes, so that the eye is exact in the world
     sideways.viewmat.linear = Mat3d{{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}}};
@@ -97,7 +97,7 @@ TEST_CASE("N28_world_1e6") {
   }
   SUBCASE("any shift: depth, and the image against long double at zero") {
     Rng rng(280);
-    Camera camera = axis_camera(63, 64);
+    Camera camera = axis_camera();
     const Vec3d eye{0.3, -0.2, 0.1};
     camera.viewmat.translation = -eye;
     const auto gs = raw_scene(281, 300, 0x1p-21);
@@ -146,7 +146,7 @@ TEST_CASE("N29_chunk_boundary") {
     GaussianCloud halves = shifted({gs.begin(), gs.begin() + 400}, corner);
     REQUIRE(append(halves, shifted({gs.begin() + 400, gs.end()}, corner)).ok());
     for (const double x : {-1.5, -0.001953125, 0.0, 0.001953125, 1.5}) {
-      Camera camera = axis_camera(63, 64);
+      Camera camera = axis_camera();
       camera.viewmat.translation = {-x, 0, 0};
       for_each_renderer([&](auto& renderer) {
         const auto reference = renderer.render({&inside}, camera, all_outputs());
@@ -161,7 +161,7 @@ TEST_CASE("N29_chunk_boundary") {
     // The camera looks along x through the edge at 32 m, so that the cells differ in depth.
     double worst = 0;
     for (int round = 0; round < 8; ++round) {
-      Camera camera = axis_camera(63, 64);
+      Camera camera = axis_camera();
       const Vec3d eye{rng.uniform(-1, 1), rng.uniform(-1, 1), 28 + rng.uniform(-0.5, 0.5)};
       camera.viewmat.translation = -eye;
       const auto at = dots(rng, camera, eye);  // depths 2 to 6 m: 30 to 34 m in z
