@@ -230,8 +230,8 @@ std::string approximations_page(const Table& table, const std::string& command) 
   out += "\n## What each profile approximates\n\n" + ledger_part(table);
   out += "\n## One knob at a time\n\n" + knob_part(table);
   out +=
-      "\n## Fronts\n\nSorted by PSNR. A setting is on the front if no other of its backend is at "
-      "least as fast and as accurate, and better in one of the two.\n" +
+      "\n## Fronts\n\nSorted by PSNR. A setting is on the front if no other of its backend and "
+      "number of threads is at least as fast and as accurate, and better in one of the two.\n" +
       front_part(table);
   out += "\n## Skinning\n\n" + named_part(table, "skinning", "skinning");
   out += "\n## Capsule distances and sweeps\n\n" + named_part(table, "sweep", "sweep");

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <initializer_list>
 #include <map>
+#include <utility>
 
 #include "../../tools/common/html_text.hpp"
 #include "plot_style.hpp"
@@ -61,16 +62,18 @@ RowRefs against_front_oracle(const RowRefs& rows) { return comparable(rows, kMea
 
 namespace {
 
-/// Draws a staircase for each backend through the points that no other point beats. It shows the best
-/// result for a given time.
+/// Draws a staircase for each backend and number of threads through the points that no other point
+/// beats. It shows the best result for a given time.
 void draw_fronts(Plot& plot, const std::vector<const ParetoPoint*>& points, const Series& series) {
-  std::map<std::string, std::vector<const ParetoPoint*>> fronts;
-  std::map<std::string, double> longest;
+  using Key = std::pair<std::string, std::string>;  // backend, threads
+  std::map<Key, std::vector<const ParetoPoint*>> fronts;
+  std::map<Key, double> longest;
   for (const ParetoPoint* p : points) {
-    if (!p->dominated && !p->partial) fronts[p->backend].push_back(p);
-    longest[p->backend] = std::max(longest[p->backend], p->time);
+    const Key key(p->backend, p->threads);
+    if (!p->dominated && !p->partial) fronts[key].push_back(p);
+    longest[key] = std::max(longest[key], p->time);
   }
-  for (auto& [backend, front] : fronts) {
+  for (auto& [key, front] : fronts) {
     std::sort(front.begin(), front.end(),
               [](const ParetoPoint* a, const ParetoPoint* b) { return a->time < b->time; });
     std::vector<double> x, y;
@@ -82,9 +85,9 @@ void draw_fronts(Plot& plot, const std::vector<const ParetoPoint*>& points, cons
       x.push_back(p->time);
       y.push_back(p->error);
     }
-    x.push_back(longest[backend]);
+    x.push_back(longest[key]);
     y.push_back(y.back());
-    plot.line(x, y, series.color(backend), true);
+    plot.line(x, y, series.color(key.first), true);
   }
 }
 

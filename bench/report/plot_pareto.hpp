@@ -16,9 +16,10 @@ struct ParetoPoint {
   double error = 0.0;  ///< mean over the views, in the unit of the column
   double worst = 0.0;  ///< error of the worst view
   std::size_t views = 0;
-  bool partial = false;    ///< measured on fewer views than others; such a point dominates no other
-  bool dominated = false;  ///< another setting on the backend, with as many threads, is at least as fast
-                           ///< and as accurate, and better in one of the two
+  bool partial = false;  ///< measured on fewer views than others; such a point dominates no other
+  /// Another setting of the same backend and number of threads is at least as fast and as accurate, and
+  /// better in one of the two.
+  bool dominated = false;
 };
 
 /// Sets `dominated` for all points, each compared with those of its backend and number of threads.
@@ -29,8 +30,8 @@ void mark_dominated(std::vector<ParetoPoint>& points, bool higher_is_better);
 /// the contract's orders that was measured.
 RowRefs against_front_oracle(const RowRefs& rows);
 
-/// One point per (backend, setting) of `rows`, which must have the same resolution, sensor and oracle.
-/// Settings whose images equal those of `exact` are left out.
+/// One point per (backend, threads, setting) of `rows`, which must have the same resolution, sensor and
+/// oracle. Settings whose images equal those of `exact` are left out.
 std::vector<ParetoPoint> pareto_points(const RowRefs& rows, const std::string& column,
                                        bool higher_is_better);
 
