@@ -5,8 +5,8 @@ seeded faults in them (tests/mutation/mutate.py).
 
     tests/mutation/rules.py [--check]
 
-Each function stands in one file, and each rule has a fault. --check writes nothing. Exit status: 0, or 1 with what is
-wrong or how the page differs.
+Each function of the list needs a fault. --check writes nothing, and compares the page with the table. Exit status: 0,
+or 1 with what is wrong.
 """
 from __future__ import annotations
 

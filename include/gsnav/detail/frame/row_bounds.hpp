@@ -18,7 +18,7 @@ class RowBounds {
     means_.add(mean);
     add_size(scales, opacity);
   }
-  /// Adds a row whose mean culling may see off by `pad` metres along each axis.
+  /// Adds a row whose mean may be off by `pad` along each axis, metres.
   GSNAV_HD void add(const Vec3d& mean, const Vec3d& pad, const Vec3<float>& scales,
                     float opacity) noexcept {
     means_.add(Aabb<double>{mean - pad, mean + pad});
