@@ -54,7 +54,10 @@ class Worlds:
                     assert asset.cloud is not None
                     asset.lod = gsnav.build_lod("cpu:1", asset.cloud)
                 scene = gsnav.SimulatorScene(scene, assets=assets)
-            return scene, list(gsnav.generate_episodes(scene.navmesh, episodes, seed))
+            made = gsnav.generate_episodes(scene.navmesh, episodes, seed)
+            if args.people:  # else people would be at the same places at the beginning of all episodes of a flat
+                made = gsnav.draw_start_times(made, scene, self.task, seed)
+            return scene, list(made)
 
         with concurrent.futures.ThreadPoolExecutor(min(16, os.cpu_count() or 1)) as pool:
             made = list(pool.map(make, seeds))

@@ -108,6 +108,17 @@ void bind_generation(nb::module_& m) {
       Release(),
       "Samples `count` episodes, at most 10^7, with the ids \"0\", \"1\", ... Ctrl-C ends the call "
       "after an episode.");
+  m.def(
+      "draw_start_times",
+      [](std::vector<PointNavEpisode> episodes, const SimulatorScene& scene, const TaskConfig& task,
+         std::uint64_t seed) {
+        draw_start_times(episodes, scene, task, seed).throw_if_error();
+        return episodes;
+      },
+      nb::arg("episodes"), nb::arg("scene"), nb::arg("task"), nb::arg("seed"), Release(),
+      "The episodes with random start times in [0, 600) seconds, multiples of the control period at "
+      "which no avatar is within 0.6 m of the surface of an agent at the start. After a hundred "
+      "attempts, the last time is used.");
 }
 
 void bind_files(nb::module_& m) {

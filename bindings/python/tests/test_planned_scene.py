@@ -52,3 +52,20 @@ def test_wrong_options_are_named():
         gsnav.planned_simulator_scene(density=0)
     with pytest.raises(TypeError, match="no field"):
         gsnav.FloorPlanOptions(doors=3)
+
+
+def test_episodes_begin_at_random_times_and_apart_from_people():
+    task = gsnav.TaskConfig()
+    scene = gsnav.planned_simulator_scene(gsnav.FloorPlanOptions(seed=5), people=5, seed=2, density=0.05, task=task)
+    episodes = gsnav.generate_episodes(scene.navmesh, 40, 1)
+    begun = gsnav.draw_start_times(episodes, scene, task, 3)
+    assert all(e.start_time == 0 for e in episodes), "the list that was given has changed"
+    times = np.array([e.start_time for e in begun])
+    assert len(set(times)) > 35 and times.min() >= 0 and times.max() < 600
+    assert np.array_equal(times % task.control_period, np.zeros(40))
+    assert [e.id for e in begun] == [e.id for e in episodes]
+    among = gsnav.AvatarTracker(scene, task.agent_radius, task.agent_height)
+    assert min(among.distance(e.start_position, e.start_time) for e in begun) > 0.6
+    assert min(among.distance(e.start_position, 0.0) for e in episodes) < 0.6, "no episode can show a difference"
+    again = gsnav.draw_start_times(episodes, scene, task, 3)
+    assert [e.start_time for e in again] == list(times)

@@ -365,6 +365,7 @@ def test_penalties_are_a_factor_on_what_people_cost(monkeypatch):
 
     def rewards(penalties):
         worlds = Worlds(range(1), args, 8, penalties=penalties)
+        assert len({e.episode.start_time for e in worlds.episodes}) == 8
         simulator = worlds.simulator(args, 8, [], Draw(worlds, 1, 0))
         simulator.reset()
         return np.array([simulator.step(row).rewards.copy() for row in actions])
