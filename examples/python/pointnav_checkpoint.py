@@ -74,8 +74,9 @@ def begin_with(path: pathlib.Path | None, args: argparse.Namespace, agent: Agent
     if (policy.size, policy.channels) != (args.size, agent.shape[0]):
         sensor = sensors.get(policy.channels, f"{policy.channels} channels")
         sys.exit(f"--begin-with {path}: an agent of --size {policy.size} {sensor}. Use these, or another file.")
-    weights = {name: torch.from_numpy(w) for name, w in policy.weights.items()}
-    take_weights(agent, agent.state_dict() | weights, path, remedy)
+    weights = {name: w.cpu() for name, w in agent.state_dict().items()}  # the file's are on the CPU too
+    weights |= {name: torch.from_numpy(w) for name, w in policy.weights.items()}
+    take_weights(agent, weights, path, remedy)
 
 
 def say_ignored(path: pathlib.Path, kept: dict[str, Any], args: argparse.Namespace, device: torch.device) -> None:

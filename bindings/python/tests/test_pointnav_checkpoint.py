@@ -82,6 +82,16 @@ def test_a_good_checkpoint_is_read(uses):
     assert torch.equal(optimizer.state_dict()["state"][3]["exp_avg"], uses.good["optimizer"]["state"][3]["exp_avg"])
 
 
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU that PyTorch can use")
+def test_an_agent_on_a_gpu_takes_the_weights_of_a_file(uses):
+    import pointnav_checkpoint
+
+    agent, path = uses.made()[0].to("cuda"), FOLDER / "pointnav_depth.npz"
+    pointnav_checkpoint.begin_with(path, uses.args, agent)
+    with np.load(path) as file:
+        assert np.array_equal(agent.state_dict()["goal.bias"].cpu(), file["goal.bias"].astype(np.float32))
+
+
 OPTIMIZER, STATE, GROUP = ("optimizer",), ("optimizer", "state"), ("optimizer", "param_groups", 0)
 BIAS, LOG = ("agent", "goal.bias"), ("log", 2)
 
