@@ -19,8 +19,9 @@
 #include "gsnav/backends/cuda.hpp"
 #include "gsnav/backends/openmp.hpp"
 #include "gsnav/core/rng.hpp"
+#include "gsnav/device/renderer.hpp"
+#include "gsnav/eval.hpp"
 #include "gsnav/open.hpp"
-#include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/sim/basic_batch.hpp"
 #include "samples.hpp"
 
@@ -76,24 +77,38 @@ Flats flats_for(int side, bool people) {
   return flats;
 }
 
-/// Error of the images of the first environments against float64, without people.
+/// Error of the images of kJudged environments.
 struct Judged {
   double psnr = std::numeric_limits<double>::quiet_NaN(), depth_p99 = psnr;
 };
 
+/// Float64 images of environments 0, 4, 8, ..., all in the first flat: what the contract draws, or a
+/// photo of four times the resolution. People are posed in float32, as in the simulator.
 template <class Batch>
-Judged judge(CudaBackend& cuda, const Batch& sim, const BatchStep& step, const SimulatorScene& scene,
-             const std::vector<SensorSpec>& wanted) {
-  std::vector<Camera> cameras;
-  for (std::size_t e = 0; e < kJudged; ++e) {  // environments 0, 4, 8, 12: all in the first flat
-    const AgentPose& agent = sim.world(kFlats * e).agent();
-    cameras.push_back(sensor_camera(wanted[0], agent.position, agent.rotation(), agent.pitch));
-  }
-  std::vector<GaussianSet> sets;
-  for (const SceneAsset& a : scene.assets) sets.push_back(a.cloud->set(a.world_from_asset));
+eval::OracleFrames truth_of(const Batch& sim, const std::shared_ptr<const SimulatorScene>& scene,
+                            const SensorSpec& sensor, bool photo) {
   OpenMPBackend cpu;
-  BasicRenderer<double, OpenMPBackend> reference(cpu);
-  const Frames<double> truth = reference.render(sets, cameras).value();
+  SceneOnBackend<OpenMPBackend> whole(cpu, scene);
+  eval::OracleFrames all;
+  eval::OracleConfig config;
+  config.order = eval::OracleOrder::float32_key;
+  for (std::size_t e = 0; e < kJudged; ++e) {
+    const World& world = sim.world(kFlats * e);
+    whole.pose(0, world.time()).throw_if_error();
+    const AgentPose& agent = world.agent();
+    const Camera camera = sensor_camera(sensor, agent.position, agent.rotation(), agent.pitch);
+    const Device device = Device::parse("cpu").value();
+    const eval::OracleFrames one =
+        photo ? eval::oracle_photo(device, whole.sets(0), camera, 4, config).value()
+              : eval::oracle_render(device, whole.sets(0), camera, config).value();
+    all.rgb.insert(all.rgb.end(), one.rgb.begin(), one.rgb.end());
+    all.alpha.insert(all.alpha.end(), one.alpha.begin(), one.alpha.end());
+    all.median_depth.insert(all.median_depth.end(), one.median_depth.begin(), one.median_depth.end());
+  }
+  return all;
+}
+
+Judged judge(CudaBackend& cuda, const BatchStep& step, const eval::OracleFrames& truth) {
   Judged judged;
   for (const BatchObservation& o : step.images) {
     const auto floats = static_cast<std::size_t>(o.height * o.width * o.channels);
@@ -168,8 +183,8 @@ class Alone {
 ///
 /// Counters: `ms` and `p90_ms` of the calls, `steps/s`, and `world_ms`, which is a call without images.
 /// `draw_ms` is what the renderer takes on the device for the same frames (`fast`, without people).
-/// `psnr` and `depth_p99` (metres) compare four environments after the reset with float64, without
-/// people. gsnav-report judges `lod`, against photos.
+/// `psnr` and `depth_p99` (metres) compare four environments after the reset with float64: levels of
+/// detail with photos, and the other profiles with images of the contract.
 void step_batch_cuda(benchmark::State& state) {
   if (CudaBackend::device_count() == 0) {
     state.SkipWithError("no GPU");
@@ -200,8 +215,8 @@ void step_batch_cuda(benchmark::State& state) {
                                                       kEnvironments, episode_of)
                  .value();
   const BatchStep first = sim.reset().value();
-  Judged judged;
-  if (!people && profile != kLod) judged = judge(cuda, sim, first, *scenes[0], config.sensors);
+  const Judged judged =
+      judge(cuda, first, truth_of(sim, scenes[0], config.sensors[0], config.lod.has_value()));
 
   Rng rng(9);
   std::vector<Action> actions(kEnvironments);
