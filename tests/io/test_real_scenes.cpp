@@ -17,12 +17,6 @@ using namespace gsnav_test;
 
 namespace {
 
-#if defined(GSNAV_TEST_SANITIZED)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
-
 /// Box of the middle nine tenths along each axis.
 Aabb<double> middle_of(const GaussianCloud& cloud) {
   Aabb<double> box;

@@ -19,8 +19,9 @@ using namespace gsnav_test;
 TEST_CASE("cuda batch: every camera has the bits it has alone") {
   if (no_gpu("cuda batch images")) return;
   CudaBackend cuda;
-  GaussianCloud a = random_cloud(1, {.count = is_emulated() ? 3000 : 9000, .needle = 0.3});
-  const GaussianCloud b = random_cloud(2, {.count = 2500, .sh_degree = 1, .scale = 0.2, .mip = true});
+  GaussianCloud a = random_cloud(1, {.count = is_emulated() ? 1500 : 9000, .needle = 0.3});
+  const GaussianCloud b =
+      random_cloud(2, {.count = is_emulated() ? 900 : 2500, .sh_degree = 1, .scale = 0.2, .mip = true});
   const GaussianCloud c = random_cloud(3, {.count = 700, .sh_degree = 0, .scale = 0.02});
   sort_spatially(a);
   const GaussianArrays<CudaBackend> on_a(cuda, a), on_b(cuda, b), on_c(cuda, c);
@@ -69,7 +70,7 @@ TEST_CASE("cuda batch: the serial backend's bits; profiles and compat modes") {
   if (no_gpu("cuda batch profiles")) return;
   CudaBackend cuda;
   SerialBackend serial;
-  const GaussianCloud cloud = random_cloud(7, {.count = 3000});
+  const GaussianCloud cloud = random_cloud(7, {.count = is_emulated() ? 1500 : 3000});
   const GaussianArrays<CudaBackend> arrays(cuda, cloud);
   const Camera camera = Camera::look_at({0, 0, 0}, {0, 0, 4}, {0, -1, 0}, 97, 64, 70);
   for (const Compat compat : {Compat::none, Compat::inria, Compat::gsplat, Compat::habitat_gs}) {
@@ -136,8 +137,8 @@ TEST_CASE("cuda batch: images of many pixels, and bands in half precision") {
     compact_sh(cloud);
     const GaussianArrays<CudaBackend> arrays(cuda, cloud);
     const std::vector<GaussianSet> sets{arrays.set()};
-    const std::vector<Camera> one = is_emulated() ? ring(1, 321, 240) : ring(1, 641, 480),
-                              many = ring(9, 149, 101);
+    const std::vector<Camera> one = is_emulated() ? ring(1, 241, 180) : ring(1, 641, 480),
+                              many = is_emulated() ? ring(9, 101, 69) : ring(9, 149, 101);
     RenderConfig config;
     config.outputs = kMedianOnly;
     CudaBatchRenderer renderer(cuda, config);

@@ -77,10 +77,11 @@ constexpr unsigned kSmallOutputs[] = {kMedianDepth, kRgb, kMedianOnly};
 TEST_CASE("cuda batch regions: several scenes, placed, in lists of each camera's own") {
   if (no_gpu("cuda batch regions")) return;
   CudaBackend cuda;
-  const int count = is_emulated() ? 1200 : 9000;
+  const int count = is_emulated() ? 600 : 9000;
   GaussianCloud a = random_cloud(1, {.count = count, .needle = 0.3});
   GaussianCloud b = random_cloud(2, {.count = count / 3, .sh_degree = 1, .scale = 0.2});
-  const GaussianCloud c = random_cloud(3, {.count = 700, .sh_degree = 0, .scale = 0.02, .mip = true});
+  const GaussianCloud c =
+      random_cloud(3, {.count = is_emulated() ? 350 : 700, .sh_degree = 0, .scale = 0.02, .mip = true});
   sort_spatially(a);
   sort_spatially(b);
   compact_sh(b);
@@ -129,7 +130,7 @@ TEST_CASE("cuda batch regions: tiles that warps divide have the bits of whole on
   if (no_gpu("cuda batch regions in parts")) return;
   CudaBackend cuda;
   // Faint rows in front of others, so that lists are long and pixels close at different rows.
-  const int count = is_emulated() ? 2500 : 40000;
+  const int count = is_emulated() ? 1500 : 40000;
   GaussianCloud faint = faint_cloud(
       count, [](double z) { return 0.02 * z; },
       [](int, Rng& rng) {
@@ -151,7 +152,8 @@ TEST_CASE("cuda batch regions: tiles that warps divide have the bits of whole on
     config.background = {0.25, 0.5, 0.75};
     CudaBatchRenderer renderer(cuda, config);
     renderer.set_least_of_regions(cuda::policy::Regions::kLeastCameras, 0);
-    for (const unsigned outputs : kSmallOutputs) {
+    for (std::size_t o = 0; o < std::size(kSmallOutputs); ++o) {
+      const unsigned outputs = kSmallOutputs[o];
       CAPTURE(outputs);
       const auto draw = [&](const Least& least) {
         renderer.set_least_of_parts(least.pairs, least.rows, least.always);
@@ -160,7 +162,10 @@ TEST_CASE("cuda batch regions: tiles that warps divide have the bits of whole on
       const Batch whole = draw({64, 0, false});
       CHECK(whole.stats.parts_given == 0);
       check_some(cuda, whole, sets, cameras, {}, config, outputs);
-      for (const Least& least : {Least{2, 0, true}, {9, 1, true}, {2, 100, true}, {2, 0, false}}) {
+      constexpr Least kLeasts[] = {{2, 0, true}, {9, 1, true}, {2, 100, true}, {2, 0, false}};
+      for (std::size_t i = 0; i < std::size(kLeasts); ++i) {
+        if (is_emulated() && i != 0 && i != o + 1) continue;  // each of the others with one output
+        const Least& least = kLeasts[i];
         CAPTURE(least.pairs);
         CAPTURE(least.rows);
         const Batch divided = draw(least);
@@ -220,6 +225,7 @@ TEST_CASE("cuda batch regions: thousands of rows of one key are in order of rank
   Camera camera;
   camera.set_hfov(48, 48, 60);
   camera.cx = camera.cy = 24;
+  if (is_emulated()) camera.width = camera.height = 32;  // the walls are in the middle
   const std::vector<Camera> cameras(kCameras, camera);
   for (const bool sorted : {false, true}) {
     if (sorted) sort_spatially(cloud);

@@ -111,6 +111,8 @@ TEST_CASE("cuda: SH bands that chunks do not need are not read, in batches and a
       check_held(some.set().gaussians, most);
       for (const int limit : {kMaxShDegree, 1}) {
         for (const int count : {5, many_cameras()}) {
+          // Emulated: every two of number of bands, limit and number of cameras.
+          if (is_emulated() && (limit == 1) != ((count == 5) == (most % 3 == 0))) continue;
           CAPTURE(most);
           CAPTURE(halves);
           CAPTURE(limit);

@@ -12,3 +12,13 @@
 #if !defined(GSNAV_TEST_SANITIZED) && (defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__))
 #define GSNAV_TEST_SANITIZED
 #endif
+
+namespace gsnav_test {
+
+#if defined(GSNAV_TEST_SANITIZED)
+inline constexpr bool kSanitized = true;
+#else
+inline constexpr bool kSanitized = false;
+#endif
+
+}  // namespace gsnav_test
