@@ -12,6 +12,7 @@
 #include "gsnav/detail/rigging/capsule_fit.hpp"
 #include "gsnav/detail/rigging/capsule_volume.hpp"
 #include "gsnav/detail/rigging/mesh_avatar.hpp"
+#include "support/sanitized.hpp"
 
 using namespace gsnav;
 using namespace gsnav_test;
@@ -136,12 +137,13 @@ TEST_CASE("fitted capsules of a body that is capsules are those capsules") {
 }
 
 TEST_CASE("capsules hold people while they walk") {
+  constexpr int kPoses = kSanitized ? 4 : 12;  // sanitizers are slow
   const AvatarAsset person = make_humanoid({.gaussians = 20000});
   const WalkMotion walk = WalkMotion::create(person.skeleton).value();
   std::vector<std::vector<Affine3<double>>> poses;
-  for (int k = 0; k < 12; ++k) {
+  for (int k = 0; k < kPoses; ++k) {
     LocalPose pose;
-    walk.pose(k / 12.0, 1.0, 0.0, pose);
+    walk.pose(k / static_cast<double>(kPoses), 1.0, 0.0, pose);
     poses.push_back(joints_at(person.skeleton, pose));
   }
   check_body("humanoid", person, poses);
@@ -151,7 +153,7 @@ TEST_CASE("capsules hold people while they walk") {
     MeshAvatarOptions options;
     options.gaussians = 20000;
     check_body(name, make_mesh_avatar(body.loaded.mesh, options).value().asset,
-               poses_of(body.loaded.mesh.skeleton, body.loaded.clips[0].clip, 12));
+               poses_of(body.loaded.mesh.skeleton, body.loaded.clips[0].clip, kPoses));
   }
 }
 

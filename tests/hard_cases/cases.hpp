@@ -16,16 +16,19 @@
 #include "gsnav/render/config.hpp"
 #include "gsnav/scene/basic_renderer.hpp"
 #include "gsnav/scene/gaussian_cloud.hpp"
+#include "support/sanitized.hpp"
 
 // Inputs that several hard cases share.
 
 namespace gsnav_test {
 
-/// How many random samples a case draws: `base` times GSNAV_HARD_CASE_SAMPLES (1 where it is not set).
+/// How many random samples a case draws: `base` times GSNAV_HARD_CASE_SAMPLES (1 where it is not set; a
+/// quarter under a sanitizer, which is that much slower).
 inline std::size_t sample_count(std::size_t base) {
   const char* factor = std::getenv("GSNAV_HARD_CASE_SAMPLES");
+  const double unless_set = kSanitized ? 0.25 : 1.0;
   return static_cast<std::size_t>(static_cast<double>(base) *
-                                  (factor != nullptr ? std::atof(factor) : 1.0));
+                                  (factor != nullptr ? std::atof(factor) : unless_set));
 }
 
 /// Standard deviations may be 0: a flat axis.

@@ -22,6 +22,7 @@
 #include "sog_file.hpp"
 #include "splat_file.hpp"
 #include "spz_file.hpp"
+#include "support/sanitized.hpp"
 
 // Files with a byte changed, dropped or doubled: a loader returns a Status that names the file or a
 // result that is whole, and asks for no more memory than such a small file can need.
@@ -32,6 +33,9 @@ using namespace gsnav_test;
 namespace {
 
 constexpr std::size_t kMostMemory = 8000000;
+
+/// Of so many mutations, those that are tried: a quarter under sanitizers, under which fuzzers try more.
+constexpr int tried(int n) { return kSanitized ? n / 4 : n; }
 
 std::string mutated(const std::string& text, std::mt19937& generator) {
   std::string out = text;
@@ -100,14 +104,14 @@ TEST_CASE("mutations: ply") {
     file.rows = random_rows(6, 9, 2);
     file.before_header = "element face 2\nproperty list uchar short a\n";
     file.before_rows = file.format == "ascii" ? "1 5\n0\n" : std::string("\1\0\5\0", 4);
-    const Tally t = feed(file.text(), 3000, 1, "some.ply", [](const std::string& text) {
+    const Tally t = feed(file.text(), tried(3000), 1, "some.ply", [](const std::string& text) {
       return check_cloud(io::parse_ply(bytes_of(text), "some.ply"));
     });
-    CHECK(t.ok > 100);
-    CHECK(t.failed > 100);
+    CHECK(t.ok > tried(100));
+    CHECK(t.failed > tried(100));
     // Only the header: there every byte counts.
     const std::string rows = file.text().substr(file.header().size());
-    feed(file.header(), 3000, 2, "some.ply", [&](const std::string& header) {
+    feed(file.header(), tried(3000), 2, "some.ply", [&](const std::string& header) {
       return check_cloud(io::parse_ply(bytes_of(header + rows), "some.ply"));
     });
   }
@@ -117,24 +121,24 @@ TEST_CASE("mutations: compressed ply") {
   CompressedPlyFile file;
   file.rest = 9;
   file.rows = random_rows(6, 9, 2);
-  const Tally t = feed(file.text(), 3000, 9, "some.ply", [](const std::string& text) {
+  const Tally t = feed(file.text(), tried(3000), 9, "some.ply", [](const std::string& text) {
     return check_cloud(io::parse_ply(bytes_of(text), "some.ply"));
   });
-  CHECK(t.ok > 100);
-  CHECK(t.failed > 100);
+  CHECK(t.ok > tried(100));
+  CHECK(t.failed > tried(100));
   const std::string rows = file.text().substr(file.header().size());
-  feed(file.header(), 3000, 10, "some.ply", [&](const std::string& header) {
+  feed(file.header(), tried(3000), 10, "some.ply", [&](const std::string& header) {
     return check_cloud(io::parse_ply(bytes_of(header + rows), "some.ply"));
   });
 }
 
 TEST_CASE("mutations: splat") {
   const Tally t =
-      feed(splat_text(random_rows(6, 0, 2)), 3000, 11, "some.splat", [](const std::string& text) {
+      feed(splat_text(random_rows(6, 0, 2)), tried(3000), 11, "some.splat", [](const std::string& text) {
         return check_cloud(io::parse_splat(bytes_of(text), "some.splat"));
       });
-  CHECK(t.ok > 100);
-  CHECK(t.failed > 100);
+  CHECK(t.ok > tried(100));
+  CHECK(t.failed > tried(100));
 }
 
 TEST_CASE("mutations: spz, as it is and inside of its gzip stream") {
@@ -146,13 +150,13 @@ TEST_CASE("mutations: spz, as it is and inside of its gzip stream") {
     const auto load = [](const std::string& text) {
       return check_cloud(io::parse_spz(bytes_of(text), "some.spz"));
     };
-    CHECK(feed(file.text(), 2000, 12, "some.spz", load).failed > 1000);
-    const Tally t = feed(file.payload(), 2000, 13, "some.spz",
+    CHECK(feed(file.text(), tried(2000), 12, "some.spz", load).failed > tried(1000));
+    const Tally t = feed(file.payload(), tried(2000), 13, "some.spz",
                          [&](const std::string& payload) { return load(gzip(payload)); });
-    CHECK(t.ok > 100);
-    CHECK(t.failed > 100);
+    CHECK(t.ok > tried(100));
+    CHECK(t.failed > tried(100));
     const std::string rest = file.payload().substr(16);
-    feed(file.payload().substr(0, 16), 2000, 14, "some.spz",
+    feed(file.payload().substr(0, 16), tried(2000), 14, "some.spz",
          [&](const std::string& header) { return load(gzip(header + rest)); });
   }
 }
@@ -170,10 +174,10 @@ TEST_CASE("mutations: spz 4") {
   const auto load = [](const std::string& bytes) {
     return check_cloud(io::parse_spz(bytes_of(bytes), "some.spz"));
   };
-  const Tally t = feed(text, 4000, 17, "some.spz", load);
-  CHECK(t.ok > 100);
-  CHECK(t.failed > 1000);
-  feed(text.substr(0, 32), 2000, 18, "some.spz",
+  const Tally t = feed(text, tried(4000), 17, "some.spz", load);
+  CHECK(t.ok > tried(100));
+  CHECK(t.failed > tried(1000));
+  feed(text.substr(0, 32), tried(2000), 18, "some.spz",
        [&](const std::string& header) { return load(header + rest); });
 }
 
@@ -183,13 +187,13 @@ TEST_CASE("mutations: gltf") {
   file.rows = random_rows(3, 9, 2);
   file.nodes = R"([{"children":[1],"scale":[2,2,2]},{"mesh":0,"rotation":[0,0,1,0]}])";
   const std::string json = file.json(), binary = file.binary();
-  const Tally t = feed(json, 6000, 19, "some.glb", [&](const std::string& text) {
+  const Tally t = feed(json, tried(6000), 19, "some.glb", [&](const std::string& text) {
     const std::string glb = GlbFile::glb(text, binary);
     return check_cloud(io::parse_gltf(bytes_of(glb), "some.glb"));
   });
-  CHECK(t.ok > 100);
-  CHECK(t.failed > 1000);
-  feed(file.text(), 3000, 20, "some.glb",
+  CHECK(t.ok > tried(100));
+  CHECK(t.failed > tried(1000));
+  feed(file.text(), tried(3000), 20, "some.glb",
        [&](const std::string& text) { return check_cloud(io::parse_gltf(bytes_of(text), "some.glb")); });
 }
 
@@ -210,12 +214,12 @@ TEST_CASE("mutations: ksplat") {
     const std::size_t parts[][2] = {{0, main}, {first, section}, {second, section}};
     for (const auto& part_of : parts) {
       const std::size_t from = part_of[0], size = part_of[1];
-      feed(text.substr(from, size), 1000, 15, "some.ksplat", [&](std::string part) {
+      feed(text.substr(from, size), tried(1000), 15, "some.ksplat", [&](std::string part) {
         part.resize(size);
         return load(text.substr(0, from) + part + text.substr(from + size));
       });
     }
-    feed(text.substr(data), 1000, 16, "some.ksplat",
+    feed(text.substr(data), tried(1000), 16, "some.ksplat",
          [&](const std::string& bytes) { return load(text.substr(0, data) + bytes); });
   }
 }
@@ -226,20 +230,20 @@ TEST_CASE("mutations: each file of a SOG, and its bundle") {
   f.make_files();
   f.write_folder(folder / "set");
   for (const auto& [name, content] : f.files) {
-    const Tally t = feed(content, name == "meta.json" ? 2000 : 300, 3, (folder / "set").string(),
+    const Tally t = feed(content, tried(name == "meta.json" ? 2000 : 300), 3, (folder / "set").string(),
                          [&, file = name](const std::string& text) {
                            write_file(folder / "set" / file, text);
                            return check_cloud(io::load_sog(folder / "set"));
                          });
-    CHECK(t.failed > 20);
+    CHECK(t.failed > tried(20));
     write_file(folder / "set" / name, content);
   }
   for (const bool deflated : {false, true}) {
-    const Tally t = feed(f.bundle(deflated), 2000, 4, "a.sog", [&](const std::string& text) {
+    const Tally t = feed(f.bundle(deflated), tried(2000), 4, "a.sog", [&](const std::string& text) {
       write_file(folder / "a.sog", text);
       return check_cloud(io::load_sog(folder / "a.sog"));
     });
-    CHECK(t.failed > 1000);
+    CHECK(t.failed > tried(1000));
   }
 }
 
@@ -247,23 +251,23 @@ TEST_CASE("mutations: cameras, images, arrays, meshes") {
   TempFolder folder("mutations_other");
   const std::vector<Camera> cameras(2);
   REQUIRE(io::save_cameras(folder / "a.json", cameras).ok());
-  feed(read_file(folder / "a.json"), 3000, 5, "a.json", [&](const std::string& text) {
+  feed(read_file(folder / "a.json"), tried(3000), 5, "a.json", [&](const std::string& text) {
     write_file(folder / "a.json", text);
     return io::load_cameras(folder / "a.json").status();
   });
   REQUIRE(io::save_png_rgb(folder / "a.png", std::vector<float>(75, 0.3f), 5, 5).ok());
-  feed(read_file(folder / "a.png"), 2000, 6, "a.png", [&](const std::string& text) {
+  feed(read_file(folder / "a.png"), tried(2000), 6, "a.png", [&](const std::string& text) {
     write_file(folder / "a.png", text);
     return io::load_png(folder / "a.png").status();
   });
   REQUIRE(io::save_npy(folder / "a.npy", std::vector<float>(6), std::vector<std::size_t>{2, 3}).ok());
-  feed(read_file(folder / "a.npy"), 3000, 7, "a.npy", [&](const std::string& text) {
+  feed(read_file(folder / "a.npy"), tried(3000), 7, "a.npy", [&](const std::string& text) {
     write_file(folder / "a.npy", text);
     const auto a = io::load_npy(folder / "a.npy");
     if (a) CHECK(a->values.size() <= 6);
     return a.status();
   });
-  feed("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\nf -1/2/3 -2//4 -3\n", 3000, 8, "a.obj",
+  feed("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\nf -1/2/3 -2//4 -3\n", tried(3000), 8, "a.obj",
        [&](const std::string& text) {
          write_file(folder / "a.obj", text);
          const auto m = io::load_obj(folder / "a.obj");

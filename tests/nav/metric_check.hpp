@@ -10,6 +10,7 @@
 
 #include "geodesic_oracle.hpp"
 #include "gsnav/nav/navmesh.hpp"
+#include "support/sanitized.hpp"
 
 namespace gsnav_test {
 
@@ -19,7 +20,7 @@ inline double sum_of(const std::vector<gsnav::Vec3d>& points) {
   return sum;
 }
 
-inline constexpr int kPathsOfAFloor = 60;
+inline constexpr int kPathsOfAFloor = kSanitized ? 20 : 60;  // sanitizers are slow
 
 /// So many paths between random points against brute force; returns how far the worst length is off,
 /// metres.

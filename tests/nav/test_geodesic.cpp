@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <optional>
+#include <string>
 #include <thread>
 
 #include "detour.hpp"
@@ -22,6 +25,7 @@ using gsnav_test::check_metric;
 using gsnav_test::detour_position;
 using gsnav_test::detour_query;
 using gsnav_test::DetourQuery;
+using gsnav_test::kSanitized;
 using gsnav_test::random_boxes;
 using gsnav_test::Soup;
 
@@ -90,14 +94,19 @@ void check_against_detour(const NavMesh& mesh, int pairs, double tolerance) {
   CHECK(worst < tolerance);
 }
 
-NavMesh demo(const char* file) {
-  const Soup soup = gsnav_test::read_obj(gsnav_test::data_file(file));
+/// A mesh of the test data, built once: what it prepares for paths takes seconds.
+const NavMesh& demo(const std::string& file) {
+  static std::map<std::string, NavMesh> built;
+  const auto there = built.find(file);
+  if (there != built.end()) return there->second;
+  const Soup soup = gsnav_test::read_obj(gsnav_test::data_file(file.c_str()));
   NavMeshSettings s;
   s.cell_size = 0.3;
   s.agent_height = 2.0;
   s.agent_radius = 0.6;
   s.agent_max_climb = 0.9;
-  return NavMesh::build(s, soup.vertices, soup.triangles).value();
+  NavMesh mesh = NavMesh::build(s, soup.vertices, soup.triangles).value();
+  return built.emplace(file, std::move(mesh)).first->second;
 }
 
 }  // namespace
@@ -169,12 +178,12 @@ TEST_CASE("geodesic: one floor above another is a floor of its own") {
 
 TEST_CASE("geodesic: symmetric, and no detour is shorter") {
   check_metric(build_cells(random_boxes(3, 30, 20)), cases(100000));
-  check_against_detour(build_cells(random_boxes(3, 30, 20)), 1000, 1e-6);
+  check_against_detour(build_cells(random_boxes(3, 30, 20)), cases(1000), 1e-6);
   for (const char* file : {"nav/recast/nav_test.obj", "nav/recast/dungeon.obj"}) {
     if (gsnav_test::data_file(file).empty()) continue;
-    const NavMesh mesh = demo(file);
-    check_metric(mesh, 10000);
-    check_against_detour(mesh, 1000, 3e-4);
+    const NavMesh& mesh = demo(file);
+    check_metric(mesh, cases(10000));
+    check_against_detour(mesh, cases(1000), 3e-4);
   }
 }
 
@@ -187,7 +196,7 @@ TEST_CASE("geodesic: the surface has no step where Recast's height triangles ove
     if (path.empty()) continue;
     const Soup soup = gsnav_test::read_obj(path);
     NavMeshSettings s;
-    s.cell_size = 0.1;
+    s.cell_size = kSanitized ? 0.2 : 0.1;  // a quarter of the polygons where each takes so long
     s.tile_size = tile_size;
     const NavMesh mesh = NavMesh::build(s, soup.vertices, soup.triangles).value();
     const gsnav::detail::UnfoldedMesh& faces = mesh.impl().unfolded();
@@ -206,7 +215,7 @@ TEST_CASE("geodesic: the surface has no step where Recast's height triangles ove
 TEST_CASE("geodesic: RecastDemo's file of paths") {
   const std::string file = gsnav_test::data_file("nav/recast/nav_mesh_test.txt");
   if (file.empty()) return;
-  const NavMesh mesh = demo("nav/recast/nav_test.obj");
+  const NavMesh& mesh = demo("nav/recast/nav_test.obj");
   const DetourQuery query = detour_query(mesh);
   std::ifstream in(file);
   int paths = 0;
@@ -236,7 +245,7 @@ TEST_CASE("geodesic: thousands of polygons are no limit") {
   const NavMesh mesh = build_cells(soup);
   CHECK(mesh.polygon_count() > 2048);
   Rng rng(3);
-  for (int i = 0; i < 200; ++i) {
+  for (int i = 0; i < cases(200); ++i) {
     const NavPoint a = mesh.random_point(rng, 0), b = mesh.random_point(rng, 0);
     const double d = mesh.distance_between(a, b), line = norm(b.position - a.position);
     REQUIRE(d >= line - 1e-9);
@@ -284,7 +293,7 @@ TEST_CASE("geodesic: many goals, and fields of distance") {
 
 TEST_CASE("geodesic: fields over slopes") {
   if (gsnav_test::data_file("nav/recast/nav_test.obj").empty()) return;
-  const NavMesh mesh = demo("nav/recast/nav_test.obj");
+  const NavMesh& mesh = demo("nav/recast/nav_test.obj");
   Rng rng(4);
   const NavPoint goal = mesh.random_point(rng, 0);
   const GeodesicField field = GeodesicField::make(mesh, std::span(&goal.position, 1)).value();
@@ -304,12 +313,13 @@ TEST_CASE(
       waves.quad(at(x, z), at(x, z + 1), at(x + 1, z + 1), at(x + 1, z));
     }
   }
-  std::vector<NavMesh> meshes;
-  meshes.push_back(build_cells(waves));
+  const NavMesh waving = build_cells(waves);
+  std::vector<const NavMesh*> meshes{&waving};
   for (const char* file : {"nav/recast/nav_test.obj", "nav/recast/undulating.obj"}) {
-    if (!gsnav_test::data_file(file).empty()) meshes.push_back(demo(file));
+    if (!gsnav_test::data_file(file).empty()) meshes.push_back(&demo(file));
   }
-  for (const NavMesh& mesh : meshes) {
+  for (const NavMesh* const each : meshes) {
+    const NavMesh& mesh = *each;
     const NavMesh::Impl& impl = mesh.impl();
     const detail::UnfoldedMesh& faces = impl.unfolded();
     Rng rng(41);
@@ -353,7 +363,7 @@ TEST_CASE("geodesic: as far there as back for points that lie a rounding outside
   // Points on edges of polygons, where height triangles end up to a micrometre short of them.
   const std::string file = "nav/recast/undulating.obj";
   if (gsnav_test::data_file(file).empty()) return;
-  const NavMesh mesh = demo(file.c_str());
+  const NavMesh& mesh = demo(file);
   const NavMesh::Impl& impl = mesh.impl();
   Rng rng(42);
   std::vector<NavPoint> goals;
@@ -387,7 +397,7 @@ TEST_CASE(
   // Against the search over windows from each point, which knows neither fields nor cells.
   for (const char* file : {"nav/recast/nav_test.obj", "nav/recast/undulating.obj"}) {
     if (gsnav_test::data_file(file).empty()) continue;
-    const NavMesh mesh = demo(file);
+    const NavMesh& mesh = demo(file);
     const NavMesh::Impl& impl = mesh.impl();
     Rng rng(42);
     const std::vector<Vec3d> goals{mesh.random_point(rng, 0).position,
@@ -432,8 +442,9 @@ TEST_CASE(
 
 TEST_CASE("geodesic: a field has the same bits for any number of threads and any order of questions") {
   const std::string file = gsnav_test::data_file("nav/recast/undulating.obj");
-  const NavMesh mesh =
-      file.empty() ? build_cells(random_boxes(5, 20, 14)) : demo("nav/recast/undulating.obj");
+  std::optional<NavMesh> boxes;
+  if (file.empty()) boxes = build_cells(random_boxes(5, 20, 14));
+  const NavMesh& mesh = boxes ? *boxes : demo("nav/recast/undulating.obj");
   Rng rng(43);
   const Vec3d goal = mesh.random_point(rng, 0).position;
   std::vector<NavPoint> points;
@@ -459,7 +470,7 @@ TEST_CASE("geodesic: a field has the same bits for any number of threads and any
 TEST_CASE("geodesic: to an error, between a proven bound and a path") {
   const std::string file = gsnav_test::data_file("nav/recast/undulating.obj");
   if (file.empty()) return;
-  const NavMesh mesh = demo("nav/recast/undulating.obj");
+  const NavMesh& mesh = demo("nav/recast/undulating.obj");
   REQUIRE(mesh.impl().hubs().empty());  // hills are searched
   detail::GeodesicSearch plain;
   Rng rng(31);

@@ -45,7 +45,7 @@ struct Meshes {
 TEST_CASE("cuda batch: meshes among the Gaussians have the bits they have one camera at a time") {
   if (no_gpu("cuda batches with meshes")) return;
   CudaBackend cuda;
-  GaussianCloud cloud = random_cloud(5, {.count = 9000, .needle = 0.3});
+  GaussianCloud cloud = random_cloud(5, {.count = is_emulated() ? 3000 : 9000, .needle = 0.3});
   sort_spatially(cloud);
   const GaussianArrays<CudaBackend> arrays(cuda, cloud);
   const std::vector<GaussianSet> sets{arrays.set()};
@@ -155,7 +155,9 @@ TEST_CASE("cuda batch: Composite::hard_depth") {
     for (const std::vector<Camera>& seen : {few, cameras}) {
       const std::vector<MeshFrame> of_seen(seen.size(), all[0]);
       const Frames<float> expected = singly(cuda, {set}, seen, {}, config, kAll, of_seen);
+      int turn = (i + 1) / 2;
       for (const unsigned outputs : {kAll, kMedianOnly, unsigned{kMedianDepth}, unsigned{kRgb}}) {
+        if (is_emulated() && ++turn % 2 != 0) continue;  // each output by two of four rules
         CAPTURE(outputs);
         const Batch got = draw_batch(cuda, renderer, {set}, seen, {}, outputs, true, of_seen);
         check_same(got.frames, singly(cuda, {set}, seen, {}, config, outputs, of_seen));
