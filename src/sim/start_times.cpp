@@ -11,9 +11,17 @@
 namespace gsnav {
 
 Status draw_start_times(std::span<PointNavEpisode> episodes, const SimulatorScene& scene,
-                        const TaskConfig& task, std::uint64_t seed) {
+                        const TaskConfig& task, std::uint64_t seed,
+                        const std::function<void(double)>& progress) {
+  if (Status s = validate(task); !s) return s;
   Rng rng(seed ^ 0x7469636bull);
   for (PointNavEpisode& e : episodes) {
+    if (progress) {
+      progress(static_cast<double>(&e - episodes.data()) / static_cast<double>(episodes.size()));
+    }
+    if (!is_finite(e.start_position)) {
+      return {Errc::invalid_argument, "episode \"" + e.id + "\": start_position is not finite"};
+    }
     for (int tries = 0; tries < 100; ++tries) {
       // At multiples of the control period, many episodes share the same intervals, whose bodies are
       // then computed once.

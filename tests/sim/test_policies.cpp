@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "flat_world.hpp"
@@ -85,4 +88,16 @@ TEST_CASE("episodes start when nobody is near") {
       }
     }
   }
+  // Bad arguments are named, and an exception of progress ends the work.
+  TaskConfig bad;
+  bad.control_period = 0;
+  CHECK(draw_start_times(episodes, scene, bad, 4).message().find("control_period") != std::string::npos);
+  int calls = 0;
+  const auto stop = [&](double) {
+    if (++calls == 3) throw std::runtime_error("enough");
+  };
+  CHECK_THROWS_WITH(draw_start_times(episodes, scene, task, 4, stop), "enough");
+  episodes[7].start_position.y = std::numeric_limits<double>::quiet_NaN();
+  CHECK(draw_start_times(episodes, scene, task, 4).message() ==
+        "episode \"7\": start_position is not finite");
 }

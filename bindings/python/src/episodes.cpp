@@ -112,13 +112,14 @@ void bind_generation(nb::module_& m) {
       "draw_start_times",
       [](std::vector<PointNavEpisode> episodes, const SimulatorScene& scene, const TaskConfig& task,
          std::uint64_t seed) {
-        draw_start_times(episodes, scene, task, seed).throw_if_error();
+        draw_start_times(episodes, scene, task, seed, stop_after_signal).throw_if_error();
         return episodes;
       },
       nb::arg("episodes"), nb::arg("scene"), nb::arg("task"), nb::arg("seed"), Release(),
       "The episodes with random start times in [0, 600) seconds, multiples of the control period at "
       "which no avatar is within 0.6 m of the surface of an agent at the start. After a hundred "
-      "attempts, the last time is used.");
+      "attempts, the last time is used. Ctrl-C ends the call after an episode. Raises InvalidArgument "
+      "naming the field of `task`, or the episode of which start_position is not finite.");
 }
 
 void bind_files(nb::module_& m) {

@@ -69,3 +69,5 @@ def test_episodes_begin_at_random_times_and_apart_from_people():
     assert min(among.distance(e.start_position, 0.0) for e in episodes) < 0.6, "no episode can show a difference"
     again = gsnav.draw_start_times(episodes, scene, task, 3)
     assert [e.start_time for e in again] == list(times)
+    with pytest.raises(gsnav.InvalidArgument, match="control_period"):
+        gsnav.draw_start_times(episodes, scene, gsnav.TaskConfig(control_period=0), 3)
