@@ -66,7 +66,7 @@ def begin_with(path: pathlib.Path | None, args: argparse.Namespace, agent: Agent
     if path is None:
         return
     remedy = "Name another file by --begin-with."
-    if path.suffix != ".npz":
+    if path.suffix.lower() != ".npz":
         checkpoint_of(path, args, "--begin-with", agent, remedy=remedy)
         return
     policy = load(path, "--begin-with")

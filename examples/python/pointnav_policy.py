@@ -98,7 +98,7 @@ def load(path: pathlib.Path, option: str = "--weights") -> Policy:
         sys.exit(f"{path}: not found. Train first, or name another file by {option}.")
     remedy = f"Name another file by {option}."
     try:
-        if path.suffix == ".npz":
+        if path.suffix.lower() == ".npz":
             weights = arrays_of(path)
             size = weights.pop("size")
             need(size.dtype.kind in "iu" and not size.shape, "size", size, "a whole number")

@@ -364,7 +364,7 @@ def arguments() -> argparse.Namespace:
     p.add_argument("--critic-updates", type=number(int, 0), default=0, help="first updates, which learn values alone")
     p.add_argument("--horizon", type=number(float, 1, 1e15), default=1e8, help="steps until the rate is --lr / 10")
     p.add_argument("--every", type=number(int, 1, 10**9), default=50, help="updates from one checkpoint to the next")
-    p.add_argument("--cut-off", type=number(float, 0, 1), default=1.0, help="fraction of ranks whose end ends the "
+    p.add_argument("--cut-off", type=number(float, 0.01, 1), default=1.0, help="fraction of ranks whose end ends the "
                    "rollouts of the others. DD-PPO has 0.6; below 1, runs on several ranks are not reproducible")
     p.add_argument("--mirror", action="store_true", help="swap left and right in every other environment")
     p.add_argument("--not-deterministic", action="store_true", help="let PyTorch choose algorithms by speed alone")

@@ -172,7 +172,8 @@ def test_errors_say_what_to_do(first, tmp_path):
     assert "there are" in refused("--device", "tpu", "--out", tmp_path)
     assert "multiple of --chunks" in refused("--chunks", "3")
     for option, value in (("--chunks", "0"), ("--steps", "nan"), ("--lr", "-1"), ("--size", "35"), ("--density", "nan"),
-                          ("--people", "-1"), ("--epochs", "0"), ("--success", "nan"), ("--every", "0")):
+                          ("--people", "-1"), ("--epochs", "0"), ("--success", "nan"), ("--every", "0"),
+                          ("--cut-off", "0")):
         error = refused(*TINY, "--out", tmp_path / "none", option, value)
         assert f"argument {option}: {value} is not" in error
     file = tmp_path / "file"
