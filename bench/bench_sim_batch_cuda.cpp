@@ -94,6 +94,7 @@ const eval::OracleFrames& truth_of(const Batch& sim, const std::shared_ptr<const
   if (!all.rgb.empty()) return all;
   OpenMPBackend cpu;
   SceneOnBackend<OpenMPBackend> whole(cpu, scene);
+  const Device device = Device::parse("cpu").value();
   eval::OracleConfig config;
   config.order = eval::OracleOrder::float32_key;
   for (std::size_t e = 0; e < kJudged; ++e) {
@@ -101,7 +102,6 @@ const eval::OracleFrames& truth_of(const Batch& sim, const std::shared_ptr<const
     whole.pose(0, world.time()).throw_if_error();
     const AgentPose& agent = world.agent();
     const Camera camera = sensor_camera(sensor, agent.position, agent.rotation(), agent.pitch);
-    const Device device = Device::parse("cpu").value();
     const eval::OracleFrames one =
         photo ? eval::oracle_photo(device, whole.sets(0), camera, 4, config).value()
               : eval::oracle_render(device, whole.sets(0), camera, config).value();

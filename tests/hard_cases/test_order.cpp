@@ -399,11 +399,8 @@ TEST_CASE("N24_neg_zero_depth") {
 }
 
 TEST_CASE("N77_quantised_capture keeps its order at any place") {
-#if defined(GSNAV_TEST_SANITIZED)
-  constexpr std::size_t kRows = 6000;  // such builds run device code on the host too, slowly
-#else
-  constexpr std::size_t kRows = 120000;
-#endif
+  // Builds for sanitizers run device code on the host too, slowly.
+  constexpr std::size_t kRows = kSanitized ? 6000 : 120000;
   const GaussianCloud cloud = coarse_capture(kRows, kRows / 6);
   CHECK(cloud.origins.size() > 2);
   const Camera axis = axis_camera(12, 12);

@@ -34,7 +34,7 @@ namespace {
 
 constexpr std::size_t kMostMemory = 8000000;
 
-/// Of so many mutations, those that are tried: a quarter under sanitizers, under which fuzzers try more.
+/// Number of mutations to try: n, or a quarter of it under sanitizers, which fuzzers use for longer.
 constexpr int tried(int n) { return kSanitized ? n / 4 : n; }
 
 std::string mutated(const std::string& text, std::mt19937& generator) {
