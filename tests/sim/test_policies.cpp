@@ -96,7 +96,7 @@ TEST_CASE("episodes start when nobody is near") {
   const auto stop = [&](double) {
     if (++calls == 3) throw std::runtime_error("enough");
   };
-  CHECK_THROWS_WITH(draw_start_times(episodes, scene, task, 4, stop), "enough");
+  CHECK_THROWS_WITH(static_cast<void>(draw_start_times(episodes, scene, task, 4, stop)), "enough");
   episodes[7].start_position.y = std::numeric_limits<double>::quiet_NaN();
   CHECK(draw_start_times(episodes, scene, task, 4).message() ==
         "episode \"7\": start_position is not finite");
