@@ -19,7 +19,7 @@ using namespace gsnav_test;
 namespace {
 
 /// Opaque disks facing z on a wall at depth z, far larger than the view.
-GaussianCloud wall(std::uint64_t seed, double z, int count) {
+GaussianCloud wall_of_gaussians(std::uint64_t seed, double z, int count) {
   Rng rng(seed);
   std::vector<RawGaussian> disks;
   for (int i = 0; i < count; ++i) {
@@ -53,7 +53,7 @@ TEST_CASE("N65_cull_invariance of slices of depth") {
                                             .scale = 0.05,
                                             .center = {0, 0, 3},
                                             .extent = 4});
-  REQUIRE(append(layers, wall(660, 3.0, 4000)).ok());
+  REQUIRE(append(layers, wall_of_gaussians(660, 3.0, 4000)).ok());
   const GaussianCloud room = sorted(layers);
   const GaussianCloud plain = random_cloud(662, {.count = 800, .sh_degree = 2, .needle = 0.1});
   const GaussianCloud placed = sorted(random_cloud(663, {.count = 3000, .sh_degree = 0, .scale = 0.03}));
@@ -93,8 +93,8 @@ TEST_CASE("N65_cull_invariance of slices of depth") {
 }
 
 TEST_CASE("N65_cull_invariance behind a wall, and before it") {
-  GaussianCloud scene = wall(665, 2.0, 4000);
-  REQUIRE(append(scene, wall(666, 5.0, 6000)).ok());
+  GaussianCloud scene = wall_of_gaussians(665, 2.0, 4000);
+  REQUIRE(append(scene, wall_of_gaussians(666, 5.0, 6000)).ok());
   const GaussianCloud cloud = sorted(scene);
   const Camera camera = axis_camera(64, 60);
   RenderConfig config = all_outputs();
