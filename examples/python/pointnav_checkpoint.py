@@ -14,7 +14,7 @@ import torch
 from pointnav_agent import Agent, made_by
 from pointnav_files import line_of, need, shown
 from pointnav_policy import CHANNELS, load, read_checkpoint
-from pointnav_worlds import METRICS
+from pointnav_worlds import METRICS, WORLDS_VERSION
 from torch import Tensor
 
 COLUMNS = {"update", "frames", "episodes", *METRICS, "reward", "policy", "value", "entropy", "seconds"}  # of a log
@@ -88,10 +88,21 @@ def say_ignored(path: pathlib.Path, kept: dict[str, Any], args: argparse.Namespa
         print(f"{path}: made by {then}, goes on by {now}. Bits may differ from those of one run.", file=sys.stderr)
 
 
+def check_worlds(path: pathlib.Path, kept: dict[str, Any], args: argparse.Namespace) -> None:
+    """Ends the program if a checkpoint is of worlds of another version than those that its arguments give now."""
+    # A checkpoint without the field is of version 1 or 2. They differ only in the episodes of people.
+    then = kept.get("worlds_version", None if args.people else 2)
+    if type(then) is not int or then != WORLDS_VERSION:
+        sys.exit(f"{path}: worlds_version is {shown(kept.get('worlds_version'))}, not {WORLDS_VERSION}: it may have "
+                 f"seen other flats or episodes. Begin anew with its weights: --begin-with {path}, and another folder "
+                 "for --out.")
+
+
 def resumed(path: pathlib.Path, args: argparse.Namespace, agent: Agent, optimizer: torch.optim.Optimizer,
             names: tuple[str, ...]) -> dict[str, Any]:
     """Reads a checkpoint from which training goes on, and gives agent and optimiser their state."""
     kept = checkpoint_of(path, args, "folder for --out", agent, names)
+    check_worlds(path, kept, args)
     update, log, digests = kept["update"], kept["log"], kept["digests"]
     try:
         need(type(update) is int and 0 < update < 2**53 and update % args.every == 0, "update", update,

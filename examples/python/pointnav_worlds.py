@@ -23,6 +23,9 @@ SENSORS = {"depth": ("depth",), "rgb": ("rgb",), "rgbd": ("rgb", "depth")}  # im
 TRAIN_SEEDS, HELD_OUT_SEEDS = range(64), range(64, 80)
 MESH_DENSITY = 0.05  # largest density of flats of triangles
 SUCCESS = 2.5  # reward for a success
+# Version of Worlds and Draw, which checkpoints keep. Raise it when the same arguments give other flats or episodes.
+# In version 1, episodes of people began at time 0.
+WORLDS_VERSION = 2
 METRICS = ("success", "spl", "soft_spl", "collision_rate", "psi", "steps")
 
 

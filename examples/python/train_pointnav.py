@@ -30,8 +30,8 @@ from pointnav_agent import (Agent, Mirror, Reorder, Rows, agreed, clear, devices
 from pointnav_checkpoint import begin_with, resumed, say_ignored
 from pointnav_files import aside
 from pointnav_policy import ACTIONS, CHANNELS, HIDDEN
-from pointnav_worlds import (METRICS, SUCCESS, TRAIN_SEEDS, Draw, Worlds, flats_argument, goals, mixed,
-                             number, run_program, sensor_arguments, sensors_of, world_arguments)
+from pointnav_worlds import (METRICS, SUCCESS, TRAIN_SEEDS, WORLDS_VERSION, Draw, Worlds, flats_argument, goals,
+                             mixed, number, run_program, sensor_arguments, sensors_of, world_arguments)
 from torch import Tensor, nn
 from torch.nn.utils.rnn import PackedSequence
 
@@ -273,10 +273,10 @@ def save(learner: Learner, log: list[dict[str, float]], out: pathlib.Path) -> No
         dist.all_gather_object(digests, learner.digest)
     if learner.rank:
         return
-    kept = {name: getattr(learner.args, name) for name in KEPT}
     # resume() reads all of it, and pointnav_checkpoint.py checks it there.
     state = {"agent": learner.agent.state_dict(), "optimizer": learner.optimizer.state_dict(), "log": log,
-             "update": learner.update_count, "digests": digests, "args": kept, "made_by": made_by(learner.device)}
+             "update": learner.update_count, "digests": digests, "made_by": made_by(learner.device),
+             "worlds_version": WORLDS_VERSION, "args": {name: getattr(learner.args, name) for name in KEPT}}
     with aside(out / "checkpoint.pt") as part:
         torch.save(state, part)
     write_log(out, log)

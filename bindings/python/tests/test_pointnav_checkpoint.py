@@ -27,6 +27,7 @@ class Uses:
         import pointnav_checkpoint
         import pointnav_policy
         from pointnav_agent import Agent
+        from pointnav_worlds import WORLDS_VERSION
         from train_pointnav import KEPT
 
         self.path, self.names = path, KEPT
@@ -42,7 +43,8 @@ class Uses:
         optimizer.step()
         self.good = {"agent": agent.state_dict(), "optimizer": optimizer.state_dict(), "update": 5,
                      "log": [dict.fromkeys(columns, 1.0) for _ in range(5)], "digests": [bytes(32)],
-                     "args": dict(vars(self.args)), "made_by": "a test"}
+                     "args": dict(vars(self.args)), "made_by": "a test",
+                     "worlds_version": WORLDS_VERSION}
 
     def made(self):
         agent = self.agent(64, 1)
@@ -120,6 +122,34 @@ def test_bad_progress_is_named(keys, change, text, uses):
     torch.save(changed(uses.good, keys, change), uses.path)
     uses.refused(RESUMED, text)
     uses.reads[BEGUN](), uses.reads[PLAYED]()  # take weights only
+
+
+ABSENT = object()
+
+
+@pytest.mark.parametrize("held,shown,alone,among_people", [
+    (1, "1", None, None), (2, "2", 2, 2), (3, "3", 3, 3), (ABSENT, "None", 2, None), (None, "None", None, None),
+    (True, "True", None, None), (2.0, "2.0", None, None), ("2", "'2'", None, None),
+    (torch.tensor(2), "int64 []", None, None)])
+def test_a_run_goes_on_in_the_worlds_in_which_it_began(held, shown, alone, among_people, uses, monkeypatch):
+    """`alone` and `among_people`: the version of the program that goes on without and with people."""
+    for people, version in ((0, alone), (5, among_people)):
+        uses.args.people = people
+        state = {**uses.good, "args": dict(vars(uses.args)), "worlds_version": held}
+        if held is ABSENT:
+            del state["worlds_version"]
+        torch.save(state, uses.path)
+        for now in (2, 3):
+            monkeypatch.setattr(sys.modules["pointnav_checkpoint"], "WORLDS_VERSION", now)
+            if now == version:
+                uses.reads[RESUMED]()
+                continue
+            with pytest.raises(SystemExit) as error:
+                uses.reads[RESUMED]()
+            line = str(error.value.code)
+            assert line.startswith(f"{uses.path}: worlds_version is {shown}, not {now}: ") and "\n" not in line, line
+            assert f"--begin-with {uses.path}" in line and "another folder for --out" in line, line
+        uses.reads[BEGUN](), uses.reads[PLAYED]()  # take weights only
 
 
 @pytest.mark.parametrize("keys,change,text", [

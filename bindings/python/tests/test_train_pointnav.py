@@ -63,6 +63,20 @@ def test_a_killed_run_goes_on_with_the_same_bits(first, tmp_path):
     assert trained(tmp_path) == first[1]
 
 
+def test_a_run_of_other_worlds_is_refused_and_its_weights_are_taken(first, tmp_path):
+    kept = torch.load(first[0] / "checkpoint.pt", weights_only=True)
+    assert kept["worlds_version"] == 2
+    old = tmp_path / "old" / "checkpoint.pt"
+    old.parent.mkdir()
+    torch.save({**kept, "worlds_version": 1}, old)
+    run = subprocess.run(command(old.parent), env=ONE_THREAD, capture_output=True, text=True)
+    assert run.returncode == 1 and run.stderr.startswith(f"{old}: worlds_version is 1, not 2: "), run.stderr
+    assert run.stderr.count("\n") == 1 and [p.name for p in old.parent.iterdir()] == [old.name], run.stderr
+    trained(tmp_path / "new", "--begin-with", old, "--critic-updates", "1", updates=1, every=1)
+    for name, value in weights(tmp_path / "new").items():
+        assert name.startswith("value") or torch.equal(value, kept["agent"][name]), name
+
+
 def weights(out):
     return torch.load(out / "checkpoint.pt", weights_only=True)["agent"]
 
