@@ -6,10 +6,12 @@ from __future__ import annotations
 import argparse
 import collections
 import concurrent.futures
+import contextlib
 import hashlib
 import math
 import os
 import sys
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -62,8 +64,7 @@ class Worlds:
                 made = gsnav.draw_start_times(made, scene, self.task, seed)
             return scene, list(made)
 
-        with concurrent.futures.ThreadPoolExecutor(min(16, os.cpu_count() or 1)) as pool:
-            made = list(pool.map(make, seeds))
+        made = in_threads(make, seeds)
         self.scenes = [scene for scene, _ in made]
         self.episodes = [gsnav.BatchEpisode(scene=s, episode=made[s][1][k])
                          for k in range(episodes) for s in range(len(made))]
@@ -79,6 +80,37 @@ class Worlds:
                                    images=memory, auto_reset=gsnav.AutoReset.next_step)
         return gsnav.BatchSimulator(args.device, self.scenes, config, environments, next_episode,
                                     image_source=image_source)
+
+
+def in_threads(make: Callable[[int], Any], seeds: range) -> list[Any]:
+    """The results of make(seed) in the order of the seeds.
+
+    Threads make them. After Ctrl-C they go on, until run_program() ends the program. An error waits for them.
+    """
+    futures = [concurrent.futures.Future[Any]() for _ in seeds]
+    left = collections.deque(zip(seeds, futures))
+
+    def work() -> None:
+        while True:
+            try:
+                seed, future = left.popleft()
+            except IndexError:
+                return
+            try:
+                future.set_result(make(seed))
+            except BaseException as e:
+                future.set_exception(e)
+
+    threads = [threading.Thread(target=work, daemon=True) for _ in range(min(16, os.cpu_count() or 1, len(seeds)))]
+    for thread in threads:
+        thread.start()
+    try:
+        return [future.result() for future in futures]
+    except Exception:
+        left.clear()
+        for thread in threads:
+            thread.join()
+        raise
 
 
 def mixed(*numbers: int) -> int:
@@ -145,7 +177,10 @@ def run_program(main: Callable[[], None]) -> None:
             raise
         sys.exit(f"{name}: {str(e).splitlines()[0]}")
     except KeyboardInterrupt:
-        sys.exit(f"{name}: stopped")
+        with contextlib.suppress(OSError):  # a closed pipe
+            print(f"{name}: stopped", file=sys.stderr, flush=True)
+            sys.stdout.flush()
+        os._exit(1)  # handlers of an ordinary exit must not run beside the threads of in_threads()
 
 
 def world_arguments(p: argparse.ArgumentParser) -> None:

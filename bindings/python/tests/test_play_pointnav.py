@@ -2,8 +2,12 @@
 """Plays held-out episodes with the trained agent of examples/python, which needs no torch."""
 
 import pathlib
+import select
+import signal
 import subprocess
 import sys
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -27,6 +31,63 @@ def test_errors_say_what_to_do(tmp_path):
     assert "Train first" in play("--weights", tmp_path / "checkpoint.pt").stderr
     assert "between 1 and 1,000,000" in play("--episodes", "0").stderr
     assert "there are" in play("--device", "tpu").stderr
+
+
+# Says when a thread begins to make a flat with a thousand people, which takes minutes.
+MAKES_FLATS = """
+import os, signal, sys
+import gsnav
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have ignored it
+make = gsnav.planned_simulator_scene
+def said(*arguments):
+    os.write(1, b"making\\n")
+    return make(*arguments)
+gsnav.planned_simulator_scene = said
+name, sys.path[0] = sys.argv.pop(1), sys.argv.pop(1)
+program = __import__(name)
+program.run_program(program.main)
+"""
+
+
+@pytest.mark.parametrize("name", ["play_pointnav", "train_pointnav"])
+def test_ctrl_c_does_not_wait_for_flats(name, tmp_path):
+    if name == "train_pointnav":
+        pytest.importorskip("torch")
+    words = [sys.executable, "-c", MAKES_FLATS, name, FOLDER, "--people", "1000", "--density", "0.05",
+             *(["--out", tmp_path] if name == "train_pointnav" else [])]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
+        try:
+            assert select.select([run.stdout], [], [], 300)[0] and run.stdout.readline() == "making\n"
+            time.sleep(1)  # the thread is in C++
+            assert run.poll() is None
+            run.send_signal(signal.SIGINT)
+            sent = time.monotonic()
+            out, errors = run.communicate(timeout=60)
+            assert time.monotonic() - sent < 5  # mostly 0.1 s; other processes may take the processor
+        finally:
+            run.kill()
+    assert run.returncode == 1 and errors == "-c: stopped\n" and set(out.split()) <= {"making"}, (errors, out)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_error_in_a_flat_ends_the_others(monkeypatch):
+    monkeypatch.syspath_prepend(FOLDER)
+    from pointnav_worlds import in_threads
+
+    ended = []
+
+    def make(seed):
+        if seed == 1:
+            raise ValueError(f"flat {seed}")
+        time.sleep(0.3)
+        ended.append(seed)
+        return seed
+
+    assert in_threads(lambda seed: -seed, range(40)) == [-seed for seed in range(40)]
+    before = threading.active_count()
+    with pytest.raises(ValueError, match="flat 1"):
+        in_threads(make, range(200))
+    assert len(ended) < 40 and threading.active_count() == before, ended
 
 
 def test_a_damaged_file_of_weights_ends_with_a_line(tmp_path, monkeypatch):
