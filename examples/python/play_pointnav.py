@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plays held-out episodes with a trained agent, a random policy and the geodesic follower. Needs no torch.
 
+The table has means over the episodes ± standard errors. These are over episodes, not over trainings or flats.
+
     play_pointnav.py                                     # the agent whose weights are beside this file
     play_pointnav.py --weights run/checkpoint.pt         # the agent that train_pointnav.py --out run has trained
 """
@@ -8,6 +10,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import pathlib
 import sys
 import time
@@ -27,8 +30,8 @@ def sensor_of(policy: Policy | None) -> str:
     return next((name for name, c in CHANNELS.items() if policy is not None and c == policy.channels), "depth")
 
 
-def evaluate(args: argparse.Namespace, worlds: Worlds, name: str, policy: Policy | None) -> dict[str, float]:
-    """Mean metrics over the held-out episodes.
+def evaluate(args: argparse.Namespace, worlds: Worlds, name: str, policy: Policy | None) -> dict[str, np.ndarray]:
+    """Metrics of each held-out episode, in the order of the episodes.
 
     name: "agent" samples actions as in training; "greedy" takes the most probable ones; "random" and "follower".
     """
@@ -66,11 +69,17 @@ def evaluate(args: argparse.Namespace, worlds: Worlds, name: str, policy: Policy
         if time.monotonic() - shown > 2 and sys.stderr.isatty():
             shown = time.monotonic()
             print(f"{name}: {len(rows)} of {args.episodes} episodes", end=" \r", file=sys.stderr, flush=True)
-    return {key: float(np.mean([rows[i][key] for i in sorted(rows)])) for key in METRICS}
+    return {key: np.array([rows[i][key] for i in range(args.episodes)], float) for key in METRICS}
+
+
+def cell(values: np.ndarray) -> str:
+    """Mean over the episodes and its standard error, which takes them as independent. One episode has none."""
+    error = values.std(ddof=1) / len(values) ** 0.5 if len(values) > 1 else math.nan
+    return f"{values.mean():.3f} ± {error:.3f}"
 
 
 def main() -> None:
-    """Prints a table of the policies' metrics."""
+    """Prints a table of the policies' metrics: means over the episodes ± their standard errors."""
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("--weights", type=pathlib.Path, default=WEIGHTS, help="checkpoint.pt, or a file of --save-weights")
     p.add_argument("--save-weights", type=pathlib.Path, metavar="FILE.npz", help="write the agent to a file and end")
@@ -93,8 +102,8 @@ def main() -> None:
     worlds = Worlds(HELD_OUT_SEEDS, args, -(-args.episodes // len(HELD_OUT_SEEDS)))
     print("| policy | " + " | ".join(METRICS) + " |\n" + "|---" * (len(METRICS) + 1) + "|")
     for name in args.policies:
-        means = evaluate(args, worlds, name, policy if name in plays else None)
-        print(f"| {name} | " + " | ".join(f"{means[key]:.3f}" for key in METRICS) + " |", flush=True)
+        metrics = evaluate(args, worlds, name, policy if name in plays else None)
+        print(f"| {name} | " + " | ".join(cell(metrics[key]) for key in METRICS) + " |", flush=True)
 
 
 if __name__ == "__main__":

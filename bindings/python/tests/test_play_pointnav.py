@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plays held-out episodes with the trained agent of examples/python, which needs no torch."""
 
+import argparse
 import pathlib
 import select
 import signal
+import statistics
 import subprocess
 import sys
 import threading
@@ -12,6 +14,8 @@ import time
 import numpy as np
 import pytest
 
+import gsnav
+
 FOLDER = pathlib.Path(__file__).parents[3] / "examples" / "python"
 
 
@@ -19,12 +23,68 @@ def play(*words, script="play_pointnav.py"):
     return subprocess.run([sys.executable, FOLDER / script, "--device", "cpu", *words], capture_output=True, text=True)
 
 
+def table(printed):
+    """The table: for each policy and metric, mean and standard error."""
+    head, _, *rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in printed.splitlines()]
+    return {name: {key: tuple(map(float, c.split(" ± "))) for key, c in zip(head[1:], cells)} for name, *cells in rows}
+
+
 def test_the_trained_agent_reaches_goals_in_flats_it_has_never_seen():
     run = play("--episodes", "8", "--policies", "greedy", "random")
     assert run.returncode == 0, run.stderr
-    spl = {line.split("|")[1].strip(): float(line.split("|")[3]) for line in run.stdout.splitlines()[2:]}
+    spl = {name: values["spl"][0] for name, values in table(run.stdout).items()}
     assert spl["random"] < 0.1 and spl["greedy"] > 0.7  # 0.9 over 500 episodes
     assert (FOLDER / "pointnav_depth.npz").stat().st_size < 2e6
+
+
+class Wanders:
+    """Follows the shortest path in some episodes. In others it walks in circles, and ends after a while."""
+
+    def __init__(self):
+        self.follower = gsnav.GeodesicFollower()
+
+    def next(self, world):
+        m = world.metrics()
+        if m.start_distance > 4:
+            return self.follower.next(world)
+        if m.steps > 40 * m.start_distance:
+            return gsnav.Action.stop
+        return gsnav.Action.turn_left if m.steps % 5 == 0 else gsnav.Action.move_forward
+
+
+def test_the_table_has_means_and_standard_errors_over_episodes(monkeypatch, capsys):
+    """Truth: the episodes one after the other in a simulator of one agent."""
+    monkeypatch.syspath_prepend(FOLDER)
+    import play_pointnav
+    from pointnav_worlds import Worlds
+
+    args = argparse.Namespace(people=5, rooms=2, density=0.05, quality="exact", worlds="gaussians")
+    worlds, policy, ended = Worlds(range(64, 65), args, 9), Wanders(), []
+    simulator = gsnav.Simulator("cpu:1", worlds.scenes[0], gsnav.SimulatorConfig(task=worlds.task, sensors=[]))
+    for e in worlds.episodes:
+        simulator.reset(e.episode)
+        while not simulator.done:
+            simulator.step(policy.next(simulator.world))
+        ended.append(simulator.metrics())
+    monkeypatch.setattr(gsnav, "GeodesicFollower", lambda: policy)
+    monkeypatch.setattr(play_pointnav, "Worlds", lambda *arguments: worlds)
+
+    def played(count):
+        monkeypatch.setattr(sys, "argv", ["play_pointnav.py", "--device", "cpu:1", "--people", "5", "--policies",
+                                          "follower", "--batch", "4", "--episodes", str(count)])
+        play_pointnav.main()
+        return table(capsys.readouterr().out)["follower"]
+
+    found = played(9)
+    for key, (mean, error) in found.items():
+        values = [float(getattr(m, key)) for m in ended]
+        assert mean == pytest.approx(statistics.mean(values), abs=6e-4), (key, values)
+        assert error == pytest.approx(statistics.stdev(values) / 3, abs=6e-4) and error > 0.002, (key, values)
+    # An episode counts once, whatever its length.
+    rates = [m.collision_steps / m.steps for m in ended]
+    assert found["collision_rate"][0] == pytest.approx(statistics.mean(rates), abs=6e-4)
+    assert abs(sum(m.collision_steps for m in ended) / sum(m.steps for m in ended) - statistics.mean(rates)) > 2e-3
+    assert all(np.isnan(error) for _, error in played(1).values())
 
 
 def test_errors_say_what_to_do(tmp_path):
