@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Draws a picture, its depth and a map with a path. usage: plot.py [SCENE]; writes plot.png, needs matplotlib"""
 
+import pathlib
 import sys
 
 import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
+from pointnav_files import aside  # noqa: E402
 
 import gsnav  # noqa: E402
 
@@ -26,7 +28,8 @@ def main(scene_name: str = "default") -> None:
     plan.imshow(floor.islands < 0, cmap="gray_r", extent=(floor.low[0], right, below, floor.low[2]))
     plan.plot(points[:, 0], points[:, 2], "r-")
     plan.set(xlabel="x, metres", ylabel="z, metres")
-    figure.savefig("plot.png")
+    with aside(pathlib.Path("plot.png")) as part:
+        figure.savefig(part)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the PointNav programs write files, and name a value of a file that cannot be used. Needs no other package."""
+"""How the programs write files, and name a value of a file that cannot be used. Needs no other package."""
 
 from __future__ import annotations
 

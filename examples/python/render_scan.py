@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Renders a scene to numpy arrays. usage: render_scan.py [SCENE [DEVICE]]; writes scan.npz"""
 
+import pathlib
 import sys
 
 import numpy as np
+from pointnav_files import aside
 
 import gsnav
 
@@ -17,7 +19,8 @@ def main(scene_name: str = "default", device_name: str = "best") -> None:
     rgb, depth = frames.rgb, frames.median_depth  # float32 [480][640][3] and [480][640], metres
     # [/snippet]
     assert rgb is not None and depth is not None
-    np.savez_compressed("scan.npz", rgb=gsnav.to_bytes(rgb), depth=depth)
+    with aside(pathlib.Path("scan.npz")) as part:
+        np.savez_compressed(part, rgb=gsnav.to_bytes(rgb), depth=depth)
     print(f"{scene.name} on {device.description}: median depth {np.median(depth):.2f} m")
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs each example in a process of its own, and checks the types of all."""
 
+import os
 import pathlib
 import subprocess
 import sys
@@ -29,6 +30,23 @@ def test_example(name, tmp_path):
     subprocess.run([sys.executable, "-W", "error::UserWarning", EXAMPLES / name], check=True, cwd=tmp_path)
     if name in WRITES:
         assert (tmp_path / WRITES[name]).stat().st_size > 1000
+
+
+@pytest.mark.parametrize("name", ["render_scan.py", "plot.py"])
+def test_a_file_that_cannot_be_written_is_as_it_was(name, tmp_path):
+    resource = pytest.importorskip("resource")
+    if name in NEEDS:
+        pytest.importorskip(NEEDS[name])
+    path = tmp_path / WRITES[name]
+    path.write_bytes(b"old")
+
+    def limit():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))  # bytes of a file
+
+    run = subprocess.run([sys.executable, EXAMPLES / name], cwd=tmp_path, capture_output=True, text=True,
+                         env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}, preexec_fn=limit)
+    assert run.returncode == 1 and "File too large" in run.stderr, run.stderr
+    assert path.read_bytes() == b"old" and list(tmp_path.iterdir()) == [path]
 
 
 @pytest.mark.parametrize("examples", [[p for p in SHORT if p.name != "on_torch.py"],
