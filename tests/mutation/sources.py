@@ -123,3 +123,11 @@ class Sources:
                 if any(s[0] <= body[0] and body[1] <= s[1] for s in scopes):
                     found.update((file, *place) for place in tokens.find(pattern, *body))
         return sorted(found)
+
+
+def place_of(sources: Sources, edit):
+    """(file, begin, end) of the tokens to replace, or why there is no such place."""
+    found = sources.find(edit.function, edit.old)
+    if len(found) == 1:
+        return found[0], ""
+    return None, f"{edit.function} holds {len(found)} times: {edit.old.strip().splitlines()[0]}"
