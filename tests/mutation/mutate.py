@@ -13,7 +13,8 @@ backend by itself where the fault names backends. Exit status: 0 all faults are 
 (the tokens do not stand in the function exactly once, a fault does not compile, a case fails without a fault).
 --check only looks whether each fault has its place and its cases, and whether headers of tests declare nothing that
 another file instantiates: a second, and a test of every build. With `--cxx "ccache c++"`, what a fault does not change
-is compiled once.
+is compiled once. --together compiles all tests once, with all faults, and chooses a fault at run time
+(tests/mutation/switches.py); faults that this cannot do or does not catch are then checked as without it.
 """
 import argparse
 import concurrent.futures
