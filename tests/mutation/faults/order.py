@@ -128,7 +128,7 @@ FAULTS = [
           "select(l > last, l - one, l)",
           ORDER, "N22_depth_tie_grid", on=EVERY),
     fault("rank_of_the_stored_row", "ViewedSet::rank_of",
-          "(gaussians.row_ids.empty() ? row : gaussians.row_ids[row])", "row",
+          "gaussians.row_ids.empty() ? row : gaussians.row_ids[row]", "row",
           CULLING, "N21_depth_ties_keep_file_order when rows are sorted in space", on=EVERY),
     fault("ranks_of_lanes_by_the_stored_row", "store_ranks", "ranks[l] = args.rank_of_id(ranks[l]);",
           "ranks[l] = args.rank_of_id(static_cast<std::uint32_t>(first + l));",
