@@ -202,22 +202,28 @@ TEST_CASE("planes: depth in closed form, from a centimetre to the horizon") {
 TEST_CASE("slivers and needles keep the depth of their corners") {
   SerialBackend serial;
   Rng rng(3);
+  const double f = mesh_lens().fx;
+  const auto whole = [&](int most) { return std::floor(rng.uniform(-most, most + 1)); };
+  int drawn = 0;
   for (int i = 0; i < 200; ++i) {
     SurfaceMesh m;
     m.two_sided = true;
-    // Edge-on within a rounding: through the camera, but for 1e-9.
-    const Vec3d along{rng.uniform(-0.5, 0.5), rng.uniform(-0.5, 0.5), 1};
+    // Edge-on: through the camera, but for 1e-5. The image is a line through centres of pixels, so that
+    // it covers some.
+    const Vec3d along{(whole(15) + 0.5) / f, (whole(15) + 0.5) / f, 1};
     const auto point = [&](double z) {
-      return vec_cast<float>(along * z + Vec3d{rng.normal(), rng.normal(), 0} * 1e-7);
+      return vec_cast<float>(along * z + Vec3d{rng.normal(), rng.normal(), 0} * 1e-5);
     };
-    m.geometry.vertices = {point(0.5), point(20),
-                           vec_cast<float>(along * 3.0 + Vec3d{rng.normal(), rng.normal(), 0} * 0.02)};
+    const Vec3d third = along + Vec3d{whole(1) * 8 / f, whole(1) * 8 / f, 0};
+    m.geometry.vertices = {point(0.5), point(20), vec_cast<float>(third * 3.0)};
     m.geometry.triangles = {{0, 1, 2}};
     const OneMesh mesh(m);
     for (const float z : draw<float>(serial, mesh.instances, mesh_lens()).depth) {
       REQUIRE((std::isinf(z) || (z >= 0.4999f && z <= 20.01f)));
+      drawn += std::isinf(z) ? 0 : 1;
     }
   }
+  CHECK(drawn > 200);
 }
 
 TEST_CASE(
