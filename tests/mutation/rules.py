@@ -41,7 +41,7 @@ RULES = {
     },
     "Order": {
         "sort key": ("sort_key", "row_key", "depth_key", "distance_key", "KeyCode"),
-        "rank of equal keys": ("ViewedSet::rank_of",),
+        "rank of equal keys": ("ViewedSet::rank_of", "store_ranks"),
     },
     "Tiles": {
         "pixels of a footprint": ("pixel_range",),

@@ -22,7 +22,7 @@ FAULTS = [
     fault("rows_by_themselves", "seen_rows",
           "    if (any) continue;\n    for (std::size_t r = first; r < first + run; ++r) out",
           "    for (std::size_t r = first; r < first + run; ++r)\n      if (begin + r >= most.size() || "
-          "!(static_cast<double>(most[begin + r]) > settings.min_weight)) out",
+          "!(static_cast<double>(most[begin + r]) > min_weight)) out",
           VISIBLE_TEST, RUNS, why="what lies together is seen together"),
     fault("a_chunk_by_its_last_viewpoint", "add",
           "    for (std::size_t k = 0; k < kSeenRowWords; ++k) to[k] |= rows[k];\n", "    to = rows;\n",
