@@ -156,6 +156,47 @@ TEST_CASE("N49_mesh_between_layers") {
   }
 }
 
+TEST_CASE("hard_depth shows Gaussians where their expected depth is not beyond the mesh") {
+  // On the axis two Gaussians, of colours b + c and of alpha 0.95, whose expected depth is 2.8 / 0.95;
+  // or one that is too faint for Habitat-GS, which drops alpha up to 0.01.
+  const std::array<double, 3> background{0.1, 0.2, 0.3},
+      wall{1, static_cast<double>(srgb_encoded(0.5)), 0};
+  const auto color = [](float sh0) { return 0.5 + 0.28209479177387814 * static_cast<double>(sh0); };
+  const std::array<float, 3> near_color{0.9f, -0.7f, 0.4f}, far_color{-0.2f, 0.3f, 1.0f};
+  const GaussianCloud two = cloud_of({gaussian({0, 0, 2}, {0.4, 0.4, 1e-4}, 0.5, near_color),
+                                      gaussian({0, 0, 4}, {4, 4, 1e-4}, 0.9, far_color)}),
+                      faint = cloud_of({gaussian({0, 0, 2}, {0.4, 0.4, 1e-4}, 0.008, near_color)});
+  RenderConfig config = all_outputs();
+  config.composite = Composite::hard_depth;
+  config.background = {0.1, 0.2, 0.3};
+  // A wall behind the camera leaves the pixel without a mesh.
+  for (const float z : {2.94f, 2.95f, -1.0f}) {
+    const OneMesh mesh = wall_mesh(z, 5, {1, 0.5f, 0});
+    const bool covered = z > 0;
+    const std::array<double, 3>& under = covered ? wall : background;
+    for (const bool dropped : {false, true}) {
+      const bool shown = !dropped && (!covered || static_cast<double>(z) > 2.8 / 0.95);
+      const double depth = shown ? 2.8 / 0.95 : covered ? static_cast<double>(z) : 0.0;
+      render_everywhere(
+          {dropped ? &faint : &two}, axis_camera(), config,
+          [&](const auto& f, const auto&) {
+            const std::size_t p = kAxisPixel;
+            for (std::size_t c = 0; c < 3; ++c) {
+              const double over = 0.5 * color(near_color[c]) + 0.45 * color(far_color[c]);
+              const double want = shown ? over + 0.05 * under[c] : under[c];
+              CHECK(std::abs(static_cast<double>(f.rgb[3 * p + c]) - want) < 1e-6);
+            }
+            const double alpha = covered ? 1.0 : shown ? 0.95 : 0.0;
+            CHECK(std::abs(static_cast<double>(f.alpha[p]) - alpha) < 1e-6);
+            for (const auto* image :
+                 {&f.median_depth, &f.expected_depth, &f.accumulated_depth, &f.first_hit_depth})
+              CHECK(std::abs(static_cast<double>((*image)[p]) - depth) < 2e-6);
+          },
+          mesh.instances);
+    }
+  }
+}
+
 TEST_CASE("N50_mesh_straddle_cloud") {
   const GaussianCloud cloud = random_cloud(50, {.count = 10000,
                                                 .sh_degree = 1,

@@ -65,6 +65,7 @@ RULES = {
                                                 "last_above_half"),
         "depth along a ray": ("make_splat_depth", "ray_depth"),
         "meshes among Gaussians": ("behind", "alpha_before_mesh", "blend_surface", "blend_within"),
+        "Habitat-GS's choice of layer": ("HardDepthPixel",),
         "sums to a pixel": ("finished", "pixel_color", "pixel_expected_depth", "pixel_accumulated_depth",
                             "pixel_value", "store_color"),
     },

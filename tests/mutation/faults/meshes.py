@@ -5,6 +5,7 @@ from . import BACKENDS, BY_ALL_TILES, fault
 MESH = "tests/ops/test_mesh.cpp"
 CASES = "tests/hard_cases/test_composite.cpp"
 PANES = "tests/hard_cases/test_fragments.cpp"
+HARD_DEPTH = "hard_depth shows Gaussians*"
 RAYS = "random triangles, also huge ones and behind the camera: what a ray tracer in long double meets"
 
 FAULTS = [
@@ -41,6 +42,12 @@ FAULTS = [
           "state.transmittance = select(state.transmittance < L(S(0)), -after, after);", "",
           CASES,
           "N49_mesh_between_layers", on=BY_ALL_TILES),
+    fault("hard_depth_of_the_farther", "HardDepthPixel", "covered && d > z", "covered && d < z", CASES, HARD_DEPTH,
+          why="the mesh shows where it is farther", on=BY_ALL_TILES),
+    fault("hard_depth_of_the_faint", "HardDepthPixel", "a > S(kHabitatReturnAlpha)", "a > S(0)", CASES, HARD_DEPTH,
+          why="Gaussians too faint for a depth are drawn", on=BY_ALL_TILES),
+    fault("hard_depth_alpha_of_the_mesh", "HardDepthPixel", "covered ? S(1) : (lost ? S(0) : a)", "lost ? S(0) : a",
+          CASES, HARD_DEPTH, why="a mesh is transparent", on=BY_ALL_TILES),
     fault("mesh_cull_by_centre", "behind", "d.z - d.reach > depth", "d.z > depth", CASES, "N53_tile_max_mesh_cull",
           on=BACKENDS),
     fault("mesh_chunk_without_reach", "nearest_reach", "* (1 - 1e-6) - reach * (1 + 1e-5);",
