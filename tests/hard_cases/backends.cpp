@@ -82,7 +82,12 @@ Frames<S> CaseRenderer<S, B>::render(const std::vector<Placed>& scene,
     const auto in_float = [&](const RenderConfig& how) {
       return draw<float>(*backend_, there.sets, cameras, how, there.instances);
     };
-    if (judges_fast(config)) check_fast(in_float(fast_of(config)), in_float(config), frames);
+    if (judges_fast(config)) {
+      const Frames<float> fast = in_float(fast_of(config)), exact = in_float(config);
+      record_hashes(fast, std::string(this->name()) + ", fast");
+      record_hashes(exact, std::string(this->name()) + ", float");
+      check_fast(fast, exact, frames);
+    }
   }
   return frames;
 }
