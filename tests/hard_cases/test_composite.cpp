@@ -117,6 +117,9 @@ GaussianCloud wall_of_disks(std::uint64_t seed, double z, double half, int count
   return cloud_of(disks);
 }
 
+/// Colour of a Gaussian of degree 0 in one channel.
+double color(float sh0) { return 0.5 + 0.28209479177387814 * static_cast<double>(sh0); }
+
 OneMesh wall_mesh(float z, float half, const Vec3f& linear) {
   SurfaceMesh m = quad({-half, -half, z}, {half, -half, z}, {half, half, z}, {-half, half, z});
   m.base_color = linear;
@@ -132,7 +135,6 @@ TEST_CASE("N49_mesh_between_layers") {
     const GaussianCloud cloud =
         cloud_of({gaussian({0, 0, 2}, {0.4, 0.4, 1e-4}, opacity, {0.9f, -0.7f, 0.4f}),
                   gaussian({0, 0, 4}, {4, 4, 1e-4}, 0.9, {1.5f, 1.5f, 1.5f})});
-    const auto color = [](float sh0) { return 0.5 + 0.28209479177387814 * static_cast<double>(sh0); };
     const std::array<double, 3> front{color(0.9f), color(-0.7f), color(0.4f)};
     render_everywhere(
         {&cloud}, axis_camera(), all_outputs(),
@@ -157,11 +159,10 @@ TEST_CASE("N49_mesh_between_layers") {
 }
 
 TEST_CASE("hard_depth shows Gaussians where their expected depth is not beyond the mesh") {
-  // On the axis two Gaussians, of colours b + c and of alpha 0.95, whose expected depth is 2.8 / 0.95;
-  // or one that is too faint for Habitat-GS, which drops alpha up to 0.01.
+  // On the axis: two Gaussians with alpha 0.5 and 0.9, together 0.95, whose expected depth is 2.8 /
+  // 0.95. Or one with alpha 0.008: Habitat-GS drops pixels of up to 0.01.
   const std::array<double, 3> background{0.1, 0.2, 0.3},
       wall{1, static_cast<double>(srgb_encoded(0.5)), 0};
-  const auto color = [](float sh0) { return 0.5 + 0.28209479177387814 * static_cast<double>(sh0); };
   const std::array<float, 3> near_color{0.9f, -0.7f, 0.4f}, far_color{-0.2f, 0.3f, 1.0f};
   const GaussianCloud two = cloud_of({gaussian({0, 0, 2}, {0.4, 0.4, 1e-4}, 0.5, near_color),
                                       gaussian({0, 0, 4}, {4, 4, 1e-4}, 0.9, far_color)}),
