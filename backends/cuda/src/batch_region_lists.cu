@@ -152,7 +152,18 @@ __device__ void reserve_lists(const RegionArgs& r, ListShared& s) {
   s.precise_reserved = s.precise_base == kNoPreciseRecords ? 0u : s.precise_rows;
 }
 
-/// A block counts the rows of a part of a camera.
+/// Places the rows of a camera that has one part, after the block has counted them.
+__device__ void place_all(const BatchArgs& a, const RegionArgs& r, ListShared& s, const ListWarp& warp) {
+  __syncthreads();  // the bins have been read
+  if (threadIdx.x == 0) {
+    s.rows = r.camera_rows[s.part.camera];
+    s.precise_rows = 0;
+  }
+  if (s.fits != 0)
+    for_instances(a, r, s, [&](std::uint32_t groups, const uint2* rows) { warp.place(groups, rows); });
+}
+
+/// A block counts the rows of a part of a camera. If that is all of the camera, it places them, too.
 __global__ void __launch_bounds__(kListThreads, Policy::kListResident)
     count_rows_kernel(const __grid_constant__ BatchArgs a, const __grid_constant__ RegionArgs r) {
   extern __shared__ __align__(16) unsigned bins[];
@@ -178,11 +189,7 @@ __global__ void __launch_bounds__(kListThreads, Policy::kListResident)
   if (s.fits != 0)
     for_instances(a, r, s, [&](std::uint32_t groups, uint2* rows) { warp.count(groups, rows); });
   const std::uint32_t camera = s.part.camera, first = s.part.first, parts = s.part.parts;
-  if (parts > 1) {
-    if (!sum_parts(r, s, bins, count)) return;
-  } else if (threadIdx.x == 0) {
-    r.part_precise[first] = 0;
-  }
+  if (parts > 1 && !sum_parts(r, s, bins, count)) return;
   place_bins(s, bins, count);
   if (threadIdx.x == 0) reserve_lists(r, s);
   __syncthreads();
@@ -195,18 +202,19 @@ __global__ void __launch_bounds__(kListThreads, Policy::kListResident)
   for (std::uint32_t i = threadIdx.x; s.fits == 0 && i < s.precise_reserved; i += kListThreads) {
     if (s.precise_base + i < r.precise_capacity) r.precise_rows[s.precise_base + i] = {kNoSlot, 0};
   }
+  if (parts == 1) return place_all(a, r, s, warp);
   for (std::uint32_t i = threadIdx.x; s.fits != 0 && i < count; i += kListThreads) {
     std::uint32_t place = bins[i];
     for (std::uint32_t q = 0; q < parts; ++q) {
       std::uint32_t& of_part = r.list_places[std::size_t{first + q} * count + i];
-      const std::uint32_t rows = parts > 1 ? of_part : 0u;
+      const std::uint32_t rows = of_part;
       of_part = place;
       place += rows;
     }
   }
 }
 
-/// A block places the rows of a part of a camera.
+/// A block places the rows of one of several parts of a camera.
 __global__ void __launch_bounds__(kListThreads, Policy::kListResident)
     place_rows_kernel(const __grid_constant__ BatchArgs a, const __grid_constant__ RegionArgs r) {
   extern __shared__ __align__(16) unsigned bins[];
@@ -214,6 +222,7 @@ __global__ void __launch_bounds__(kListThreads, Policy::kListResident)
   ListShared& s = *reinterpret_cast<ListShared*>(memory);
   if (blockIdx.x >= r.counters->list_parts) return;
   const std::uint32_t count = static_cast<std::uint32_t>(r.columns * r.rows) * r.bins;
+  if (r.list_parts[blockIdx.x].parts == 1) return;
   if (threadIdx.x == 0) {
     s.part = r.list_parts[blockIdx.x];
     s.rows = r.camera_rows[s.part.camera];
