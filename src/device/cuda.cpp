@@ -3,6 +3,7 @@
 
 #include "engines_on.hpp"
 #include "gsnav/detail/render/frame_batch.hpp"
+#include "gsnav/scene/visible_sets.hpp"
 
 namespace gsnav::detail {
 namespace {
@@ -19,6 +20,13 @@ std::unique_ptr<CudaBackend> make_cuda(const Device& device) {
 const EngineFactory cuda_engines = engines_on<CudaBackend, make_cuda>();
 
 int cuda_count() noexcept { return CudaBackend::device_count(); }
+Result<VisibleSets> visible_sets_on_cuda(const Device& device, const GaussianCloud& cloud,
+                                         std::span<const Vec3d> viewpoints,
+                                         const VisibleSettings& settings,
+                                         const Similarity& world_from_asset) {
+  CudaBackend backend(device.index());
+  return build_visible_sets(backend, cloud, viewpoints, settings, world_from_asset);
+}
 std::string cuda_name(int index) { return CudaBackend(index).device_name(); }
 
 }  // namespace gsnav::detail

@@ -36,7 +36,7 @@ RULES = {
     },
     "Culling": {
         "bounds of a chunk in view": ("nearest_reach", "reach", "chunk_extent"),
-        "rows that a cell may see": ("seen_rows", "any_of_part"),
+        "rows that a cell may see": ("heavy_rows", "whole_groups", "any_of_part"),
         "rough footprint of a row": ("rough_footprint", "RoughView"),
     },
     "Order": {

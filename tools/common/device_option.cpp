@@ -6,7 +6,7 @@
 
 namespace gsnav_tools {
 
-void add_device_option(CLI::App& app, gsnav::Device& device, bool* float64) {
+void add_device_option(CLI::App& app, gsnav::Device& device, bool* float64, const char* use) {
   const auto read = [&device, float64](const std::string& name) {
     if (float64 != nullptr && name == "serial64") {
       *float64 = true;
@@ -16,9 +16,9 @@ void add_device_option(CLI::App& app, gsnav::Device& device, bool* float64) {
     if (!found) throw CLI::ValidationError("--device", found.message());
     device = *found;
   };
-  std::string what =
-      "device to render on: best (a GPU if there is one, else cpu), cpu, cpu:THREADS, cuda, "
-      "cuda:NUMBER, serial";
+  std::string what = std::string(use) +
+                     ": best (a GPU if there is one, else cpu), cpu, cpu:THREADS, cuda, cuda:NUMBER, "
+                     "serial";
   if (float64 != nullptr) what += ", serial64 (the float64 reference)";
   app.add_option_function<std::string>("--device", read, what)->default_str("best")->force_callback();
 }

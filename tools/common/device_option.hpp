@@ -14,7 +14,9 @@ namespace gsnav_tools {
 /// Adds `--device`, with the default "best". Other names than those of the machine's devices are
 /// rejected with a list of these.
 /// @param float64 Set to true by "serial64". Null: that name is not available.
-void add_device_option(CLI::App& app, gsnav::Device& device, bool* float64 = nullptr);
+/// @param use Begins the help text: "device to render on".
+void add_device_option(CLI::App& app, gsnav::Device& device, bool* float64 = nullptr,
+                       const char* use = "device to render on");
 
 /// Throws CLI::ValidationError if GSNAV_ISA names no instruction set. For programs without --device.
 void check_instruction_set();

@@ -10,7 +10,6 @@
 
 #include "../common/progress.hpp"
 #include "draw.hpp"
-#include "gsnav/backends/openmp.hpp"
 #include "gsnav/core/replace_file.hpp"
 #include "gsnav/io.hpp"
 #include "gsnav/io/image_file.hpp"
@@ -66,6 +65,12 @@ Result<NavMesh> from_triangles(const Options& o) {
   return build(o, all);
 }
 
+/// The device of --device. --threads holds for `cpu`, too.
+Device device_of(const Options& o) {
+  if (o.threads == 0 || o.device.kind() != DeviceKind::cpu || o.device.threads() != 0) return o.device;
+  return Device::parse("cpu:" + std::to_string(o.threads)).value();
+}
+
 /// Computes the visible sets for positions on the NavMesh, and writes them.
 Status write_visible_sets(const Options& o, const GaussianCloud& cloud, const NavMesh& mesh,
                           const Similarity& placed) {
@@ -76,8 +81,7 @@ Status write_visible_sets(const Options& o, const GaussianCloud& cloud, const Na
   settings.progress = [print = gsnav_tools::progress_printer()](double share) {
     print("visible sets", share);
   };
-  OpenMPBackend backend(o.threads);
-  const auto sets = build_visible_sets(backend, cloud, *viewpoints, settings, placed);
+  const auto sets = build_visible_sets(device_of(o), cloud, *viewpoints, settings, placed);
   if (!sets) return sets.status();
   if (sets->refused_share > 0) {
     std::fprintf(stderr,

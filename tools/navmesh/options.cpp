@@ -158,7 +158,7 @@ void add_build(CLI::App& app, Options& o, Given& given) {
                      "Habitat does (Gaussians with more than 2^22 columns: 512)")
           ->capture_default_str()
           ->group(build);
-  app.add_option("--threads", o.threads, "number of threads that build tiles; 0 uses all cores")
+  app.add_option("--threads", o.threads, "number of threads; 0 uses all cores")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str()
       ->group(build);
@@ -214,6 +214,8 @@ void add_visible_sets(CLI::App& app, Options& o) {
   const auto setting = [&](const char* name, auto& value, const char* text) {
     app.add_option(name, value, text)->capture_default_str()->group(seen);
   };
+  gsnav_tools::add_device_option(app, o.device, nullptr, "device that finds visible sets");
+  app.get_option("--device")->group(seen);
   setting("--visible-cell", v.cell, "side of a cell, metres; viewpoints are half a side apart");
   setting("--visible-weight", v.min_weight,
           "least share of a pixel that a Gaussian must have to count as seen");
@@ -292,12 +294,9 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
             {"--lod-error", no_image},
             {"--lod-levels", "a NavMesh is built from the finest level"},
             {"--avatars", no_people},
-            {"--seed", no_people},
-            {"--device", "NavMeshes and visible sets are built on the processor: see --threads"}});
-  const auto status = gsnav_tools::parse_options(app, argc, argv, [&] {
-    gsnav_tools::check_instruction_set();  // for visible sets
-    check_together(app, o, given);
-  });
+            {"--seed", no_people}});
+  const auto status =
+      gsnav_tools::parse_options(app, argc, argv, [&] { check_together(app, o, given); });
   if (status) {
     exit_code = *status;
     return std::nullopt;

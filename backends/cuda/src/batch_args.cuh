@@ -276,6 +276,15 @@ void launch_ordering(const BatchArgs& args, int multiprocessors, cudaStream_t st
 /// @param rgb8 8-bit image, or null. May be combined with raster.images.rgb.
 void launch_blending(const BatchArgs& args, const RasterArgs<float>& raster, std::uint8_t* rgb8,
                      cudaStream_t stream);
+/// Where the largest share of light of each Gaussian goes, if a call finds them in place of images.
+struct LargestShares {
+  float* most = nullptr;  ///< [groups of cameras][rows]. Null: the call draws images.
+  std::uint32_t rows = 0, cameras_of_group = 1;
+  bool operator==(const LargestShares&) const = default;
+};
+/// Raises `to.most` to the shares that the Gaussians of the lists have.
+void launch_weighing(const BatchArgs& args, const BlendRules<float>& rules, const LargestShares& to,
+                     cudaStream_t stream);
 /// Replaces the slots of median Gaussians by their depths, unless blending has done it. Without
 /// `args.sources`, slots are sources.
 void launch_depths(const BatchArgs& args, const RasterArgs<float>& raster, cudaStream_t stream);

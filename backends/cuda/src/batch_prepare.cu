@@ -224,7 +224,8 @@ bool CudaBatchRenderer::State::plan_tiles(std::span<const BatchCamera> cameras,
                                           std::uint64_t gaussians) {
   const int width = cameras[0].camera.width, height = cameras[0].camera.height;
   args.grid = TileGrid::of(width, height, cuda::policy::Batch::kTile);
-  const bool few = is_of_few(args.cameras, args.grid.count(), gaussians, multiprocessors);
+  const bool few =
+      shares.most == nullptr && is_of_few(args.cameras, args.grid.count(), gaussians, multiprocessors);
   if (few) args.grid = TileGrid::of(width, height, cuda::policy::Batch::kSmallTile);
   args.tiles = static_cast<std::uint32_t>(
       std::min<std::uint64_t>(args.cameras * std::uint64_t{args.grid.count()}, ~std::uint32_t{0}));
@@ -245,8 +246,9 @@ void CudaBatchRenderer::State::set_raster(const BatchImages& images) {
   raster.background = vec_cast<float>(config.background);
   raster.exp2_method = exp2_method(config.quality);
   raster.images = images.floats;
-  raster.rules =
-      images.rgb8 != nullptr ? blend_rules<float>(config) : blend_rules<float>(config, images.floats);
+  raster.rules = images.rgb8 != nullptr || shares.most != nullptr
+                     ? blend_rules<float>(config)
+                     : blend_rules<float>(config, images.floats);
   rgb8 = images.rgb8;
 }
 

@@ -51,7 +51,7 @@ bool CudaBatchRenderer::State::uses_regions(std::span<const GaussianSet> sets,
   const FrameImages<float>& f = images.floats;
   std::uint64_t gaussians = 0;
   for (const CameraSet& v : camera_sets) gaussians += sets[v.set].gaussians.size();
-  if (cameras.size() < least_cameras_of_regions || gaussians == 0 ||
+  if (shares.most != nullptr || cameras.size() < least_cameras_of_regions || gaussians == 0 ||
       gaussians < least_gaussians_of_regions * cameras.size() ||
       std::max(first.width, first.height) > Policy::kSide || config.response != Response::ewa ||
       config.compat != Compat::none || config.sort_order != SortOrder::z_depth ||

@@ -132,7 +132,13 @@ void CudaBatchRenderer::State::enqueue(const cuda::Flight& flight) {
   cuda::launch_projection(args, multiprocessors, stream);
   cuda::launch_binning(args, multiprocessors, stream);
   if (args.depth_bins.many() || args.short_lists) cuda::launch_ordering(args, multiprocessors, stream);
-  cuda::launch_blending(args, raster, rgb8, stream);
+  if (shares.most == nullptr) {
+    cuda::launch_blending(args, raster, rgb8, stream);
+  } else {
+    const std::size_t groups = args.cameras / shares.cameras_of_group;
+    backend.fill(shares.most, 0, groups * shares.rows * sizeof(float));
+    cuda::launch_weighing(args, raster.rules, shares, stream);
+  }
   backend.copy(flight.counters, args.counters, sizeof(cuda::BatchCounters), CopyKind::device_to_host);
 }
 
@@ -160,8 +166,8 @@ Status CudaBatchRenderer::State::launch() {
   flight.triangle_capacity = triangle_capacity;
   size_scratch();
   const cuda::LaunchKey key{
-      args,        raster.images, rgb8, raster.mesh.depth, raster.mesh.color, flight.inputs.data,
-      input_bytes, region_args};
+      args,        raster.images, rgb8,  raster.mesh.depth, raster.mesh.color, flight.inputs.data,
+      input_bytes, region_args,   shares};
   if (key != flight.key) {
     flight.forget_recorded();
     flight.key = key;
@@ -203,20 +209,49 @@ void CudaBatchRenderer::set_least_of_parts(std::uint32_t pairs, std::uint32_t ro
 
 Status CudaBatchRenderer::render(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                                  const BatchImages& images) {
-  State& s = *state_;
-  if (Status status = validate(s.config); !status) return status;
-  if (Status status = cuda::check_batch(sets, cameras, s.config); !status) return status;
-  if (s.calls - s.finished >= cuda::policy::Batch::kInFlight) {
+  return state_->start(sets, cameras, images, {});
+}
+
+Status CudaBatchRenderer::weigh(const GaussianSet& set, std::span<const BatchCamera> cameras,
+                                std::size_t cameras_of_group, float* most) {
+  const auto bad = [](const std::string& what) {
+    return Status(Errc::invalid_argument, "CudaBatchRenderer::weigh: " + what);
+  };
+  const RenderConfig& config = state_->config;
+  if (most == nullptr) return bad("most is null");
+  if (cameras_of_group == 0 || cameras.size() % cameras_of_group != 0) {
+    return bad(std::to_string(cameras.size()) + " cameras are no groups of " +
+               std::to_string(cameras_of_group));
+  }
+  if (config.response != Response::ewa || config.compat != Compat::none)
+    return bad("RenderConfig.response must be Response::ewa, and compat Compat::none");
+  for (const BatchCamera& c : cameras) {
+    if (!c.meshes.instances.empty()) return bad("a camera has meshes");
+  }
+  GaussianSet by_row = set;
+  by_row.gaussians.row_ids = {};  // a row's rank is then its number
+  return state_->start(std::span(&by_row, 1), cameras, {},
+                       {most, static_cast<std::uint32_t>(set.gaussians.size()),
+                        static_cast<std::uint32_t>(cameras_of_group)});
+}
+
+Status CudaBatchRenderer::State::start(std::span<const GaussianSet> sets,
+                                       std::span<const BatchCamera> cameras, const BatchImages& images,
+                                       const cuda::LargestShares& to) {
+  if (Status s = validate(config); !s) return s;
+  if (Status s = cuda::check_batch(sets, cameras, config); !s) return s;
+  if (calls - finished >= cuda::policy::Batch::kInFlight) {
     return {Errc::invalid_argument, "CudaBatchRenderer: call finish() at least once in " +
                                         std::to_string(cuda::policy::Batch::kInFlight) +
                                         " calls of render()"};
   }
-  s.prepared = false;
-  if (Status status = s.prepare(sets, cameras, images); !status) return status;
-  if (Status status = s.place_meshes(cameras); !status) return status;
-  if (Status status = s.launch(); !status) return status;
-  s.prepared = true;
-  ++s.calls;
+  prepared = false;
+  shares = to;
+  if (Status s = prepare(sets, cameras, images); !s) return s;
+  if (Status s = place_meshes(cameras); !s) return s;
+  if (Status s = launch(); !s) return s;
+  prepared = true;
+  ++calls;
   return {};
 }
 

@@ -40,6 +40,7 @@ struct LaunchKey {
   const unsigned char* inputs = nullptr;  ///< Pinned memory.
   std::size_t input_bytes = 0;
   RegionArgs regions{};
+  LargestShares shares{};
   bool operator==(const LaunchKey&) const = default;
 };
 
@@ -189,6 +190,9 @@ struct CudaBatchRenderer::State {
     }
   }
 
+  /// Checks the inputs of a call and enqueues its work.
+  Status start(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
+               const BatchImages& images, const cuda::LargestShares& to);
   Status prepare(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                  const BatchImages& images);
   // Steps of prepare().
@@ -272,6 +276,7 @@ struct CudaBatchRenderer::State {
   cuda::RegionArgs region_args{};  ///< No `sets`: the call is not drawn by lists of regions.
   RasterArgs<float> raster;
   std::uint8_t* rgb8 = nullptr;
+  cuda::LargestShares shares;  ///< Output of the last call, if it weighed.
   std::size_t input_bytes = 0;
   std::uint64_t item_capacity = 0;   ///< Number of items of the call.
   std::uint64_t entry_capacity = 0;  ///< Largest number of slots that the call may take.

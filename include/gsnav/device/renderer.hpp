@@ -93,8 +93,8 @@ class Renderer {
 /// @return the errors of build_lod.
 Result<LodTree> build_lod(const Device& device, const GaussianCloud& cloud,
                           const LodSettings& settings = {});
-/// Builds visible sets: build_visible_sets (scene/visible_sets.hpp), compiled. It runs on the device's
-/// threads; for a GPU, on the threads of the CPU.
+/// Builds visible sets: build_visible_sets (scene/visible_sets.hpp), compiled. A GPU weighs the
+/// Gaussians of each viewpoint. The sets have the same bits on every device.
 /// @return the errors of build_visible_sets.
 Result<VisibleSets> build_visible_sets(const Device& device, const GaussianCloud& cloud,
                                        std::span<const Vec3d> viewpoints,

@@ -9,7 +9,9 @@
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/detail/core/pool_backend.hpp"
 #include "gsnav/detail/scene/seen_cells.hpp"
+#include "gsnav/detail/scene/seen_on_device.hpp"
 #include "gsnav/detail/scene/seen_viewpoints.hpp"
 #include "gsnav/detail/scene/view_cells.hpp"
 #include "gsnav/detail/scene/visible_settings.hpp"
@@ -63,23 +65,13 @@ void add_near_chunks(B& backend, const VisibleSets& sets, const GaussianCloud& c
   });
 }
 
-}  // namespace detail
-
-/// Finds the chunks and rows of a cloud that are seen from each cell. The cells are those with a
-/// viewpoint in them or within 5 cm. Each viewpoint costs six square frames, settings.face pixels wide.
-/// The result has the same bits for any number of threads.
-/// @param cloud a sorted cloud (sort_spatially).
-/// @param viewpoints world frame, metres; navmesh_viewpoints makes them.
-/// @param world_from_asset placement of the cloud in the world.
-/// @return the sets, without cells if they would gain nothing (VisibleSets::refused_share); or one of
-///   these errors:
-/// - invalid_argument: a setting out of range, no viewpoint, a viewpoint that is not finite, or a cloud
-///   that is not sorted.
-/// - those of rendering.
-template <Backend B>
-requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
+/// build_visible_sets with the object that make_seen() returns. It has the members `at_once`, `look` and
+/// `rows` of SeenFromViewpoints, and is made once the arguments have been checked.
+/// @param backend runs the rest of the work, on the host.
+template <Backend B, class MakeSeen>
+requires is_host_backend<B> Result<VisibleSets> collect_visible_sets(
     B& backend, const GaussianCloud& cloud, std::span<const Vec3d> viewpoints,
-    const VisibleSettings& settings = {}, const Similarity& world_from_asset = {}) {
+    const VisibleSettings& settings, const Similarity& world_from_asset, const MakeSeen& make_seen) {
   if (Status s = validate(settings); !s) return s;
   if (viewpoints.empty()) return Status(Errc::invalid_argument, "build_visible_sets: no viewpoint");
   if (cloud.chunk_bounds.size() != cloud.view().chunk_count()) {
@@ -94,24 +86,24 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
   out.min_weight = settings.min_weight;
   out.cloud_chunks = cloud.view().chunk_count();
   out.viewpoints = viewpoints.size();
-  const auto eyes = detail::find_cells(out, viewpoints, world_from_asset);
+  const auto eyes = find_cells(out, viewpoints, world_from_asset);
   if (!eyes) return eyes.status();
 
-  std::vector<detail::SeenOfCell> found(out.cells(), detail::SeenOfCell(out.cloud_chunks));
-  detail::add_near_chunks(backend, out, cloud, settings.near_plane / world_from_asset.scale, found);
+  std::vector<SeenOfCell> found(out.cells(), SeenOfCell(out.cloud_chunks));
+  add_near_chunks(backend, out, cloud, settings.near_plane / world_from_asset.scale, found);
   const double margin = settings.margin / world_from_asset.scale;
   const auto counts_for = [&](std::size_t cell, std::size_t v) {
     const Vec3d& eye = (*eyes)[v];
-    return detail::CellCube(out.keys[cell], out.cell).distance(eye, eye) <= margin;
+    return CellCube(out.keys[cell], out.cell).distance(eye, eye) <= margin;
   };
-  const bool with_sample = settings.most_share < 1 && out.cells() >= detail::kLeastSampled;
+  const bool with_sample = settings.most_share < 1 && out.cells() >= kLeastSampled;
   const auto [sample, order, sampled] =
-      detail::order_viewpoints(out.cells(), viewpoints.size(), with_sample, counts_for);
+      order_viewpoints(out.cells(), viewpoints.size(), with_sample, counts_for);
 
-  detail::SeenFromViewpoints<B> seen(backend, cloud.set(world_from_asset), viewpoints, settings);
+  auto seen = make_seen();
   for (std::size_t done = 0; done < order.size();) {
     if (done == sampled && !sample.empty()) {
-      const double share = detail::sampled_share(found, sample, cloud.size());
+      const double share = sampled_share(found, sample, cloud.size());
       if (share > settings.most_share) {
         out.keys.clear();
         out.refused_share = share;
@@ -132,12 +124,43 @@ requires is_host_backend<B> Result<VisibleSets> build_visible_sets(
         settings.progress(static_cast<double>(done) / static_cast<double>(order.size()));
     }
   }
-  for (detail::SeenOfCell& of_cell : found) {
+  for (SeenOfCell& of_cell : found) {
     of_cell.append_to(out.bits, settings.rows != 0);
     out.ends.push_back(out.bits.size());
-    of_cell = detail::SeenOfCell(0);
+    of_cell = SeenOfCell(0);
   }
   return out;
+}
+
+}  // namespace detail
+
+/// Finds the chunks and rows of a cloud that are seen from each cell. The cells are those with a
+/// viewpoint in them or within 5 cm. Each viewpoint costs six square frames, settings.face pixels wide.
+/// The result has the same bits for any number of threads, and on a GPU
+/// (backends/cuda/visible_sets.hpp).
+/// @param cloud a sorted cloud (sort_spatially).
+/// @param viewpoints world frame, metres; navmesh_viewpoints makes them.
+/// @param world_from_asset placement of the cloud in the world.
+/// @return the sets, without cells if they would gain nothing (VisibleSets::refused_share); or one of
+///   these errors:
+/// - invalid_argument: a setting out of range, no viewpoint, a viewpoint that is not finite, or a cloud
+///   that is not sorted.
+/// - those of rendering.
+/// On a GPU it throws gsnav::Error (out_of_memory) if memory cannot be allocated.
+template <Backend B>
+requires is_host_backend<B> || detail::WeighsBatches<B> Result<VisibleSets> build_visible_sets(
+    B& backend, const GaussianCloud& cloud, std::span<const Vec3d> viewpoints,
+    const VisibleSettings& settings = {}, const Similarity& world_from_asset = {}) {
+  if constexpr (is_host_backend<B>) {
+    return detail::collect_visible_sets(backend, cloud, viewpoints, settings, world_from_asset, [&] {
+      return detail::SeenFromViewpoints<B>(backend, cloud.set(world_from_asset), viewpoints, settings);
+    });
+  } else {
+    PoolBackend host;
+    return detail::collect_visible_sets(host, cloud, viewpoints, settings, world_from_asset, [&] {
+      return detail::SeenOnDevice<B>(backend, host, cloud, world_from_asset, viewpoints, settings);
+    });
+  }
 }
 
 }  // namespace gsnav

@@ -19,6 +19,14 @@ struct RowWeightsWorkspace {
   RenderWorkspace<float, B> render;
 };
 
+/// Settings with which shares of light are measured.
+inline RenderConfig weighing_config() noexcept {
+  RenderConfig config;
+  config.quality.exponential = Exponential::fast;
+  config.tuning.tile_size = WeighTile::kSide;
+  return config;
+}
+
 /// Measures the largest share of a pixel's light, alpha times transmittance, that each Gaussian of a set
 /// contributes anywhere in the image. Raises the values of `most` [rows] to these shares. Uses
 /// Exponential::fast; Gaussians of equal depth are blended in row order. The bits do not depend on the
@@ -33,9 +41,7 @@ requires is_host_backend<B> Status add_row_weights(B& backend, RowWeightsWorkspa
     return {Errc::invalid_argument, "add_row_weights: `most` has " + std::to_string(most.size()) +
                                         " values for " + std::to_string(set.gaussians.size()) + " rows"};
   }
-  RenderConfig config;
-  config.quality.exponential = Exponential::fast;
-  config.tuning.tile_size = WeighTile::kSide;
+  RenderConfig config = weighing_config();
   if constexpr (!RunsStage<B, stage::Each, std::size_t, WeighTile>)
     config.tuning.depth_slices = 1;  // the generic form draws no slices
   set.gaussians.row_ids = {};        // a row's rank is then its number

@@ -56,20 +56,31 @@ inline RowBits all_rows(std::size_t size, std::size_t chunk) noexcept {
   return out;
 }
 
-/// The rows of a chunk that take more than min_weight of a pixel, together with all rows of their groups
-/// of `rows` rows (0: the whole chunk). `most` [N] has the largest weight of each row.
-inline RowBits seen_rows(std::span<const float> most, std::size_t chunk, int rows,
-                         double min_weight) noexcept {
-  RowBits out = all_rows(most.size(), chunk);
-  const std::size_t run = rows == 0 ? kProjectChunk : static_cast<std::size_t>(rows);
+/// The rows of a chunk that take more than min_weight of a pixel. `most` [N] has the largest weight of
+/// each row.
+inline RowBits heavy_rows(std::span<const float> most, std::size_t chunk, double min_weight) noexcept {
+  RowBits out{};
   const std::size_t begin = chunk * kProjectChunk;
-  for (std::size_t first = 0; first < kProjectChunk; first += run) {
-    bool any = false;
-    for (std::size_t i = begin + first; i < begin + first + run && i < most.size(); ++i) {
-      any = any || static_cast<double>(most[i]) > min_weight;
+  const std::size_t count = std::min<std::size_t>(kProjectChunk, most.size() - begin);
+  for (std::size_t r = 0; r < count; ++r) {
+    if (static_cast<double>(most[begin + r]) > min_weight) out[r / 32] |= 1u << (r % 32);
+  }
+  return out;
+}
+
+/// The given rows of chunk `chunk` of a cloud of `size` Gaussians, together with all rows of their
+/// groups of `rows` rows (0: the whole chunk).
+inline RowBits whole_groups(const RowBits& some, std::size_t size, std::size_t chunk,
+                            int rows) noexcept {
+  RowBits out = all_rows(size, chunk);
+  if (rows == 0) return some == RowBits{} ? RowBits{} : out;
+  const std::uint32_t first = rows == 32 ? ~0u : (1u << rows) - 1u;
+  for (std::size_t k = 0; k < kSeenRowWords; ++k) {
+    std::uint32_t groups = 0;
+    for (int r = 0; r < 32; r += rows) {
+      if ((some[k] & first << r) != 0) groups |= first << r;
     }
-    if (any) continue;
-    for (std::size_t r = first; r < first + run; ++r) out[r / 32] &= ~(1u << (r % 32));
+    out[k] &= groups;
   }
   return out;
 }

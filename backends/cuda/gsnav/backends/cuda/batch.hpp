@@ -104,6 +104,16 @@ class CudaBatchRenderer {
   Status render(std::span<const GaussianSet> sets, std::span<const BatchCamera> cameras,
                 const BatchImages& images);
 
+  /// Measures, in place of images, the largest share of a pixel's light that each Gaussian of a set
+  /// contributes to any image of a group of cameras (add_row_weights, with the same bits). Like
+  /// render(), it enqueues the work and returns. The renderer's `config` is weighing_config().
+  /// @param set one that draws all its chunks. Arrays are in device memory.
+  /// @param cameras groups of `cameras_of_group` cameras, one after the other. All have one size.
+  /// @param most [groups][set.gaussians.size()], in device memory; it is overwritten.
+  /// @return the errors of render(); invalid_argument for cameras that are no groups, or with meshes.
+  Status weigh(const GaussianSet& set, std::span<const BatchCamera> cameras,
+               std::size_t cameras_of_group, float* most);
+
   /// Waits for all render() calls since the last finish(). If scratch was too small for the last of
   /// them, it grows and that batch is rendered again, so its arrays and images must still exist.
   /// @return out_of_memory if scratch was too small for an earlier call, or for the last one and a later
