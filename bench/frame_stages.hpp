@@ -158,7 +158,7 @@ class FrameStages {
                      [&](std::uint32_t a, std::uint32_t b) { return keys[a] < keys[b]; });
     order_.upload(order.data(), order.size());
     if constexpr (gsnav::detail::bins_by_entries<S, B>) {
-      bin_.entry = gsnav::SplatEntry::of(keys.size(), projected_.grid.count());
+      bin_.entry = gsnav::SortEntry::of(keys.size(), projected_.grid.count());
       entries_.clear();
       for (const std::uint32_t slot : order)
         entries_.push_back(bin_.entry(0, words_.view()[slot], slot));

@@ -15,7 +15,7 @@ namespace {
 
 /// Contribution of one Gaussian to the voxels that it reaches. It is widened by the variance of a voxel,
 /// so that a disc thinner than a voxel reaches the centre.
-class Splat {
+class SolidSplat {
  public:
   /// Prepares a Gaussian. Returns false if it reaches no voxel of the grid.
   bool set(const VoxelGrid& g, const Solid& s, double sigmas) {
@@ -111,8 +111,8 @@ class TileMass {
       return mass_[bricks[y / kBrick] * kVoxels + (z % kBrick * kBrick + x % kBrick) * kBrick +
                    y % kBrick];
     };
-    // Splat widens a thin sheet to a variance of level^2 / 12. On the face between two voxels its mass
-    // is exp(1.5) times the geometric mean of their masses, and the next voxels have almost none.
+    // SolidSplat widens a thin sheet to a variance of level^2 / 12. On the face between two voxels its
+    // mass is exp(1.5) times the geometric mean of their masses, and the next voxels have almost none.
     constexpr float kFace = 4.4816890703f;
     const auto sheet = [&](std::size_t y) {
       return mass(y) < least && mass(y + 1) < least &&
@@ -161,7 +161,7 @@ struct TileLists {
       : nx((g.nx + kTile - 1) / kTile), nz((g.nz + kTile - 1) / kTile) {
     std::vector<Reach> reach;
     Solid s;
-    Splat splat;
+    SolidSplat splat;
     for (const GaussianSet& set : sets) {
       const PlacedSet placed(set);
       for (std::size_t i = 0; i < set.gaussians.size(); ++i) {
@@ -252,7 +252,7 @@ Status rasterise_tiles(VoxelGrid& g, std::span<const GaussianSet> sets, const Ga
     if (lists.first[t] == lists.first[t + 1]) return;
     TileMass mass(g.ny);
     Solid s;
-    Splat splat;
+    SolidSplat splat;
     for (std::size_t k = lists.first[t]; k < lists.first[t + 1]; ++k) {
       std::size_t set = 0;
       while (set + 1 < begins.size() && lists.rows[k] >= begins[set + 1]) ++set;

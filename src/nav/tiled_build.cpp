@@ -24,13 +24,13 @@ namespace {
 constexpr int kBesideRadius = 3;  // Cells of the border in addition to the agent's radius.
 
 /// Tiles over a box, on one lattice of cells.
-struct TileGrid {
+struct NavTiles {
   const NavMeshSettings& settings;
   Aabb<double> box;
   int border = 0, nx = 0, nz = 0;  ///< `border` in cells; `nx` and `nz` are numbers of tiles.
   int width = 0, depth = 0;        ///< Size of the box in cells.
 
-  TileGrid(const NavMeshSettings& s, const Aabb<double>& b)
+  NavTiles(const NavMeshSettings& s, const Aabb<double>& b)
       : settings(s), box(b), border(VoxelSettings(s).radius + kBesideRadius) {
     width = max(1, cells_up(b.high.x - b.low.x, s.cell_size));
     depth = max(1, cells_up(b.high.z - b.low.z, s.cell_size));
@@ -82,7 +82,7 @@ struct TriangleLists {
   std::vector<std::size_t> first;
   std::vector<std::uint32_t> triangles;
 
-  TriangleLists(const TileGrid& grid, std::span<const Vec3d> vertices,
+  TriangleLists(const NavTiles& grid, std::span<const Vec3d> vertices,
                 std::span<const NavMesh::Triangle> triangles_in, const Vec3d& origin, ThreadPool& pool) {
     const double rim = (grid.border + 1) * grid.settings.cell_size;
     const auto index = [&](double v, int n) {
@@ -116,7 +116,7 @@ struct TriangleLists {
 };
 
 /// Detour's mesh of the tiles that have polygons, in order.
-Result<NavMeshPtr> link_tiles(const TileGrid& grid, std::span<const TilePolygons> tiles) {
+Result<NavMeshPtr> link_tiles(const NavTiles& grid, std::span<const TilePolygons> tiles) {
   const auto no_memory = [] {
     return Status(Errc::out_of_memory, "NavMesh: not enough memory for the tiles");
   };
@@ -197,7 +197,7 @@ class CallingProgress {
 };
 
 /// Builds the polygons of one tile.
-Result<TilePolygons> build_tile(const TileGrid& grid, const TriangleLists& lists, std::size_t tile,
+Result<TilePolygons> build_tile(const NavTiles& grid, const TriangleLists& lists, std::size_t tile,
                                 std::span<const Vec3d> vertices,
                                 std::span<const NavMesh::Triangle> triangles, const Vec3d& origin,
                                 const TileHooks& hooks, const Progress& progress) {
@@ -226,7 +226,7 @@ Result<NavMesh> build_in_tiles(const NavMeshSettings& settings, std::span<const 
                                std::span<const NavMesh::Triangle> triangles, const Vec3d& origin,
                                const Aabb<double>& box, int threads, const TileHooks& hooks) {
   if (Status s = check_grid(settings, box.low, box.high); !s.ok()) return s;
-  const TileGrid grid(settings, box);
+  const NavTiles grid(settings, box);
   const int most = static_cast<int>(std::clamp<unsigned>(std::thread::hardware_concurrency(), 1, 16));
   ThreadPool pool(threads > 0 ? threads : most);
   const TriangleLists lists(grid, vertices, triangles, origin, pool);

@@ -67,7 +67,7 @@ void blend_pixels(B& backend, const RasterArgs<S>& args) {
   });
 }
 
-/// True if a backend bins the frames of scalar S by entries (SplatEntry).
+/// True if a backend bins the frames of scalar S by entries (SortEntry).
 template <class S, Backend B>
 inline constexpr bool bins_by_entries = sizeof(S) == sizeof(float) && requires {
   B::bins_in_lanes;
@@ -165,7 +165,7 @@ Status draw_projected(B& backend, RenderWorkspace<S, B>& ws, const Camera& camer
   bin.grid = grid_of<B>(config, camera);
   std::size_t visible = 0;
   if constexpr (bins_by_entries<S, B>) {
-    bin.entry = SplatEntry::of(ws.visible.words.size(), bin.grid.count());
+    bin.entry = SortEntry::of(ws.visible.words.size(), bin.grid.count());
     bin.entries = order_entries(backend, ws.visible, bin.entry, base, range);
     visible = bin.entries.size;
   } else {

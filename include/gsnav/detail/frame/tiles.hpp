@@ -146,13 +146,13 @@ struct TileWord {
 /// A splat in 64 bits while it is sorted and binned: its key, its TileWord and its slot. Both stages
 /// read entries in sequence; an index would send them to random places. The key's lowest bits may have
 /// no room. Splats that differ only in them are then sorted once more, by their whole keys.
-struct SplatEntry {
+struct SortEntry {
   static constexpr int kMostKeyBits = 27;  ///< for a sort in three passes
   int slot_bits = 32, word_bits = 32;
 
   /// For slots below `slots` and tiles below `tiles`. An image has at most 2^22 tiles, so a word has at
   /// most 31 bits.
-  static SplatEntry of(std::size_t slots, std::size_t tiles) noexcept {
+  static SortEntry of(std::size_t slots, std::size_t tiles) noexcept {
     const auto bits_for = [](std::size_t n) {
       return static_cast<int>(std::bit_width(n > 1 ? n - 1 : n));
     };
@@ -190,7 +190,7 @@ struct BinArgs {
   /// For backends with bins_in_lanes, in place of `order`: the visible splats front to back, and the
   /// format of these entries.
   View<const std::uint64_t> entries;
-  SplatEntry entry;
+  SortEntry entry;
   View<const TileSpans> spans;  ///< [slots], filled by the projection of such backends
 };
 

@@ -59,7 +59,7 @@ template <class F>
 GSNAV_HD void for_each_intersection(const BinArgs<float>& args, std::size_t block, const F& f) noexcept {
   constexpr std::size_t kAhead = 24;
   const BlockRange r = BlockRange::of(block, args.blocks, args.entries.size);
-  const SplatEntry entry = args.entry;
+  const SortEntry entry = args.entry;
   const WordTiles tiles(args.grid);
   for (std::size_t i = r.begin; i < r.end; ++i) {
     const std::uint64_t e = args.entries[i], next = args.entries[i + kAhead < r.end ? i + kAhead : i];

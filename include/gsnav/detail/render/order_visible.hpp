@@ -161,9 +161,9 @@ struct PairRecord {
     return std::uint64_t{key} << 32 | slot;
   }
 };
-/// Record of a SplatEntry, without the lowest `dropped` bits of the key.
+/// Record of a SortEntry, without the lowest `dropped` bits of the key.
 struct EntryRecord {
-  SplatEntry entry;
+  SortEntry entry;
   View<const std::uint32_t> words;
   int dropped;
   GSNAV_HD std::uint64_t operator()(std::uint32_t key, std::uint32_t slot) const noexcept {
@@ -245,11 +245,11 @@ Result<std::size_t> order_visible(B& backend, VisibleOrder<B>& v, std::uint32_t 
   return visible;
 }
 
-/// order_visible() for backends that bin by entries (SplatEntry): sorts the visible splats whose key is
+/// order_visible() for backends that bin by entries (SortEntry): sorts the visible splats whose key is
 /// in `range` front to back. Returns their entries, which hold until `v` is used again.
 template <Backend B>
 requires is_host_backend<B> View<const std::uint64_t> order_entries(B& backend, VisibleOrder<B>& v,
-                                                                    const SplatEntry& entry,
+                                                                    const SortEntry& entry,
                                                                     std::uint32_t base,
                                                                     const KeyRange& range) {
   const std::size_t chunks = v.counts.size();

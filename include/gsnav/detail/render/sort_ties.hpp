@@ -59,7 +59,7 @@ struct PairTies {
 /// rank, or by slot if there are no ranks.
 struct EntryTies {
   View<const std::uint32_t> keys, ranks;  ///< [slots]
-  SplatEntry entry;
+  SortEntry entry;
   View<std::uint64_t> items;
   GSNAV_HD bool equal(std::size_t i) const noexcept {
     return (items[i] ^ items[i + 1]) >> entry.key_shift() == 0;
