@@ -14,6 +14,7 @@
 #include "cases.hpp"
 #include "eval/oracle_support.hpp"
 #include "ops/mesh_images.hpp"
+#include "support/image_hashes.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;
@@ -435,6 +436,7 @@ TEST_CASE("moved instances, no Gaussians, and a backend with a form of its own o
     const MeshInstance instance = scene.instance(0, {{}, {x, 0, 3}, 1});
     renderer.set_meshes({&instance, 1});
     const auto f = renderer.render({}, std::vector<Camera>{axis_camera()}).value();
+    record_hashes(f, "serial float");
     const std::size_t at =
         kAxisMiddle * kAxisSize + static_cast<std::size_t>(std::lround(kAxisMiddle + 64 * x / 3));
     CHECK(f.alpha[at] == 1);
@@ -454,6 +456,7 @@ TEST_CASE("moved instances, no Gaussians, and a backend with a form of its own o
   const std::vector<Camera> cameras{axis_camera()};
   const auto expected = renderer.render({}, cameras).value();
   const auto frames = other.render({}, cameras).value();
+  record_hashes(expected, "serial float");
   CHECK(expected.alpha[kAxisPixel] == 1);
   CHECK(frames.rgb == expected.rgb);
   CHECK(frames.alpha == expected.alpha);

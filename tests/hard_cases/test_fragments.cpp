@@ -15,6 +15,7 @@
 #include "eval/oracle_support.hpp"
 #include "gsnav/detail/render/draw_fragments.hpp"
 #include "support/fragment_truth.hpp"
+#include "support/image_hashes.hpp"
 #include "support/scenes.hpp"
 #include "support/semantic_labels.hpp"
 
@@ -360,6 +361,9 @@ TEST_CASE("panes: every output alone, batches, and what the frame does not have 
   REQUIRE(draw_frame<float>(serial, ws, std::span(&set, 1), {solid.instances, {}}, axis_camera(83),
                             config, images)
               .ok());
+  Frames<float> frame;
+  frame.alpha = alpha;
+  record_hashes(frame, "serial float");
   CHECK(ws.fragments.capacity_bytes() == 0);
   // Habitat-GS's rule has one layer per pixel.
   config.composite = Composite::hard_depth;
@@ -428,6 +432,7 @@ TEST_CASE("holes that a mask cuts: what is behind is seen, by texel and by verte
     BasicRenderer<double, SerialBackend> renderer(serial, all_outputs());
     renderer.set_meshes(cut.instances);
     const auto f = renderer.render({}, std::vector<Camera>{camera}).value();
+    record_hashes(f, "serial double");
     CHECK(std::count(f.alpha.begin(), f.alpha.end(), 1.0) == covered);
   }
 }

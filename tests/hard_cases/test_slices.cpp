@@ -11,6 +11,7 @@
 #include "cases.hpp"
 #include "gsnav/detail/frame/cull.hpp"
 #include "gsnav/detail/scene/spatial_order.hpp"
+#include "support/image_hashes.hpp"
 #include "support/scenes.hpp"
 
 using namespace gsnav;
@@ -145,6 +146,9 @@ TEST_CASE(
     FrameImages<float> images;
     images.alpha = alpha.data();
     REQUIRE(render_camera<float>(backend, ws, {&set, 1}, camera, config, images).ok());
+    Frames<float> frame;
+    frame.alpha = alpha;
+    record_hashes(frame, "serial float");
     const auto c64 = make_projection_camera<double>(camera, set, projection_rules(config));
     for (std::size_t c = 0; c < cloud.chunk_bounds.size(); ++c) {
       const std::uint32_t n = ws.visible.counts.data()[c];
@@ -198,6 +202,7 @@ TEST_CASE("slices of depth by distance, where the viewmat is as little rigid as 
       config.tuning.depth_slices = slices;
       BasicRenderer<float, OpenMPBackend> renderer(backend, config);
       const auto frame = renderer.render(cloud.set(), camera).value();
+      record_hashes(frame, "openmp float, one thread");
       if (slices == 1) first = frame.rgb;
       CAPTURE(grow);
       CAPTURE(slices);
