@@ -85,6 +85,13 @@ inline RowBits whole_groups(const RowBits& some, std::size_t size, std::size_t c
   return out;
 }
 
+/// The rows of a chunk that count as seen: those that take more than min_weight of a pixel, with their
+/// groups. Arguments as above.
+inline RowBits seen_rows(std::span<const float> most, std::size_t chunk, int rows,
+                         double min_weight) noexcept {
+  return whole_groups(heavy_rows(most, chunk, min_weight), most.size(), chunk, rows);
+}
+
 /// Collects the chunks and rows that one cell sees.
 class SeenOfCell {
  public:

@@ -73,8 +73,7 @@ class SeenOnDevice {
     host_.parallel_for(which.size() * chunks, [&](std::size_t i) {
       const std::size_t k = i / chunks, chunk = i % chunks;
       const std::span<const float> most(most_here_.data() + k * rows(), rows());
-      const RowBits heavy = heavy_rows(most, chunk, settings_.min_weight);
-      rows_[k][chunk] = whole_groups(heavy, rows(), chunk, settings_.rows);
+      rows_[k][chunk] = seen_rows(most, chunk, settings_.rows, settings_.min_weight);
     });
     return {};
   }

@@ -93,8 +93,7 @@ class SeenFromViewpoints {
       if (!s) return s;
     }
     worker.backend.parallel_for(rows.size(), [&](std::size_t i) {
-      const RowBits heavy = heavy_rows(worker.most, i, settings_.min_weight);
-      rows[i] = whole_groups(heavy, worker.most.size(), i, settings_.rows);
+      rows[i] = seen_rows(worker.most, i, settings_.rows, settings_.min_weight);
     });
     return {};
   }
