@@ -2,6 +2,7 @@
 #include "gsnav/backends/cuda.hpp"
 
 #include "engines_on.hpp"
+#include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/detail/render/frame_batch.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 
@@ -24,8 +25,13 @@ Result<VisibleSets> visible_sets_on_cuda(const Device& device, const GaussianClo
                                          std::span<const Vec3d> viewpoints,
                                          const VisibleSettings& settings,
                                          const Similarity& world_from_asset) {
-  CudaBackend backend(device.index());
-  return build_visible_sets(backend, cloud, viewpoints, settings, world_from_asset);
+  std::unique_ptr<CudaBackend> backend;
+  const Status made = guarded([&]() -> Status {
+    backend = make_cuda(device);
+    return {};
+  });
+  if (!made) return made;
+  return build_visible_sets(*backend, cloud, viewpoints, settings, world_from_asset);
 }
 std::string cuda_name(int index) { return CudaBackend(index).device_name(); }
 

@@ -85,7 +85,7 @@ extern const EngineFactory cuda_engines;
 int cpu_threads(int threads);
 std::string cpu_instruction_set();
 int cuda_count() noexcept;
-/// build_visible_sets on a GPU. May throw like its engines.
+/// build_visible_sets on a GPU. Exceptions of settings.progress leave it, as on a CPU.
 Result<VisibleSets> visible_sets_on_cuda(const Device& device, const GaussianCloud& cloud,
                                          std::span<const Vec3d> viewpoints,
                                          const VisibleSettings& settings,

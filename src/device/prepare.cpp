@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engines.hpp"
-#include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/detail/eval/oracle_photo.hpp"
 #include "gsnav/detail/scene/lod_build.hpp"
 #include "gsnav/device/renderer.hpp"
@@ -36,11 +35,8 @@ Result<VisibleSets> build_visible_sets(const Device& device, const GaussianCloud
                                        const VisibleSettings& settings,
                                        const Similarity& world_from_asset) {
 #if defined(GSNAV_DEVICE_CUDA)
-  if (device.kind() == DeviceKind::cuda) {
-    return detail::guarded([&] {
-      return detail::visible_sets_on_cuda(device, cloud, viewpoints, settings, world_from_asset);
-    });
-  }
+  if (device.kind() == DeviceKind::cuda)
+    return detail::visible_sets_on_cuda(device, cloud, viewpoints, settings, world_from_asset);
 #endif
   auto backend = host_of(device);
   return build_visible_sets(backend, cloud, viewpoints, settings, world_from_asset);

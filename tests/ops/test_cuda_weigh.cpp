@@ -179,6 +179,9 @@ TEST_CASE("visible sets: found on a GPU, they have the bits of those found on a 
   std::vector<Vec3d> there;
   for (const Vec3d& eye : eyes) there.push_back(placed * eye);
   same(placed, std::span(there).first(3));
+  VisibleSettings stopped = settings;
+  stopped.progress = [](double) { throw 5; };
+  CHECK_THROWS_AS((void)build_visible_sets(cuda, cloud, eyes, stopped), int);
   const GaussianCloud nothing;
   CHECK(build_visible_sets(cuda, nothing, eyes, settings).value().bits ==
         build_visible_sets(openmp, nothing, eyes, settings).value().bits);

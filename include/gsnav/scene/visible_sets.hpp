@@ -146,7 +146,7 @@ requires is_host_backend<B> Result<VisibleSets> collect_visible_sets(
 /// - invalid_argument: a setting out of range, no viewpoint, a viewpoint that is not finite, or a cloud
 ///   that is not sorted.
 /// - those of rendering.
-/// On a GPU it throws gsnav::Error (out_of_memory) if memory cannot be allocated.
+/// Throws only what settings.progress throws.
 template <Backend B>
 requires is_host_backend<B> || detail::WeighsBatches<B> Result<VisibleSets> build_visible_sets(
     B& backend, const GaussianCloud& cloud, std::span<const Vec3d> viewpoints,

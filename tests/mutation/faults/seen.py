@@ -37,7 +37,7 @@ FAULTS = [
           "worker.most.assign(set_.gaussians.size(), 0.0f);", "worker.most.resize(set_.gaussians.size());",
           VISIBLE_TEST, WALL, why="a thread looks from many viewpoints, one after the other"),
     fault("viewpoints_share_their_rows", "SeenFromViewpoints::look", "rows_[k]", "rows_[0]", VISIBLE_TEST, WALL),
-    fault("viewpoints_share_their_rows_on_a_gpu", "SeenOnDevice::look", "rows_[k][chunk]", "rows_[0][chunk]",
+    fault("viewpoints_share_their_rows_on_a_gpu", "find_rows", "w.rows[k][chunk]", "w.rows[0][chunk]",
           WEIGH_TEST, SETS_ON_GPU, device=True),
     fault("weights_of_the_first_lane", "weigh_kernel", "weight = largest_of_warp(weight);", "", WEIGH_TEST, SHARES,
           device=True),

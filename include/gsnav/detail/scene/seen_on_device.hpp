@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <concepts>
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "gsnav/core/backend.hpp"
 #include "gsnav/core/buffer.hpp"
 #include "gsnav/core/status.hpp"
+#include "gsnav/detail/core/guarded.hpp"
 #include "gsnav/detail/core/host_array.hpp"
 #include "gsnav/detail/core/pool_backend.hpp"
 #include "gsnav/detail/render/row_weights.hpp"
@@ -39,55 +41,65 @@ class SeenOnDevice {
  public:
   SeenOnDevice(B& backend, PoolBackend& host, const GaussianCloud& cloud,
                const Similarity& world_from_asset, std::span<const Vec3d> viewpoints,
-               const VisibleSettings& settings)
+               const VisibleSettings& settings) noexcept
       : backend_(backend),
         host_(host),
+        cloud_(cloud),
+        world_from_asset_(world_from_asset),
         viewpoints_(viewpoints),
-        settings_(settings),
-        arrays_(backend, cloud),
-        set_(arrays_.set(world_from_asset)),
-        renderer_(backend, config_of(cloud)),
-        most_(backend),
-        rows_(at_once(), std::vector<RowBits>(set_.gaussians.chunk_count())) {
-    most_.resize_discard(at_once() * rows());
-    most_here_.resize(most_.size());
-  }
+        settings_(settings) {}
 
   /// As many viewpoints as need 256 MB for their shares of light, but at most 16.
   std::size_t at_once() const noexcept {
     constexpr std::size_t kMost = 16, kShares = std::size_t{1} << 26;
-    return std::clamp<std::size_t>(kShares / std::max<std::size_t>(rows(), 1), 1, kMost);
+    return std::clamp<std::size_t>(kShares / std::max<std::size_t>(cloud_.size(), 1), 1, kMost);
   }
 
   Status look(std::span<const std::size_t> which) {
-    if (rows() == 0) return {};
-    for (std::size_t done = 0; done < which.size();) {
-      const auto some = which.subspan(done, std::min(capacity(), which.size() - done));
-      if (Status s = weigh(some, most_.data() + done * rows()); !s) return s;
-      done += some.size();
-    }
-    backend_.copy(most_here_.data(), most_.data(), which.size() * rows() * sizeof(float),
-                  CopyKind::device_to_host);
-    if (Status s = backend_.synchronize(); !s) return s;
-    const std::size_t chunks = rows_[0].size();
-    host_.parallel_for(which.size() * chunks, [&](std::size_t i) {
-      const std::size_t k = i / chunks, chunk = i % chunks;
-      const std::span<const float> most(most_here_.data() + k * rows(), rows());
-      rows_[k][chunk] = seen_rows(most, chunk, settings_.rows, settings_.min_weight);
+    return guarded([&]() -> Status {
+      if (cloud_.size() == 0) return {};
+      if (work_ == nullptr)
+        work_ = std::make_unique<Work>(backend_, cloud_, world_from_asset_, at_once());
+      for (std::size_t done = 0; done < which.size();) {
+        const auto some = which.subspan(done, std::min(capacity(), which.size() - done));
+        if (Status s = weigh(some, work_->most.data() + done * cloud_.size()); !s) return s;
+        done += some.size();
+      }
+      return find_rows(which.size());
     });
-    return {};
   }
-  std::span<const RowBits> rows(std::size_t k) const noexcept { return rows_[k]; }
+  std::span<const RowBits> rows(std::size_t k) const noexcept {
+    return work_ == nullptr ? std::span<const RowBits>() : work_->rows[k];
+  }
 
  private:
   using Renderer = typename B::batch_renderer;
 
-  static RenderConfig config_of(const GaussianCloud& cloud) {
-    RenderConfig config = weighing_config();
-    config.blend_space = cloud.set().color_space;  // no colour is read
-    return config;
-  }
-  std::size_t rows() const noexcept { return set_.gaussians.size(); }
+  /// Memory. The first look allocates it, and reports that there is none.
+  struct Work {
+    Work(B& backend, const GaussianCloud& cloud, const Similarity& world_from_asset, std::size_t at_once)
+        : arrays(backend, cloud),
+          set(arrays.set(world_from_asset)),
+          renderer(backend, config_of(cloud)),
+          most(backend),
+          rows(at_once, std::vector<RowBits>(set.gaussians.chunk_count())) {
+      most.resize_discard(at_once * cloud.size());
+      most_here.resize(most.size());
+    }
+    static RenderConfig config_of(const GaussianCloud& cloud) {
+      RenderConfig config = weighing_config();
+      config.blend_space = cloud.set().color_space;  // no colour is read
+      return config;
+    }
+
+    GaussianArrays<B> arrays;
+    GaussianSet set;
+    Renderer renderer;
+    Buffer<float, B> most;                   // [viewpoints][rows]
+    HostArray<float, B> most_here;           // [viewpoints][rows]
+    std::vector<std::vector<RowBits>> rows;  // [viewpoints][chunks]
+    bool measured = false;                   // the renderer knows how much memory a viewpoint needs
+  };
 
   std::vector<typename Renderer::camera_type> cameras_of(std::span<const std::size_t> which) const {
     std::vector<typename Renderer::camera_type> out;
@@ -100,28 +112,39 @@ class SeenOnDevice {
   }
   /// Number of viewpoints of a call for which there is memory. The first call has one.
   std::size_t capacity() const {
-    if (!measured_) return 1;
+    if (!work_->measured) return 1;
     const std::vector<std::size_t> first(at_once(), 0);
-    return std::max<std::size_t>(1, renderer_.capacity(std::span(&set_, 1), cameras_of(first)) / kFaces);
+    const std::size_t cameras = work_->renderer.capacity(std::span(&work_->set, 1), cameras_of(first));
+    return std::max<std::size_t>(1, cameras / kFaces);
   }
   Status weigh(std::span<const std::size_t> which, float* most) {
-    if (Status s = renderer_.weigh(set_, cameras_of(which), kFaces, most); !s) return s;
-    measured_ = true;
-    return renderer_.finish();
+    if (Status s = work_->renderer.weigh(work_->set, cameras_of(which), kFaces, most); !s) return s;
+    work_->measured = true;
+    return work_->renderer.finish();
+  }
+  /// Finds the rows that the first `count` viewpoints see, by their shares of light.
+  Status find_rows(std::size_t count) {
+    Work& w = *work_;
+    const std::size_t size = cloud_.size(), chunks = w.rows[0].size();
+    backend_.copy(w.most_here.data(), w.most.data(), count * size * sizeof(float),
+                  CopyKind::device_to_host);
+    if (Status s = backend_.synchronize(); !s) return s;
+    host_.parallel_for(count * chunks, [&](std::size_t i) {
+      const std::size_t k = i / chunks, chunk = i % chunks;
+      const std::span<const float> most(w.most_here.data() + k * size, size);
+      w.rows[k][chunk] = seen_rows(most, chunk, settings_.rows, settings_.min_weight);
+    });
+    return {};
   }
 
   static constexpr std::size_t kFaces = 6;
   B& backend_;
   PoolBackend& host_;
+  const GaussianCloud& cloud_;
+  Similarity world_from_asset_;
   std::span<const Vec3d> viewpoints_;
   const VisibleSettings& settings_;
-  GaussianArrays<B> arrays_;
-  GaussianSet set_;
-  Renderer renderer_;
-  Buffer<float, B> most_;                   // [viewpoints][rows]
-  HostArray<float, B> most_here_;           // [viewpoints][rows]
-  std::vector<std::vector<RowBits>> rows_;  // [viewpoints][chunks]
-  bool measured_ = false;
+  std::unique_ptr<Work> work_;
 };
 
 }  // namespace gsnav::detail
