@@ -136,9 +136,9 @@ requires is_host_backend<B> Result<VisibleSets> collect_visible_sets(
 
 /// Finds the chunks and rows of a cloud that are seen from each cell. The cells are those with a
 /// viewpoint in them or within 5 cm. Each viewpoint costs six square frames, settings.face pixels wide.
-/// The result has the same bits for any number of threads, and on a GPU
-/// (backends/cuda/visible_sets.hpp).
-/// @param cloud a sorted cloud (sort_spatially).
+/// The result has the same bits for any number of threads, and on a GPU.
+/// @param backend a host backend or CudaBackend.
+/// @param cloud a sorted cloud (sort_spatially) in host memory.
 /// @param viewpoints world frame, metres; navmesh_viewpoints makes them.
 /// @param world_from_asset placement of the cloud in the world.
 /// @return the sets, without cells if they would gain nothing (VisibleSets::refused_share); or one of
@@ -146,7 +146,7 @@ requires is_host_backend<B> Result<VisibleSets> collect_visible_sets(
 /// - invalid_argument: a setting out of range, no viewpoint, a viewpoint that is not finite, or a cloud
 ///   that is not sorted.
 /// - those of rendering.
-/// Throws only what settings.progress throws.
+/// settings.progress may throw; its exceptions are passed on.
 template <Backend B>
 requires is_host_backend<B> || detail::WeighsBatches<B> Result<VisibleSets> build_visible_sets(
     B& backend, const GaussianCloud& cloud, std::span<const Vec3d> viewpoints,

@@ -105,17 +105,20 @@ class CudaBatchRenderer {
                 const BatchImages& images);
 
   /// Measures, in place of images, the largest share of a pixel's light that each Gaussian of a set
-  /// contributes to any image of a group of cameras (add_row_weights, with the same bits). Like
-  /// render(), it enqueues the work and returns. The renderer's `config` is weighing_config().
+  /// contributes to any image of a group of cameras (add_row_weights, with the same bits if `config` is
+  /// weighing_config(), detail/render/row_weights.hpp). Like render(), it enqueues the work and returns.
   /// @param set one that draws all its chunks. Arrays are in device memory.
   /// @param cameras groups of `cameras_of_group` cameras, one after the other. All have one size.
-  /// @param most [groups][set.gaussians.size()], in device memory; it is overwritten.
-  /// @return the errors of render(); invalid_argument for cameras that are no groups, or with meshes.
+  /// @param most [groups][set.gaussians.size()], shares in [0, 1], in device memory; it is overwritten.
+  /// @return the errors of render(); invalid_argument if `most` is null, if the number of cameras is no
+  /// multiple of cameras_of_group, if a camera has meshes, or for another Response than ewa or a Compat.
+  /// Throws like render().
   Status weigh(const GaussianSet& set, std::span<const BatchCamera> cameras,
                std::size_t cameras_of_group, float* most);
 
-  /// Waits for all render() calls since the last finish(). If scratch was too small for the last of
-  /// them, it grows and that batch is rendered again, so its arrays and images must still exist.
+  /// Waits for all calls of render() and weigh() since the last finish(). If scratch was too small for
+  /// the last of them, it grows and that batch is rendered again, so its arrays and images must still
+  /// exist.
   /// @return out_of_memory if scratch was too small for an earlier call, or for the last one and a later
   /// render() failed. Those images are incomplete; scratch is large enough now. Also backend_failure, or
   /// unsupported if a count exceeds 32 bits.
