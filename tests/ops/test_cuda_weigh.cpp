@@ -13,7 +13,8 @@
 #include "gsnav/detail/render/row_weights.hpp"
 #include "gsnav/scene/visible_sets.hpp"
 #include "lod/two_rooms.hpp"
-#include "no_gpu.hpp"
+#include "ops/cuda_batch_images.hpp"
+#include "ops/no_gpu.hpp"
 #include "support/files.hpp"
 #include "support/scenes.hpp"
 
@@ -47,7 +48,7 @@ std::vector<float> weighed(CudaBackend& cuda, CudaBatchRenderer& renderer, const
   REQUIRE(renderer.weigh(set, batch_of(cameras), of_group, most.data()).ok());
   REQUIRE(renderer.finish().ok());
   std::vector<float> out(before.size());
-  cuda.copy(out.data(), most.data(), out.size() * sizeof(float), CopyKind::device_to_host);
+  most.download(out.data(), out.size());
   REQUIRE(cuda.synchronize().ok());
   return out;
 }
@@ -102,21 +103,12 @@ TEST_CASE("cuda weigh: a renderer draws the same images before and after") {
   const GaussianArrays<CudaBackend> arrays(cuda, cloud);
   const std::vector<Vec3d> eyes = places_in_rooms();
   const auto cameras = detail::cube_cameras(eyes[0], 0, 40, 0.2, 0);
-  const GaussianSet set = arrays.set();
+  const std::vector<Camera> views(cameras.begin(), cameras.end());
   const auto drawn = [&] {
-    Buffer<float, CudaBackend> rgb(cuda);
-    rgb.resize_discard(cameras.size() * 40 * 40 * 3);
-    BatchImages images;
-    images.floats.rgb = rgb.data();
-    REQUIRE(renderer.render(std::span(&set, 1), batch_of(cameras), images).ok());
-    REQUIRE(renderer.finish().ok());
-    std::vector<float> out(rgb.size());
-    cuda.copy(out.data(), rgb.data(), out.size() * sizeof(float), CopyKind::device_to_host);
-    REQUIRE(cuda.synchronize().ok());
-    return out;
+    return draw_batch(cuda, renderer, {arrays.set()}, views, {}, kRgb, false).frames.rgb;
   };
   const auto before = drawn();
-  weighed(cuda, renderer, set, cameras, 6);
+  weighed(cuda, renderer, arrays.set(), cameras, 6);
   CHECK(drawn() == before);
   CHECK(*std::max_element(before.begin(), before.end()) > 0.1f);
 }

@@ -49,7 +49,8 @@ class SeenOnDevice {
         viewpoints_(viewpoints),
         settings_(settings) {}
 
-  /// As many viewpoints as need 256 MB for their shares of light, but at most 16.
+  /// Number of viewpoints per call of `look`: at most 16. Their shares of light take at most 256 MB,
+  /// unless one viewpoint alone takes more.
   std::size_t at_once() const noexcept {
     constexpr std::size_t kMost = 16, kShares = std::size_t{1} << 26;
     return std::clamp<std::size_t>(kShares / std::max<std::size_t>(cloud_.size(), 1), 1, kMost);
@@ -126,8 +127,7 @@ class SeenOnDevice {
   Status find_rows(std::size_t count) {
     Work& w = *work_;
     const std::size_t size = cloud_.size(), chunks = w.rows[0].size();
-    backend_.copy(w.most_here.data(), w.most.data(), count * size * sizeof(float),
-                  CopyKind::device_to_host);
+    w.most.download(w.most_here.data(), count * size);
     if (Status s = backend_.synchronize(); !s) return s;
     host_.parallel_for(count * chunks, [&](std::size_t i) {
       const std::size_t k = i / chunks, chunk = i % chunks;
