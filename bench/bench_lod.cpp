@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// Levels of detail against direct rendering: error and time in one row, 256x256. Errors are against
-// O_photo(4).
+// Levels of detail against direct rendering: error and time in one row. Errors are against O_photo(4).
 //
-//   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_lod [views [first [each]]]
+//   GSNAV_BENCH_SCENE=scene.ply GSNAV_BENCH_CAMERAS=cameras.json bench_lod [--size 256x256]
+//       [--cameras N] [--gpu] [views [first [each]]]
 //
 // Without the variables, the scene is the embedded flat from its four viewpoints. The default is 8
-// views.
+// views. N is the number of cameras in one call on a GPU, at least the views. More than the views repeat
+// them from places some centimetres away. --gpu leaves out the rows of a processor.
 //
-// Times are processor times of RGB frames on one thread, the least of five runs per view. `least +dB` is
-// the smallest gain of a view over direct rendering, `below` the number of views below direct rendering.
+// Times are processor times of RGB frames on one thread, the least of five runs per view. RGB-D (with
+// alpha) and depth alone are timed for many cameras in one call. `least +dB` is the smallest gain of a
+// view over direct rendering, `below` the number of views below direct rendering.
 //
 // Depths come from separate frames that are not timed. Their columns are the share of pixels that differ
 // by more than 2 % from the median depths of all of the photo's rays in the pixel, and the 99th
@@ -20,6 +22,7 @@
 #include <cstdlib>
 #include <ctime>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "gsnav/backends/openmp.hpp"
@@ -83,19 +86,71 @@ void row(LodViews& views, const GaussianCloud& cloud, const LodTree& tree, const
   out.print(name, pixels);
 }
 
-std::size_t number(int argc, char** argv, int i, int least, std::size_t other) {
-  return argc > i ? static_cast<std::size_t>(std::max(std::atoi(argv[i]), least)) : other;
+/// The rows of a processor.
+void rows_on_cpu(LodViews& shown, const GaussianCloud& cloud, const LodTree& tree,
+                 const VisibleSets& visible, const std::vector<double>& pixels) {
+  LodRow::print_head();
+  row(shown, cloud, tree, "direct fast", LodDraw::direct, 0);
+  row(shown, cloud, tree, "photo filter", LodDraw::photo, 0);
+  for (const double p : pixels) row(shown, cloud, tree, "lod", LodDraw::lod, p);
+  row(shown, cloud, tree, "fast, seen", LodDraw::seen, 0, &visible);
+  for (const double p : pixels) row(shown, cloud, tree, "lod, seen", LodDraw::lod, p, &visible);
+  if (const char* scene = std::getenv("GSNAV_BENCH_SCENE"); scene != nullptr) {
+    if (const auto set = io::load_shipped_levels(scene).value(); set) {
+      for (const double p : pixels) row(shown, set->cloud, set->tree, "shipped", LodDraw::lod, p);
+    }
+  }
+}
+
+struct Arguments {
+  int width = 256, height = 256;
+  std::size_t cameras = 1, views = 8, first = 0;
+  bool each = false, gpu_alone = false;
+};
+
+/// Ends the program if an argument is wrong.
+Arguments arguments(int argc, char** argv) {
+  Arguments a;
+  int place = 0;  // of the next argument without a name
+  for (int i = 1; i < argc; ++i) {
+    const std::string name = argv[i];
+    char* end = nullptr;
+    if (name == "--gpu") {
+      a.gpu_alone = true;
+      continue;
+    } else if (name == "--size" && i + 1 < argc) {
+      if (std::sscanf(argv[++i], "%dx%d", &a.width, &a.height) == 2 && a.width > 0 && a.height > 0)
+        continue;
+    } else if (name == "--cameras" && i + 1 < argc) {
+      a.cameras = std::strtoull(argv[++i], &end, 10);
+      if (*end == '\0') continue;
+    } else if (place == 2 && name == "each") {
+      a.each = true;
+      continue;
+    } else if (const auto value = std::strtoull(argv[i], &end, 10);
+               place < 2 && *end == '\0' && end != argv[i]) {
+      (place++ == 0 ? a.views : a.first) = value;
+      continue;
+    }
+    std::fprintf(
+        stderr,
+        "bench_lod: '%s' is not --size 256x256, --cameras N, --gpu, a number of views, the first view "
+        "or, after both, 'each'\n",
+        argv[i]);
+    std::exit(2);
+  }
+  return a;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  const Arguments asked = arguments(argc, argv);
   const GaussianCloud& cloud = workload().cloud;
-  std::vector<Camera> cameras = sized(kLodSide, kLodSide);
-  const std::size_t views = number(argc, argv, 1, 1, 8);
-  const std::size_t first = std::min(number(argc, argv, 2, 0, 0), cameras.size() - 1);
+  std::vector<Camera> cameras = sized(asked.width, asked.height);
+  const std::size_t first = std::min(asked.first, cameras.size() - 1);
   cameras.erase(cameras.begin(), cameras.begin() + static_cast<std::ptrdiff_t>(first));
-  if (cameras.size() > views) cameras.resize(views);
+  if (cameras.size() > asked.views) cameras.resize(std::max<std::size_t>(asked.views, 1));
   OpenMPBackend all;
   const double start = cpu_ms();
   const LodTree tree = build_lod(all, cloud).value();
@@ -104,22 +159,12 @@ int main(int argc, char** argv) {
               static_cast<double>(tree.bytes()) * 1e-6, cameras.size());
   LodViews shown = lod_views(cloud, cameras);
   shown.first = first;
-  shown.each = argc > 3;
+  shown.each = asked.each;
   const std::vector<double> pixels{0.5, LodChoice{}.pixels, 1.5, 2.0, 3.0, 4.0, 6.0};
-  LodRow::print_head();
-  row(shown, cloud, tree, "direct fast", LodDraw::direct, 0);
-  row(shown, cloud, tree, "photo filter", LodDraw::photo, 0);
-  for (const double p : pixels) row(shown, cloud, tree, "lod", LodDraw::lod, p);
   const VisibleSets visible = workload_visible_sets();
-  row(shown, cloud, tree, "fast, seen", LodDraw::seen, 0, &visible);
-  for (const double p : pixels) row(shown, cloud, tree, "lod, seen", LodDraw::lod, p, &visible);
-  if (const char* scene = std::getenv("GSNAV_BENCH_SCENE"); scene != nullptr) {
-    if (const auto set = io::load_shipped_levels(scene).value(); set) {
-      for (const double p : pixels) row(shown, set->cloud, set->tree, "shipped", LodDraw::lod, p);
-    }
-  }
+  if (!asked.gpu_alone) rows_on_cpu(shown, cloud, tree, visible, pixels);
 #if defined(GSNAV_HAS_CUDA)
-  lod_rows_on_gpu(shown, cloud, tree, visible, pixels);
+  lod_rows_on_gpu(shown, asked.cameras, cloud, tree, visible, pixels);
 #endif
   return 0;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "gsnav/image/camera.hpp"
@@ -11,7 +12,7 @@
 
 namespace gsnav_bench {
 
-inline constexpr int kLodSide = 256, kLodPhoto = 4;
+inline constexpr int kLodPhoto = 4;
 
 /// Content of a row of bench_lod.
 enum class LodDraw {
@@ -23,7 +24,7 @@ enum class LodDraw {
 
 /// Views, and the image that a photo of each would have: O_photo(kLodPhoto).
 struct LodViews {
-  std::vector<gsnav::Camera> cameras;
+  std::vector<gsnav::Camera> cameras;   ///< of one size
   std::vector<std::vector<float>> rgb;  ///< [H][W][3] per view
   std::vector<std::vector<float>>
       depths;                  ///< [k H][k W] per view: the median depths of the photo's rays, metres
@@ -31,6 +32,10 @@ struct LodViews {
   double direct_ms = 0;
   std::size_t first = 0;  ///< number of the first camera
   bool each = false;      ///< print every view
+  /// Pixels of a view.
+  std::size_t width() const { return static_cast<std::size_t>(cameras.at(0).width); }
+  std::size_t height() const { return static_cast<std::size_t>(cameras.at(0).height); }
+  std::size_t pixels() const { return width() * height(); }
 };
 
 /// Renders the photos exactly, on all threads.
@@ -44,6 +49,12 @@ class LodRow {
   /// milliseconds.
   void add(const std::vector<float>& rgb, const std::vector<float>& median_depth, double ms,
            double visible, double pairs);
+  /// Sets the times of a frame with RGB, alpha and median depth, and with median depth alone,
+  /// milliseconds.
+  void set_other_times(double rgbd_ms, double depth_ms) {
+    rgbd_ms_ = rgbd_ms;
+    depth_ms_ = depth_ms;
+  }
   void print(const char* name, double pixels) const;
   static void print_head();
 
@@ -52,13 +63,16 @@ class LodRow {
   LodDraw draw_;
   std::size_t count_ = 0, least_view_ = 0, below_ = 0;
   double quality_ = 0, worst_ = 1e9, gain_ = 1e9, ms_ = 0, visible_ = 0, pairs_ = 0;
+  double rgbd_ms_ = std::numeric_limits<double>::quiet_NaN(), depth_ms_ = rgbd_ms_;
   std::vector<double> depth_errors_;
 };
 
 #if defined(GSNAV_HAS_CUDA)
-/// Prints the table's rows for the first GPU, or a line that there is none.
-void lod_rows_on_gpu(LodViews& views, const gsnav::GaussianCloud& cloud, const gsnav::LodTree& tree,
-                     const gsnav::VisibleSets& visible, const std::vector<double>& pixels);
+/// Prints the table's rows for the first GPU, or a line that there is none. The last rows have `cameras`
+/// in one call, at least the views: more repeat the views from places some centimetres away.
+void lod_rows_on_gpu(LodViews& views, std::size_t cameras, const gsnav::GaussianCloud& cloud,
+                     const gsnav::LodTree& tree, const gsnav::VisibleSets& visible,
+                     const std::vector<double>& pixels);
 #endif
 
 }  // namespace gsnav_bench

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// bench_lod on a GPU: one camera per call, then all views in one call. Times are milliseconds per frame
+// bench_lod on a GPU: one camera per call, then many in one call. Times are milliseconds per frame
 // between events on the stream. They include the copy of the cut's chunks, but not the cut itself, which
 // the host makes.
 #include <algorithm>
@@ -21,14 +21,13 @@ namespace gsnav_bench {
 
 namespace {
 
-constexpr std::size_t kPixels = std::size_t{kLodSide} * kLodSide;
-
 class GpuRows {
  public:
   GpuRows(CudaBackend& cuda, LodViews& views, const GaussianCloud& cloud, const LodTree& tree,
           const VisibleSets& visible)
       : cuda_(cuda),
         views_(views),
+        pixels_(views.pixels()),
         cloud_(cloud),
         arrays_(cuda, cloud),
         merged_(cuda, tree.merged),
@@ -40,7 +39,7 @@ class GpuRows {
         memory_(cuda),
         time_(cuda) {
     levels_.assets = {{&tree, &cloud, {}, arrays_.set().gaussians, merged_.set().gaussians}};
-    memory_.resize_discard(4 * kPixels);
+    memory_.resize_discard(4 * pixels_);
     visible_there_.upload(visible.bits.data(), visible.bits.size());
   }
 
@@ -51,7 +50,7 @@ class GpuRows {
     asset.visible_there = seen ? visible_there_.data() : nullptr;
     LodRow out(views_, draw);
     levels_.choice.pixels = std::max(pixels, 1e-3);
-    std::vector<float> rgb(3 * kPixels), depth(kPixels);
+    std::vector<float> rgb(3 * pixels_), depth(pixels_);
     for (const Camera& camera : views_.cameras) {
       BatchImages images;
       images.floats.rgb = memory_.data();
@@ -60,7 +59,7 @@ class GpuRows {
         least = std::min(least, draw_once(draw, camera, images, pairs));
       cuda_.copy(rgb.data(), images.floats.rgb, rgb.size() * sizeof(float), CopyKind::device_to_host);
       BatchImages depths;
-      depths.floats.median_depth = memory_.data() + 3 * kPixels;
+      depths.floats.median_depth = memory_.data() + 3 * pixels_;
       double ignored = 0;
       draw_once(draw, camera, depths, ignored);
       cuda_.copy(depth.data(), depths.floats.median_depth, depth.size() * sizeof(float),
@@ -71,15 +70,15 @@ class GpuRows {
     out.print(name, pixels);
   }
 
-  /// All views in one call.
-  void batch_row(const char* name, LodDraw draw, double pixels, bool seen = false) {
+  /// `n` cameras in one call, of which the first are the views.
+  void batch_row(std::size_t n, const char* name, LodDraw draw, double pixels, bool seen = false) {
     LodRow out(views_, draw);
     levels_.choice.pixels = std::max(pixels, 1e-3);
     LeveledScene::Asset& asset = levels_.assets[0];
     asset.tree = tree_;
     asset.visible = seen ? visible_ : nullptr;
     asset.visible_there = seen ? visible_there_.data() : nullptr;
-    const std::size_t n = views_.cameras.size();
+    const std::size_t views = views_.cameras.size();
     std::vector<CutSets> cuts(n);
     std::vector<GaussianSet> sets{arrays_.set()};
     std::vector<std::vector<std::uint32_t>> lists(n);
@@ -87,13 +86,15 @@ class GpuRows {
     std::vector<BatchCamera> batch;
     std::uint64_t drawn = 0;
     for (std::size_t c = 0; c < n; ++c) {
-      batch.push_back({views_.cameras[c], {}, {}});
+      batch.push_back({views_.cameras[c % views], {}, {}});
+      Camera& camera = batch.back().camera;
+      camera.viewmat.translation.x += 0.02 * static_cast<double>(c / views);
       if (draw == LodDraw::lod) {
-        cuts[c].select(levels_, {}, views_.cameras[c]);
+        cuts[c].select(levels_, {}, camera);
         drawn += cuts[c].cut(0).stats().drawn;
       } else {
         drawn += cloud_.size();
-        const auto cell = seen ? visible_->cell_of(views_.cameras[c]) : std::nullopt;
+        const auto cell = seen ? visible_->cell_of(camera) : std::nullopt;
         if (cell) bits[c] = visible_->seen_from(*cell, visible_there_.data());
         batch[c].seen = std::span(bits).subspan(c, 1);
       }
@@ -110,31 +111,35 @@ class GpuRows {
       }
     }
     CudaBatchRenderer& renderer = renderer_;
-    memory_.resize_discard(4 * n * kPixels);
-    BatchImages images, depths;
-    images.floats.rgb = memory_.data();
-    depths.floats.median_depth = memory_.data() + 3 * n * kPixels;
-    double least = 1e9;
-    for (int repeat = 0; repeat < 9; ++repeat) {
-      least = std::min(least, time_.us([&] {
-        if (draw == LodDraw::lod) chunks_.place(cuts);
-        renderer.render(sets, batch, images).throw_if_error();
-      }));
-      renderer.finish().throw_if_error();
-    }
+    memory_.resize_discard(5 * n * pixels_);
+    BatchImages images, depths, both;
+    images.floats.rgb = both.floats.rgb = memory_.data();
+    depths.floats.median_depth = both.floats.median_depth = memory_.data() + 3 * n * pixels_;
+    both.floats.alpha = memory_.data() + 4 * n * pixels_;
+    // The least of nine calls, milliseconds per frame.
+    const auto time = [&](const BatchImages& into) {
+      double least = 1e9;
+      for (int repeat = 0; repeat < 9; ++repeat) {
+        least = std::min(least, time_.us([&] {
+          if (draw == LodDraw::lod) chunks_.place(cuts);
+          renderer.render(sets, batch, into).throw_if_error();
+        }));
+        renderer.finish().throw_if_error();
+      }
+      return least * 1e-3 / static_cast<double>(n);
+    };
+    const double rgbd_ms = time(both), rgb_ms = time(images);
     const double pairs =
         static_cast<double>(renderer.stats().tile_intersections) / static_cast<double>(n);
-    renderer.render(sets, batch, depths).throw_if_error();
-    renderer.finish().throw_if_error();
-    std::vector<float> rgb(3 * kPixels), depth(kPixels);
-    for (std::size_t c = 0; c < n; ++c) {
-      cuda_.copy(rgb.data(), images.floats.rgb + 3 * c * kPixels, rgb.size() * sizeof(float),
+    out.set_other_times(rgbd_ms, time(depths));
+    std::vector<float> rgb(3 * pixels_), depth(pixels_);
+    for (std::size_t c = 0; c < views; ++c) {
+      cuda_.copy(rgb.data(), images.floats.rgb + 3 * c * pixels_, rgb.size() * sizeof(float),
                  CopyKind::device_to_host);
-      cuda_.copy(depth.data(), depths.floats.median_depth + c * kPixels, depth.size() * sizeof(float),
+      cuda_.copy(depth.data(), depths.floats.median_depth + c * pixels_, depth.size() * sizeof(float),
                  CopyKind::device_to_host);
       cuda_.synchronize().throw_if_error();
-      out.add(rgb, depth, least * 1e-3 / static_cast<double>(n),
-              static_cast<double>(drawn) / static_cast<double>(n), pairs);
+      out.add(rgb, depth, rgb_ms, static_cast<double>(drawn) / static_cast<double>(n), pairs);
     }
     out.print(name, pixels);
   }
@@ -172,6 +177,7 @@ class GpuRows {
 
   CudaBackend& cuda_;
   LodViews& views_;
+  std::size_t pixels_;  ///< number of pixels of a view
   const GaussianCloud& cloud_;
   GaussianArrays<CudaBackend> arrays_, merged_;
   CudaBatchRenderer renderer_;
@@ -188,8 +194,9 @@ class GpuRows {
 
 }  // namespace
 
-void lod_rows_on_gpu(LodViews& views, const GaussianCloud& cloud, const LodTree& tree,
-                     const VisibleSets& visible, const std::vector<double>& pixels) {
+void lod_rows_on_gpu(LodViews& views, std::size_t cameras, const GaussianCloud& cloud,
+                     const LodTree& tree, const VisibleSets& visible,
+                     const std::vector<double>& pixels) {
   if (CudaBackend::device_count() == 0) {
     std::printf("no GPU\n");
     return;
@@ -205,11 +212,12 @@ void lod_rows_on_gpu(LodViews& views, const GaussianCloud& cloud, const LodTree&
   for (const double p : pixels) rows.row("lod", LodDraw::lod, p);
   rows.row("fast, seen", LodDraw::seen, 0, true);
   for (const double p : pixels) rows.row("lod, seen", LodDraw::lod, p, true);
-  std::printf("%zu cameras in one call\n", views.cameras.size());
-  rows.batch_row("direct fast", LodDraw::direct, 0);
-  for (const double p : pixels) rows.batch_row("lod", LodDraw::lod, p);
-  rows.batch_row("fast, seen", LodDraw::seen, 0, true);
-  for (const double p : pixels) rows.batch_row("lod, seen", LodDraw::lod, p, true);
+  cameras = std::max(cameras, views.cameras.size());
+  std::printf("%zu cameras in one call\n", cameras);
+  rows.batch_row(cameras, "direct fast", LodDraw::direct, 0);
+  for (const double p : pixels) rows.batch_row(cameras, "lod", LodDraw::lod, p);
+  rows.batch_row(cameras, "fast, seen", LodDraw::seen, 0, true);
+  for (const double p : pixels) rows.batch_row(cameras, "lod, seen", LodDraw::lod, p, true);
 }
 
 }  // namespace gsnav_bench
