@@ -74,6 +74,7 @@ void BatchWorld::publish() {
 }
 
 Status BatchWorld::begin(const ParallelFor& run, std::span<const std::size_t> which) {
+  prepared_ = false;
   episodes_.resize(environments_.size());
   for (const std::size_t i : which) {
     Environment& e = environments_[i];
@@ -143,6 +144,15 @@ Status BatchWorld::reset(const ParallelFor& run, std::span<const std::uint8_t> m
 }
 
 Status BatchWorld::make_bodies(const ParallelFor& run, std::span<const std::size_t> which) {
+  try {
+    return list_and_make_bodies(run, which);
+  } catch (...) {
+    bodies_ = {};  // Listed bodies that were not made would count as none.
+    throw;
+  }
+}
+
+Status BatchWorld::list_and_make_bodies(const ParallelFor& run, std::span<const std::size_t> which) {
   static const CapsuleSet nobody;
   removed_.clear();
   bodies_.trim(most_bodies_, removed_);
@@ -202,6 +212,15 @@ Status BatchWorld::step(const ParallelFor& run, std::span<const VelocityCommand>
   return act(run, commands, before_reset);
 }
 
+void BatchWorld::prepare_step(const ParallelFor& run) {
+  if (!begun_) return;
+  stepping_.clear();
+  for (std::size_t e = 0; e < size(); ++e) {
+    if (!environments_[e].world->done()) stepping_.push_back(e);
+  }
+  prepared_ = detail::guarded([&] { return make_bodies(run, stepping_); }).ok();
+}
+
 template <class A>
 Status BatchWorld::act(const ParallelFor& run, std::span<const A> actions,
                        const std::function<Status()>& before_reset) {
@@ -220,7 +239,9 @@ Status BatchWorld::act(const ParallelFor& run, std::span<const A> actions,
     (done ? resetting_ : stepping_).push_back(e);
   }
   begun_ = false;  // Set to true again only when everything has succeeded.
-  if (Status s = make_bodies(run, stepping_); !s) return s;
+  if (!std::exchange(prepared_, false)) {
+    if (Status s = make_bodies(run, stepping_); !s) return s;
+  }
   run(stepping_.size(), [&](std::size_t k) {
     const std::size_t i = stepping_[k];
     Environment& e = environments_[i];

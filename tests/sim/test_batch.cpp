@@ -281,7 +281,7 @@ TEST_CASE("bodies of a moment are made once, also for who comes by there later, 
   const BatchWorld::ParallelFor in_turn = [](std::size_t n, const std::function<void(std::size_t)>& f) {
     for (std::size_t i = 0; i < n; ++i) f(i);
   };
-  const auto clearances = [&](std::size_t kept, std::size_t& made) {
+  const auto clearances = [&](std::size_t kept, std::size_t& made, bool ahead = false) {
     std::vector<double> seen;
     const auto bodies = [&](double t0, double t1, std::vector<DynamicCapsule>& out) {
       made += t1 > t0 ? 1 : 0;
@@ -293,16 +293,23 @@ TEST_CASE("bodies of a moment are made once, also for who comes by there later, 
     cache.keep(kept);
     REQUIRE(worlds.reset(in_turn).ok());
     for (int i = 0; i < 8; ++i) {
+      if (ahead) worlds.prepare_step(in_turn);
+      const std::size_t before = made;
       REQUIRE(worlds.step(in_turn, std::vector<Action>(2, Action::turn_left)).ok());
+      if (ahead) CHECK(made == before);
       for (const StepInfo& info : worlds.info().infos) seen.push_back(info.avatar_clearance);
       CHECK(cache.held() <= kept + 2);
     }
     return seen;
   };
-  std::size_t many = 0, few = 0;
+  std::size_t many = 0, few = 0, early = 0, none_kept = 0;
   CHECK(clearances(100, many) == clearances(2, few));
   CHECK(many == 12);  // 0 to 3 s, four intervals a second
   CHECK(few == 16);
+  // Those of the next step stay even if fewer are kept.
+  CHECK(clearances(100, early, true) == clearances(0, none_kept, true));
+  CHECK(clearances(2, few) == clearances(100, early, true));
+  CHECK(none_kept == 16);
 }
 
 namespace {

@@ -233,9 +233,13 @@ class BasicBatchSimulator {
     BatchStep out;
     static_cast<BatchInfo&>(out) = worlds_.info();
     Status told;
-    bool untold = bool(meanwhile);
+    bool untold = bool(meanwhile), prepared = is_host_backend<B>;
     const auto tell = [&] {
       if (std::exchange(untold, false)) told = detail::guarded([&] { return meanwhile(out); });
+    };
+    const auto while_drawing = [&] {
+      tell();
+      if (!std::exchange(prepared, true)) worlds_.prepare_step(parallel());
     };
     if (!config_.rendering || images_.empty()) {
       drawn_ = false;
@@ -255,7 +259,7 @@ class BasicBatchSimulator {
     for (std::size_t e = 0; e < environments(); ++e) {
       if (every || worlds_.moved(e)) add_view(e, e);
     }
-    if (Status s = draw(buffers_, std::ref(tell)); !s) return s;
+    if (Status s = draw(buffers_, std::ref(while_drawing)); !s) return s;
     drawn_ = true;
     tell();
     if (!told) return told;

@@ -122,6 +122,9 @@ class BatchWorld {
   /// Drives each environment by a velocity for one control period. Same parameters and errors.
   Status step(const ParallelFor& run, std::span<const VelocityCommand> commands,
               const std::function<Status()>& before_reset = {});
+  /// Makes the bodies of the next step of all episodes that go on, so that step() finds them. Call it
+  /// while the host would wait, such as for images. Results do not change. Errors are left to step().
+  void prepare_step(const ParallelFor& run);
 
  private:
   friend struct BatchWorldCache;  // Tests read and limit the number of cached intervals.
@@ -142,6 +145,7 @@ class BatchWorld {
              const std::function<Status()>& before_reset);
   Status begin(const ParallelFor& run, std::span<const std::size_t> which);
   Status make_bodies(const ParallelFor& run, std::span<const std::size_t> which);
+  Status list_and_make_bodies(const ParallelFor& run, std::span<const std::size_t> which);
   Status first_error(std::span<const std::size_t> which) const;
   void note_observation(std::size_t e);
   void publish();
@@ -153,6 +157,7 @@ class BatchWorld {
   std::vector<Environment> environments_;
   bool begun_ = false;
   std::size_t most_bodies_ = 2048;  // Largest number of intervals that stay cached after a step.
+  bool prepared_ = false;           // True if prepare_step() has made the bodies of the next step.
 
   BodyCache bodies_;
   struct Missing {
