@@ -9,8 +9,8 @@
 // them from places some centimetres away. --gpu leaves out the rows of a processor.
 //
 // Times are processor times of RGB frames on one thread, the least of five runs per view. RGB-D (with
-// alpha) and depth alone are timed for many cameras in one call. `least +dB` is the smallest gain of a
-// view over direct rendering, `below` the number of views below direct rendering.
+// alpha) and depth alone are timed for many cameras in one call, and else nan. `least +dB` is the
+// smallest gain of a view over direct rendering, `below` the number of views below direct rendering.
 //
 // Depths come from separate frames that are not timed. Their columns are the share of pixels that differ
 // by more than 2 % from the median depths of all of the photo's rays in the pixel, and the 99th

@@ -9,10 +9,10 @@
 #include <span>
 #include <vector>
 
-#include "gsnav/backends/openmp.hpp"
 #include "gsnav/detail/io/visible_file.hpp"
 #include "gsnav/detail/nav/gaussian_navmesh.hpp"
 #include "gsnav/detail/nav/viewpoints.hpp"
+#include "gsnav/device/renderer.hpp"
 #include "workload.hpp"
 
 using namespace gsnav;
@@ -68,11 +68,11 @@ VisibleSets workload_visible_sets(VisibleSettings settings) {
   const Similarity& placed = places.placed;
   const std::vector<Vec3d>& viewpoints = places.viewpoints;
   settings.most_share = 1;  // measured even if visible sets save nothing
-  OpenMPBackend backend;
+  const Device device = Device::parse("best").value();
   const auto start = std::chrono::steady_clock::now();
   const char* scene = std::getenv("GSNAV_BENCH_SCENE");
   io::CachedVisibleSets found;
-  const auto build = [&] { return build_visible_sets(backend, cloud, viewpoints, settings, placed); };
+  const auto build = [&] { return build_visible_sets(device, cloud, viewpoints, settings, placed); };
   if (scene != nullptr) {
     found = io::cached_visible_sets(scene, cloud, viewpoints, settings, placed, build).value();
   } else {
@@ -81,11 +81,13 @@ VisibleSets workload_visible_sets(VisibleSettings settings) {
   }
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   std::printf(
-      "visible sets: %zu cells of %.2f m from %zu viewpoints, %s in %.1f s, %.2f MB; a cell sees %.1f "
+      "visible sets: %zu cells of %.2f m from %zu viewpoints, %s in %.1f s (%s), %.2f MB; a cell sees "
+      "%.1f "
       "%% of %zu chunks, %.1f %% of the Gaussians\n",
       found.sets.cells(), found.sets.cell, viewpoints.size(), found.built ? "found" : "read",
-      took.count(), static_cast<double>(found.sets.bytes()) * 1e-6, 100 * found.sets.mean_share(),
-      found.sets.cloud_chunks, 100 * found.sets.mean_row_share(cloud.size()));
+      took.count(), device.name().c_str(), static_cast<double>(found.sets.bytes()) * 1e-6,
+      100 * found.sets.mean_share(), found.sets.cloud_chunks,
+      100 * found.sets.mean_row_share(cloud.size()));
   return std::move(found.sets);
 }
 

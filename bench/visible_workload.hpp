@@ -20,8 +20,9 @@ struct VisibleWorkload {
 /// Builds the NavMesh and finds the places, `spacing` metres apart.
 VisibleWorkload visible_workload(double spacing = gsnav::VisibleSettings{}.spacing());
 
-/// Visible sets of the workload, found from visible_workload. They are cached beside GSNAV_BENCH_SCENE.
-/// Prints their cost. `settings`: this function overwrites those that describe the camera.
+/// Visible sets of the workload, found from visible_workload on the device `best`. Every device finds
+/// the same bits. They are cached beside GSNAV_BENCH_SCENE. Prints their cost. `settings`: this function
+/// overwrites those that describe the camera.
 gsnav::VisibleSets workload_visible_sets(gsnav::VisibleSettings settings = {});
 
 }  // namespace gsnav_bench
