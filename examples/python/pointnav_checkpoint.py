@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import math
 import pathlib
 import sys
@@ -12,7 +13,7 @@ from typing import Any
 
 import torch
 from pointnav_agent import Agent, made_by
-from pointnav_files import line_of, need, shown
+from pointnav_files import aside, line_of, need, shown
 from pointnav_policy import CHANNELS, load, read_checkpoint
 from pointnav_worlds import METRICS, WORLDS_VERSION
 from torch import Tensor
@@ -27,7 +28,9 @@ def checkpoint_of(path: pathlib.Path, args: argparse.Namespace, option: str, age
     kept = read_checkpoint(path, remedy)
     for name in names:
         now = getattr(args, name)
-        then = kept["args"].get(name, now)
+        if name not in kept["args"]:
+            sys.exit(f"{path}: args[{name!r}] is missing. {remedy}")
+        then = kept["args"][name]
         if not isinstance(then, (int, float) if isinstance(now, float) else type(now)):
             sys.exit(f"{path}: args[{name!r}] is {shown(then)}, not of the type of {now!r}. {remedy}")
         if now != then:
@@ -35,6 +38,14 @@ def checkpoint_of(path: pathlib.Path, args: argparse.Namespace, option: str, age
                      f"{option}.")
     take_weights(agent, kept["agent"], path, remedy)
     return kept
+
+
+def write_checkpoint(path: pathlib.Path, state: dict[str, Any]) -> None:
+    """Writes a checkpoint. Raises an OSError, where torch.save(state, path) has another error for a full disk."""
+    held = io.BytesIO()
+    torch.save(state, held)
+    with aside(path) as part:
+        part.write_bytes(held.getbuffer())
 
 
 def take_weights(agent: Agent, weights: Mapping[str, Tensor], path: pathlib.Path, remedy: str) -> None:
@@ -79,11 +90,11 @@ def begin_with(path: pathlib.Path | None, args: argparse.Namespace, agent: Agent
     take_weights(agent, weights, path, remedy)
 
 
-def say_ignored(path: pathlib.Path, kept: dict[str, Any], args: argparse.Namespace, device: torch.device) -> None:
+def say_ignored(path: pathlib.Path, kept: dict[str, Any], args: argparse.Namespace) -> None:
     """Says that a run goes on from its own checkpoint, and if it was made by another version or device."""
     if args.begin_with is not None:
         print(f"{path}: goes on from here. --begin-with {args.begin_with} is of no use.", file=sys.stderr)
-    now, then = made_by(device), kept.get("made_by")
+    now, then = made_by(args.torch_device), kept.get("made_by")
     if then not in (None, now):
         print(f"{path}: made by {then}, goes on by {now}. Bits may differ from those of one run.", file=sys.stderr)
 

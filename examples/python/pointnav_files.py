@@ -7,6 +7,7 @@ import contextlib
 import os
 import pathlib
 import reprlib
+import tempfile
 from collections.abc import Iterator
 from typing import Any
 
@@ -25,6 +26,12 @@ def aside(path: pathlib.Path) -> Iterator[pathlib.Path]:
     except BaseException:
         part.unlink(missing_ok=True)
         raise
+
+
+def make_folder(path: pathlib.Path) -> None:
+    """Makes a folder if there is none. Raises an OSError if no file can be written there."""
+    path.mkdir(parents=True, exist_ok=True)
+    tempfile.TemporaryFile(dir=path).close()
 
 
 def line_of(value: object) -> str:

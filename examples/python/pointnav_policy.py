@@ -189,7 +189,17 @@ def checked(weights: dict[str, Array], size: int) -> Policy:
 
 
 def save(policy: Policy, path: pathlib.Path) -> None:
-    """Writes the weights as numbers of 16 bits, without those of the value, to a file .npz."""
-    kept: dict[str, Any] = {name: w.astype(np.float16) for name, w in policy.weights.items() if name[:5] != "value"}
+    """Writes the weights as numbers of 16 bits, without those of the value, to a file .npz.
+
+    Ends the program if a weight is larger than such a number can be.
+    """
+    kept: dict[str, Any] = {}
+    for name, weight in policy.weights.items():
+        largest = float(np.abs(weight).max(initial=0))
+        if name[:5] == "value":
+            continue
+        if largest > np.finfo(np.float16).max:
+            sys.exit(f"{path}: {name} has a weight of size {largest:g}, and numbers of 16 bits end at 65504")
+        kept[name] = weight.astype(np.float16)
     with aside(path) as part, open(part, "wb") as file:
         np.savez_compressed(file, **kept, size=np.int32(policy.size))

@@ -27,8 +27,8 @@ import numpy as np
 import torch.distributed as dist
 from pointnav_agent import (Agent, Mirror, Reorder, Rows, agreed, clear, devices_of, hash_of, made_by, pieces,
                             progress, set_determinism, write_log)
-from pointnav_checkpoint import begin_with, resumed, say_ignored
-from pointnav_files import aside
+from pointnav_checkpoint import begin_with, resumed, say_ignored, write_checkpoint
+from pointnav_files import make_folder
 from pointnav_policy import ACTIONS, CHANNELS, HIDDEN
 from pointnav_worlds import (METRICS, SUCCESS, TRAIN_SEEDS, WORLDS_VERSION, Draw, Worlds, flats_argument, goals,
                              mixed, number, run_program, sensor_arguments, sensors_of, world_arguments)
@@ -47,11 +47,10 @@ KEPT = ("seed", "flats", "episodes_per_flat", "people", "blind", "size", "densit
 class Learner:
     """Collects rollouts of T steps in N environments and updates the agent by PPO."""
 
-    def __init__(self, args: argparse.Namespace, agent: Agent, worlds: Worlds) -> None:
-        self.args, self.agent, self.worlds = args, agent, worlds
+    def __init__(self, args: argparse.Namespace, agent: Agent, optimizer: torch.optim.Adam, worlds: Worlds) -> None:
+        self.args, self.agent, self.optimizer, self.worlds = args, agent, optimizer, worlds
         self.device, n, t = next(agent.parameters()).device, args.environments, args.rollout
         self.rank, self.ranks = (dist.get_rank(), dist.get_world_size()) if dist.is_initialized() else (0, 1)
-        self.optimizer = torch.optim.Adam(agent.parameters(), args.lr, eps=1e-5, fused=self.device.type == "cuda")
         self.update_count, self.digest = 0, b""
         self.draw = Draw(worlds, args.seed, self.rank * n)
         sensors = sensors_of(args, args.blind)
@@ -277,24 +276,17 @@ def save(learner: Learner, log: list[dict[str, float]], out: pathlib.Path) -> No
     state = {"agent": learner.agent.state_dict(), "optimizer": learner.optimizer.state_dict(), "log": log,
              "update": learner.update_count, "digests": digests, "made_by": made_by(learner.device),
              "worlds_version": WORLDS_VERSION, "args": {name: getattr(learner.args, name) for name in KEPT}}
-    with aside(out / "checkpoint.pt") as part:
-        torch.save(state, part)
+    write_checkpoint(out / "checkpoint.pt", state)
     write_log(out, log)
 
 
-def resume(learner: Learner, out: pathlib.Path) -> list[dict[str, float]]:
-    """Goes on from the checkpoint, if there is one. Returns the log so far."""
-    path = out / "checkpoint.pt"
+def resume(args: argparse.Namespace, agent: Agent, optimizer: torch.optim.Optimizer) -> dict[str, Any]:
+    """The checkpoint from which the run goes on. Empty if there is none: then --begin-with gives the weights."""
+    path = args.out / "checkpoint.pt"
     if not path.exists():
-        begin_with(learner.args.begin_with, learner.args, learner.agent)
-        return []
-    kept = resumed(path, learner.args, learner.agent, learner.optimizer, KEPT)
-    if learner.rank == 0:
-        say_ignored(path, kept, learner.args, learner.device)
-    learner.update_count, learner.digest = kept["update"], kept["digests"][learner.rank]
-    if learner.rank == 0:
-        write_log(out, list(kept["log"]))
-    return list(kept["log"])
+        begin_with(args.begin_with, args, agent)
+        return {}
+    return resumed(path, args, agent, optimizer, KEPT)
 
 
 def log_row(learner: Learner, frames: float, seconds: float) -> dict[str, float]:
@@ -315,10 +307,17 @@ def log_row(learner: Learner, frames: float, seconds: float) -> dict[str, float]
 def train(args: argparse.Namespace, agent: Agent) -> None:
     """Trains until all environments together have taken `args.steps` steps."""
     began = time.perf_counter()
+    optimizer = torch.optim.Adam(agent.parameters(), args.lr, eps=1e-5, fused=args.torch_device.type == "cuda")
+    kept = resume(args, agent, optimizer)  # refuses a bad file before the flats are made, which takes a while
     worlds = Worlds(TRAIN_SEEDS[:args.flats], args, args.episodes_per_flat, args.success, args.penalties)
-    learner = Learner(args, agent, worlds)
-    log = resume(learner, args.out)
+    learner = Learner(args, agent, optimizer, worlds)
+    log: list[dict[str, float]] = list(kept.get("log", []))
+    if kept:
+        learner.update_count, learner.digest = kept["update"], kept["digests"][learner.rank]
     if learner.rank == 0:
+        if kept:
+            say_ignored(args.out / "checkpoint.pt", kept, args)
+            write_log(args.out, log)
         print(f"{args.flats} flats made in {time.perf_counter() - began:.0f} s; {learner.update_count} updates done")
     first, ready, steady = 0.0, 0.0, False
     updates = args.every * math.ceil(args.steps / (args.every * args.rollout * args.environments * args.ranks))
@@ -365,7 +364,7 @@ def arguments() -> argparse.Namespace:
     p.add_argument("--horizon", type=number(float, 1, 1e15), default=1e8, help="steps until the rate is --lr / 10")
     p.add_argument("--every", type=number(int, 1, 10**9), default=50, help="updates from one checkpoint to the next")
     p.add_argument("--cut-off", type=number(float, 0.01, 1), default=1.0, help="fraction of ranks whose end ends the "
-                   "rollouts of the others. DD-PPO has 0.6; below 1, runs on several ranks are not reproducible")
+                   "rollouts of the others: 0.6 in DD-PPO, and 0.5 for two ranks. Below 1, runs are not reproducible")
     p.add_argument("--mirror", action="store_true", help="swap left and right in every other environment")
     p.add_argument("--not-deterministic", action="store_true", help="let PyTorch choose algorithms by speed alone")
     p.add_argument("--success", type=number(float, 0, 1e6), default=SUCCESS, help="reward for a success")
@@ -389,7 +388,7 @@ def main() -> None:
     if local >= 0:
         dist.init_process_group("nccl" if args.torch_device.type == "cuda" else "gloo")
     args.ranks = dist.get_world_size() if local >= 0 else 1
-    args.out.mkdir(parents=True, exist_ok=True)
+    make_folder(args.out)
     torch.manual_seed(args.seed)
     train(args, Agent(args.size, 0 if args.blind else CHANNELS[args.sensor]).to(args.torch_device))
     if local >= 0:

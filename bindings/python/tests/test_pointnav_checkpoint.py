@@ -246,6 +246,22 @@ def test_bad_arrays_are_named(field, value, text, uses, tmp_path):
     uses.refused(PLAYED, text)
 
 
+def test_arguments_that_are_missing_are_named(uses):
+    state = copy.deepcopy(uses.good)
+    del state["args"]["seed"]
+    torch.save(state, uses.path)
+    uses.refused(RESUMED, "args['seed'] is missing")
+
+
+def test_weights_too_large_for_16_bits_are_not_written(uses, tmp_path):
+    from pointnav_policy import load, save
+
+    torch.save(changed(uses.good, (*BIAS,), torch.full((32,), 7e4)), uses.path)
+    with pytest.raises(SystemExit, match="goal.bias has a weight of size 70000"):
+        save(load(uses.path), tmp_path / "agent.npz")
+    assert not (tmp_path / "agent.npz").exists()
+
+
 def test_programs_end_with_a_line(uses, tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["train_pointnav.py", "--rollout", "16", "--environments", "4", "--every", "5"])
     import train_pointnav

@@ -92,6 +92,18 @@ def test_two_ranks_make_the_update_of_one_with_twice_the_environments(tmp_path):
     assert log[0] == pytest.approx(log[1], abs=1e-5)
 
 
+def test_a_folder_or_disk_that_takes_no_files_ends_the_run_with_a_line(tmp_path):
+    def said(out, *limits):
+        run = subprocess.run([*limits, *command(out)], env=ONE_THREAD, capture_output=True, text=True)
+        assert run.returncode == 1 and run.stderr.startswith("train_pointnav.py: "), run.stderr
+        assert run.stderr.count("\n") == 1 and not list(out.glob("part-*")), run.stderr
+        return run.stderr
+
+    assert "No such file" in said(pathlib.Path("/proc/folder"))
+    # Files of at most 64 KiB: the checkpoint is larger.
+    assert "too large" in said(tmp_path, "prlimit", "--fsize=65536")
+
+
 def test_ranks_end_together(tmp_path):
     trained(tmp_path, "--minutes", "0", "--cut-off", "0.5", ranks=2, updates=50, every=1)
     assert len(rows(tmp_path)) == 2
@@ -105,7 +117,9 @@ def test_a_rollout_ends_early_once_enough_other_ranks_are_done(tmp_path):
                        "from pointnav_worlds import Worlds\n"
                        "args = train_pointnav.arguments()\n"
                        "args.torch_device = torch.device('cpu')\n"
-                       "learner = train_pointnav.Learner(args, Agent(64, 1), Worlds(range(2), args, 10))\n"
+                       "agent = Agent(64, 1)\n"
+                       "optimizer = torch.optim.Adam(agent.parameters())\n"
+                       "learner = train_pointnav.Learner(args, agent, optimizer, Worlds(range(2), args, 10))\n"
                        "class Store:\n"
                        "    def add(self, name, n):\n"
                        "        return 1  # of two ranks is done\n"
