@@ -262,9 +262,13 @@ class BasicRenderer {
       jobs_.clear();
       together_.clear();
       alone_.clear();
+      const RenderConfig* checked = nullptr;  // Neighbours often share one.
+      bool valid = false;
       for (std::size_t c = 0; c < count; ++c) {
-        jobs_.push_back(job_of(c));
-        (FrameBatch<B>::supports(jobs_[c]) ? together_ : alone_).push_back(c);
+        const FrameJob<S>& job = jobs_.emplace_back(job_of(c));
+        if (checked != job.config) valid = validate(*(checked = job.config)).ok();
+        // draw_frame reports a configuration that is not valid.
+        (valid && FrameBatch<B>::supports(job) ? together_ : alone_).push_back(c);
       }
       const CopyKind to = where == Images::host ? CopyKind::device_to_host : CopyKind::device_to_device;
       if (!together_.empty()) {

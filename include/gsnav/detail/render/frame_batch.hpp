@@ -67,11 +67,10 @@ class FrameBatch {
  public:
   explicit FrameBatch(B& backend) : backend_(&backend), scratch_(backend) {}
 
-  /// Whether `render` can draw a frame. Other frames are left to draw_frame, which also says what is
-  /// wrong with a configuration or a camera.
+  /// Whether `render` can draw a frame whose configuration and camera are valid. Other frames are left
+  /// to draw_frame.
   static bool supports(const FrameJob<float>& job) {
-    return validate(*job.config).ok() && validate(*job.camera).ok() &&
-           Batch::supports(*job.config, job.sets, job.meshes).ok();
+    return Batch::supports(*job.config, job.sets, job.meshes).ok();
   }
 
   /// Draws the frames jobs[j] for each j in `which`, all of which must be supported. Waits for the

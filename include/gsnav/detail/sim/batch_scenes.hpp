@@ -73,8 +73,11 @@ class BatchScenes {
     const auto key = [this](const SceneView& v) {
       return std::pair(v.scene, scenes_[v.scene]->scene().avatars.empty() ? 0.0 : v.time);
     };
-    std::stable_sort(views.begin(), views.end(),
-                     [&](const SceneView& a, const SceneView& b) { return key(a) < key(b); });
+    order_.clear();
+    for (std::size_t i = 0; i < views.size(); ++i) order_.emplace_back(key(views[i]), i);
+    std::sort(order_.begin(), order_.end());
+    unsorted_.assign(views.begin(), views.end());
+    for (std::size_t i = 0; i < views.size(); ++i) views[i] = unsorted_[order_[i].second];
     posed_.clear();
     used_.assign(scenes_.size(), 0);
     for (std::size_t first = 0, last = 0; first < views.size(); first = last) {
@@ -117,9 +120,11 @@ class BatchScenes {
     run(posed_.size(), [&](std::size_t i) {
       Posed& p = posed_[i];
       p.status = detail::guarded([&] {
-        for (const SceneView& v : p.views)
-          plan.append_cameras(v.view.base, v.view.rotation, v.view.pitch, p.cameras);
         const std::size_t scene = p.views[0].scene;
+        for (const SceneView& v : p.views) {
+          if (scenes_[scene]->scene().avatars.empty()) break;
+          plan.append_cameras(v.view.base, v.view.rotation, v.view.pitch, p.cameras);
+        }
         return scenes_[scene]->prepare(p.slot, p.views[0].time, p.cameras, configs_[scene],
                                        plan.any(SensorPlan::kSemantic));
       });
@@ -153,6 +158,9 @@ class BatchScenes {
   std::vector<RenderConfig> configs_;                       // One per scene.
   std::size_t left_poses_ = 0;                              // Poses of scenes that were freed.
   SkinningBatch<B> skinning_;
+  std::vector<std::pair<std::pair<std::size_t, double>, std::size_t>> order_;  // Keys and places of
+                                                                               // views, in order.
+  std::vector<SceneView> unsorted_;
   std::vector<Posed> posed_;
   std::vector<std::size_t> used_;  // Number of slots used per scene.
   std::vector<SensorView> ready_;

@@ -91,7 +91,7 @@ class SceneOnBackend {
     if (s.whole && s.time == t) return {};
     s.whole = false;
     if (Status e = s.people.pose(scene_->avatars, t); !e) return e;
-    list_sets(s);
+    list_sets(s, true);
     list_bodies(s);
     pose_count_ += s.people.size();
     s.time = t;
@@ -101,7 +101,8 @@ class SceneOnBackend {
   /// Poses slot `slot` for certain cameras, in two steps: prepare(), then pose_prepared(). Avatars that
   /// no camera can see cost little. prepare() runs on the host only; several threads may call it for
   /// different slots after make_slots().
-  /// @param whole_bodies whether whole bodies are drawn besides their levels of detail.
+  /// @param whole_bodies whether whole bodies are drawn besides their levels of detail. Otherwise, and
+  /// without levels of detail, sets() leaves out the avatars that no camera can see.
   /// @return an error of skinning.
   Status prepare(std::size_t slot, double t, std::span<const Camera> cameras, const RenderConfig& config,
                  bool whole_bodies = false) {
@@ -120,7 +121,7 @@ class SceneOnBackend {
       return levels;
     };
     if (Status e = s.people.prepare(scene_->avatars, t, wanted); !e) return e;
-    list_sets(s);
+    list_sets(s, whole_bodies || lod_);
     return {};
   }
   /// Second step of prepare(): skins the Gaussians, as part of a batch that the caller runs.
@@ -196,9 +197,12 @@ class SceneOnBackend {
       }
     }
   }
-  void list_sets(Slot& s) const {
+  /// @param all whether avatars that are not posed have a set too, an empty one.
+  void list_sets(Slot& s, bool all) const {
     s.sets = sets_;
-    for (std::size_t i = 0; i < s.people.size(); ++i) s.sets.push_back(s.people.set(i));
+    for (std::size_t i = 0; i < s.people.size(); ++i) {
+      if (all || s.people.is_seen(i)) s.sets.push_back(s.people.set(i));
+    }
   }
 
   B* backend_;
