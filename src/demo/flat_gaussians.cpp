@@ -43,8 +43,8 @@ std::vector<Box> Painter::covers_of(const Patch& patch) const {
   return covers;
 }
 
-void Painter::emit_gaussians(const Patch& patch, const Cut& cut, std::size_t first_row, int sh_degree,
-                             Made& out) const {
+void Painter::emit_gaussians(const Patch& patch, const PatchSplit& cut, std::size_t first_row,
+                             int sh_degree, Made& out) const {
   const std::vector<Box> covers = covers_of(patch);
   const double length_t = column_length(patch.position, 0.5, patch.flat);
   const int rows = count_for(length_t, patch.spacing.v * cut.stretch);
@@ -103,8 +103,8 @@ Painter::Counted Painter::count(const Patch& patch, double stretch) const {
   return out;
 }
 
-Result<Painter::Cut> Painter::cut_at(double stretch, ThreadPool& pool) const {
-  Cut cut;
+Result<Painter::PatchSplit> Painter::cut_at(double stretch, ThreadPool& pool) const {
+  PatchSplit cut;
   cut.stretch = stretch;
   cut.patches.resize(patches_.size());
   const Status s = detail::run_guarded(pool, static_cast<std::uint32_t>(patches_.size()),
@@ -120,17 +120,17 @@ Result<Painter::Cut> Painter::cut_at(double stretch, ThreadPool& pool) const {
   return cut;
 }
 
-Result<Painter::Cut> Painter::cut_into(std::size_t gaussians, ThreadPool& pool) const {
+Result<Painter::PatchSplit> Painter::cut_into(std::size_t gaussians, ThreadPool& pool) const {
   // The number falls with the square of `stretch`, in steps. Search a stretch that gives slightly too
   // few; rows then get the missing Gaussians, most of them one at most.
   const double goal = static_cast<double>(gaussians);
-  std::optional<Cut> best;
+  std::optional<PatchSplit> best;
   double few = 0, many = 0;  // largest and smallest stretches known to give at most `gaussians`, and
                              // more; 0: none yet
   double stretch = 1.07 * std::sqrt(400000 / goal);
   constexpr int kTries = 16;
   for (int i = 0; i < kTries; ++i) {
-    Result<Cut> cut = cut_at(stretch, pool);
+    Result<PatchSplit> cut = cut_at(stretch, pool);
     if (!cut) return cut;
     const double made = static_cast<double>(cut->gaussians), rows = static_cast<double>(cut->rows);
     if (cut->gaussians <= gaussians) {
@@ -146,7 +146,7 @@ Result<Painter::Cut> Painter::cut_into(std::size_t gaussians, ThreadPool& pool) 
   }
   if (!best) {
     constexpr double kOneEach = 1e6;
-    Result<Cut> least = cut_at(kOneEach, pool);
+    Result<PatchSplit> least = cut_at(kOneEach, pool);
     if (!least) return least;
     if (least->gaussians > gaussians) {
       return Status{Errc::invalid_argument,
@@ -178,7 +178,7 @@ void Painter::emit_triangles(const Patch& patch, DefaultScene& scene) {
   }
 }
 
-Status Painter::emit(const Cut& cut, const SceneSampling& sampling, ThreadPool& pool,
+Status Painter::emit(const PatchSplit& cut, const SceneSampling& sampling, ThreadPool& pool,
                      GaussianCloudBuilder& builder) const {
   constexpr std::size_t kBatch = 1 << 20;  // number of Gaussians that are made before they are written
                                            // in order
@@ -224,8 +224,9 @@ Result<DefaultScene> Painter::finish(const SceneSampling& sampling) const {
   ThreadPool pool(sampling.threads > 0 ? sampling.threads : cores);
   DefaultScene scene;
   const Status s = detail::guarded([&]() -> Status {
-    const Result<Cut> cut = sampling.gaussians > 0 ? cut_into(sampling.gaussians, pool)
-                                                   : cut_at(1.07 / std::sqrt(sampling.density), pool);
+    const Result<PatchSplit> cut = sampling.gaussians > 0
+                                       ? cut_into(sampling.gaussians, pool)
+                                       : cut_at(1.07 / std::sqrt(sampling.density), pool);
     if (!cut) return cut.status();
     for (const Patch& p : patches_) emit_triangles(p, scene);
     if (sampling.kind == SurfaceKind::mesh) return emit_painted(*cut, sampling, pool, scene);

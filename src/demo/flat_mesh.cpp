@@ -47,7 +47,7 @@ void Painter::emit_painted(const Patch& patch, double stretch, TexturedPart& out
   }
 }
 
-Status Painter::emit_painted(const Cut& cut, const SceneSampling& sampling, ThreadPool& pool,
+Status Painter::emit_painted(const PatchSplit& cut, const SceneSampling& sampling, ThreadPool& pool,
                              DefaultScene& scene) const {
   std::vector<TexturedPart> made(patches_.size());
   const Status s = detail::run_guarded(pool, static_cast<std::uint32_t>(patches_.size()),

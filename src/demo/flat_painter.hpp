@@ -79,7 +79,7 @@ class Painter {
             bool glows = false);
 
   /// Faces of a box, as a bitmask.
-  enum Face : unsigned { kXn = 1, kXp = 2, kYn = 4, kYp = 8, kZn = 16, kZp = 32, kAll = 63 };
+  enum BoxFace : unsigned { kXn = 1, kXp = 2, kYn = 4, kYp = 8, kZn = 16, kZp = 32, kAll = 63 };
   void box(const Vec3d& low, const Vec3d& high, const Field& color, Spacing spacing,
            unsigned faces = kAll & ~unsigned{kYn}, bool blocks = true);
   void rounded_box(const Vec3d& low, const Vec3d& high, double radius, const Field& color,
@@ -111,7 +111,7 @@ class Painter {
     std::size_t gaussians = 0, open_rows = 0;
   };
   /// How patches are cut into Gaussians.
-  struct Cut {
+  struct PatchSplit {
     double stretch = 1;         ///< Factor on all spacings.
     std::size_t gaussians = 0;  ///< Total number.
     std::size_t rows = 0;       ///< Open rows, counted through all patches.
@@ -135,12 +135,12 @@ class Painter {
   bool sun_at(const Room& room, const Vec3d& p, const Vec3d& n) const;
   std::vector<Box> covers_of(const Patch& patch) const;
   Counted count(const Patch& patch, double stretch) const;
-  Result<Cut> cut_at(double stretch, ThreadPool& pool) const;
+  Result<PatchSplit> cut_at(double stretch, ThreadPool& pool) const;
   /// The cut that gives exactly `gaussians`.
-  Result<Cut> cut_into(std::size_t gaussians, ThreadPool& pool) const;
-  void emit_gaussians(const Patch& patch, const Cut& cut, std::size_t first_row, int sh_degree,
+  Result<PatchSplit> cut_into(std::size_t gaussians, ThreadPool& pool) const;
+  void emit_gaussians(const Patch& patch, const PatchSplit& cut, std::size_t first_row, int sh_degree,
                       Made& out) const;
-  Status emit(const Cut& cut, const SceneSampling& sampling, ThreadPool& pool,
+  Status emit(const PatchSplit& cut, const SceneSampling& sampling, ThreadPool& pool,
               GaussianCloudBuilder& builder) const;
   /// Writes the bands from 1 on of a Gaussian, as RawGaussian::shN has them.
   void write_sheen(const Room& room, const Vec3d& p, const Vec3d& normal, int sh_degree,
@@ -151,7 +151,7 @@ class Painter {
               const Vec3d& normal) const;
   /// Appends the patch as a grid of triangles, whose vertices are as far apart as Gaussians.
   void emit_painted(const Patch& patch, double stretch, TexturedPart& out) const;
-  Status emit_painted(const Cut& cut, const SceneSampling& sampling, ThreadPool& pool,
+  Status emit_painted(const PatchSplit& cut, const SceneSampling& sampling, ThreadPool& pool,
                       DefaultScene& scene) const;
 
   std::vector<Room> rooms_;

@@ -110,7 +110,7 @@ void WalkMotion::pose(const Steps& steps, double walking, double time, const std
   turn.resize(parents_.size());
   global.resize(parents_.size());
   set.assign(parents_.size(), 0);
-  const Body b = body(phase, walking, pelvis_drop_);
+  const PelvisPose b = body(phase, walking, pelvis_drop_);
   out.translations = rest_.translations;
   out.translations[at(kPelvis)] = b.pelvis;
   out.root = {};
@@ -135,8 +135,8 @@ void WalkMotion::pose(const Steps& steps, double walking, double time, const std
   for (int side = 0; side < 2; ++side) {
     const double s = side == 0 ? 1.0 : -1.0;
     const int first = side == 0 ? kRightHip : kLeftHip;
-    const Foot f = foot(side, steps, walking);
-    const Leg leg = solve(side, b, f);
+    const FootPose f = foot(side, steps, walking);
+    const LegPose leg = solve(side, b, f);
     give(at(first), leg.thigh);
     give(at(first + 1), leg.shin);
     give(at(first + 2), about_x(f.pitch));
@@ -188,7 +188,7 @@ void WalkMotion::prepare() {
     double stretch = 0.0;
     for (int k = 0; k < 64; ++k) {
       const double phase = k / 64.0;
-      const Body b = body(phase, 1.0, drop);
+      const PelvisPose b = body(phase, 1.0, drop);
       for (int side = 0; side < 2; ++side) {
         Steps steps{.cycles = phase, .stride = stride_};
         stretch = max(stretch, solve(side, b, foot(side, steps, 1.0)).stretch);
@@ -212,8 +212,8 @@ void WalkMotion::prepare() {
   }
 }
 
-WalkMotion::Body WalkMotion::body(double phase, double walking, double drop) const {
-  Body b;
+WalkMotion::PelvisPose WalkMotion::body(double phase, double walking, double drop) const {
+  PelvisPose b;
   const double mid = 0.5 * options_.duty;  // phase at which the right leg is upright
   b.roll = 3.0 * walking * std::cos(kTwoPi * (phase - mid));
   b.rotation =
@@ -237,7 +237,7 @@ Vec3d WalkMotion::ankle(int side, double forward, double pitch) const {
   return a + pivot - rotate(about_x(pitch), pivot);
 }
 
-WalkMotion::Foot WalkMotion::foot(int side, const Steps& s, double walking) const {
+WalkMotion::FootPose WalkMotion::foot(int side, const Steps& s, double walking) const {
   double p = s.cycles + (side == 0 ? 0.0 : 0.5);
   p -= std::floor(p);
   const double duty = options_.duty;
@@ -245,7 +245,7 @@ WalkMotion::Foot WalkMotion::foot(int side, const Steps& s, double walking) cons
   // stop.
   const double here = clamp(s.stride * (upright() - p), -s.gone, s.left);
   const double next = clamp(s.stride * (upright() - p + 1), -s.gone, s.left);
-  Foot f;
+  FootPose f;
   if (p < duty) {
     f.pitch = stance_pitch(p, walking);
     f.ankle = ankle(side, here, f.pitch);
@@ -276,13 +276,13 @@ WalkMotion::Foot WalkMotion::foot(int side, const Steps& s, double walking) cons
   return f;
 }
 
-WalkMotion::Leg WalkMotion::solve(int side, const Body& b, const Foot& f) const {
+WalkMotion::LegPose WalkMotion::solve(int side, const PelvisPose& b, const FootPose& f) const {
   const int first = side == 0 ? kRightHip : kLeftHip;
   const Vec3d hip = b.pelvis + rotate(b.rotation, rest(first) - rest(kPelvis));
   const Vec3d thigh0 = rest(first + 1) - rest(first), shin0 = rest(first + 2) - rest(first + 1);
   const double l1 = norm(thigh0), l2 = norm(shin0);
   const Vec3d to = f.ankle - hip;
-  Leg leg;
+  LegPose leg;
   leg.stretch = norm(to) / (l1 + l2);
   const double reach = clamp(norm(to), 1.01 * abs(l1 - l2) + 1e-6, 0.9999 * (l1 + l2));
   const Vec3d down = normalized(to);

@@ -25,7 +25,7 @@ namespace gsnav::detail {
 namespace {
 
 /// A point of the surface, before it becomes a Gaussian.
-struct SurfacePoint {
+struct BodyPoint {
   Vec3d position{}, normal{};
   double spacing = 0;    // least distance to other points, metres
   std::size_t lobe = 0;  // the nearest lobe
@@ -33,8 +33,8 @@ struct SurfacePoint {
 
 /// Spreads points over the surface: random points on the lobes are moved to the smooth union and kept if
 /// no other is near (dart throwing).
-std::vector<SurfacePoint> sample_surface(const BodyShape& shape, const HumanoidOptions& o,
-                                         const std::vector<double>& density) {
+std::vector<BodyPoint> sample_surface(const BodyShape& shape, const HumanoidOptions& o,
+                                      const std::vector<double>& density) {
   Rng rng(o.seed);
   double weighted = 0;
   for (std::size_t i = 0; i < shape.lobes.size(); ++i)
@@ -44,7 +44,7 @@ std::vector<SurfacePoint> sample_surface(const BodyShape& shape, const HumanoidO
   const double spacing = std::sqrt(0.285 * weighted / o.gaussians);
   const double scale = o.height / 1.70;
   PointGrid grid(spacing, static_cast<std::size_t>(o.gaussians));
-  std::vector<SurfacePoint> out;
+  std::vector<BodyPoint> out;
   std::vector<std::vector<std::size_t>> among;
   std::vector<double> sum{0.0};
   for (std::size_t i = 0; i < shape.lobes.size(); ++i) {
@@ -60,7 +60,7 @@ std::vector<SurfacePoint> sample_surface(const BodyShape& shape, const HumanoidO
     const Vec3d unit{q * std::cos(angle), z, q * std::sin(angle)};
     // The round ends get a share of the points in proportion to their length.
     const double straight = norm(l.b - l.a), ends = l.radii_a.y + l.radii_b.y;
-    SurfacePoint p;
+    BodyPoint p;
     const Mat3d back = transpose(l.axes);
     if (rng.uniform() * (straight + ends) < straight) {
       const double t = rng.uniform(), c = std::cos(angle), s = std::sin(angle);
@@ -102,7 +102,7 @@ class HumanoidPainter {
     for (std::size_t i = 0; i < shape.lobes.size(); ++i) among_.push_back(shape.neighbours(i, 0.08));
   }
 
-  Vec3d color(const SurfacePoint& p, Rng& rng) const {
+  Vec3d color(const BodyPoint& p, Rng& rng) const {
     const Vec3d x = p.position * (1.0 / scale_);
     const Lobe& lobe = shape_.lobes[p.lobe];
     Vec3d c;
@@ -223,7 +223,7 @@ class HumanoidWeigher {
 
   /// Fills `row` [J]. Weights fall off exponentially with the distance from the lobes of each joint.
   /// Only joints within two steps up or down the tree from the nearest lobe's joint get weight.
-  void weigh(const SurfacePoint& p, std::vector<float>& row) {
+  void weigh(const BodyPoint& p, std::vector<float>& row) {
     const std::size_t n = distance_.size(), home = shape_.lobes[p.lobe].joint;
     std::fill(distance_.begin(), distance_.end(), 1e3);
     for (const Lobe& l : shape_.lobes) {
@@ -254,7 +254,7 @@ Status cover_with_gaussians(const HumanoidOptions& o, const BodyShape& shape, Av
                       n.find("ring") != n.npos || n.find("pinky") != n.npos || n.find("thumb") != n.npos;
     density.push_back(n == "head" ? (l.part == BodyPart::skin ? 2.2 : 1.4) : fine ? 1.8 : 1.0);
   }
-  const std::vector<SurfacePoint> points = sample_surface(shape, o, density);
+  const std::vector<BodyPoint> points = sample_surface(shape, o, density);
   const HumanoidPainter painter(o, shape);
   HumanoidWeigher weigher(shape, asset.skeleton, o.height / 1.70);
   Rng rng(o.seed ^ 0x636f6c6f7572ull);
@@ -264,7 +264,7 @@ Status cover_with_gaussians(const HumanoidOptions& o, const BodyShape& shape, Av
                                 0.0f);
   std::vector<std::uint16_t> indices;
   std::vector<float> weights, row;
-  for (const SurfacePoint& p : points) {
+  for (const BodyPoint& p : points) {
     RawGaussian g;
     g.mean = p.position;
     const Vec3d n = p.normal,

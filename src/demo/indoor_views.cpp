@@ -97,12 +97,12 @@ std::optional<Vec3d> longest_sight(const Surfaces& surfaces, const Vec3d& eye, d
   return best;
 }
 
-struct Sight {
+struct ViewRay {
   Vec3d eye, ray;
 };
 
 /// A random view. Nothing if too many places in a row were not free.
-std::optional<Sight> random_view(const Surfaces& surfaces, double height, Rng& rng) {
+std::optional<ViewRay> random_view(const Surfaces& surfaces, double height, Rng& rng) {
   const Aabb<double>& all = surfaces.bounds();
   constexpr int kTries = 1000;
   for (int i = 0; i < kTries && !all.empty(); ++i) {
@@ -112,7 +112,7 @@ std::optional<Sight> random_view(const Surfaces& surfaces, double height, Rng& r
     if (!surfaces.free({{eye.x - kClear, kAboveRugs, eye.z - kClear},
                         {eye.x + kClear, eye.y + kClear, eye.z + kClear}}))
       continue;
-    if (const auto ray = longest_sight(surfaces, eye, turn)) return Sight{eye, *ray};
+    if (const auto ray = longest_sight(surfaces, eye, turn)) return ViewRay{eye, *ray};
   }
   return {};
 }
@@ -128,7 +128,7 @@ Result<std::vector<Camera>> indoor_views(const DefaultScene& scene, const Indoor
   while (static_cast<int>(out.size()) < o.count) {
     // Take the candidate furthest from all earlier views, so that views spread over the rooms.
     constexpr int kCandidates = 6;
-    std::optional<Sight> best;
+    std::optional<ViewRay> best;
     double furthest = -1;
     for (int i = 0; i < kCandidates; ++i) {
       const auto view = random_view(surfaces, o.eye_height, rng);

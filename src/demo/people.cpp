@@ -23,23 +23,23 @@ constexpr double kApart = 0.75;     // metres between two people, root to root, 
 constexpr double kUsualPace = 1.0;  // metres per second
 
 /// The path of a person, and its speed.
-struct Way {
+struct PersonPath {
   std::vector<Vec3d> points;
   WalkOptions walk;
   WalkTrajectory trajectory;
 };
 
-std::optional<Way> make_way(const std::vector<Vec3d>& points, double speed) {
+std::optional<PersonPath> make_way(const std::vector<Vec3d>& points, double speed) {
   WalkOptions walk;
   walk.speed = speed;
   auto trajectory = WalkTrajectory::create(points, walk);
   if (!trajectory) return {};
-  return Way{points, walk, std::move(*trajectory)};
+  return PersonPath{points, walk, std::move(*trajectory)};
 }
 
 /// A path through random places, walked back and forth in `kRound` seconds. Nothing if the random path
 /// would need too high or too low a speed.
-std::optional<Way> random_way(const NavMesh& mesh, Rng& rng) {
+std::optional<PersonPath> random_way(const NavMesh& mesh, Rng& rng) {
   std::vector<Vec3d> points{mesh.random_point(rng, 0).position};
   double length = 0;
   for (int tries = 0; tries < 40 && length < 0.40 * kRound * kUsualPace; ++tries) {
@@ -58,9 +58,9 @@ std::optional<Way> random_way(const NavMesh& mesh, Rng& rng) {
   return {};
 }
 
-double closest(const Way& a, const std::vector<Way>& others) {
+double closest(const PersonPath& a, const std::vector<PersonPath>& others) {
   double least = std::numeric_limits<double>::infinity();
-  for (const Way& b : others) {
+  for (const PersonPath& b : others) {
     for (double t = 0; t < kRound; t += 0.2) {
       least = std::min(least, norm(a.trajectory.at(t).position - b.trajectory.at(t).position));
     }
@@ -123,12 +123,12 @@ Result<std::vector<AvatarActor>> walking_people(const NavMesh& walkways, std::si
                                                 const std::function<void(double)>& progress) {
   if (Status s = check_people("walking_people: ", "count", count); !s) return s;
   if (!std::isfinite(density)) return {Errc::invalid_argument, "walking_people: density is not finite"};
-  std::vector<Way> ways;
+  std::vector<PersonPath> ways;
   std::vector<AvatarActor> people;
   Rng rng(seed ^ 0x70656f706c65ull);
   for (std::size_t i = 0; i < count; ++i) {
     if (progress) progress(static_cast<double>(i) / static_cast<double>(count));
-    std::optional<Way> best;
+    std::optional<PersonPath> best;
     double best_distance = -1;
     for (int tries = 0; tries < 80 && best_distance < kApart; ++tries) {
       auto way = random_way(walkways, rng);

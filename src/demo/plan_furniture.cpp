@@ -19,7 +19,7 @@ constexpr double kCurtainDepth = 0.12;
 constexpr double kSlim = 0.2, kSlimmest = 0.1;
 
 /// A frame that is rotated by quarter turns and moved to x, z.
-struct Frame {
+struct FurnitureFrame {
   double x = 0, z = 0;
   int quarters = 0;  // quarter turns about +Y
 
@@ -45,9 +45,9 @@ FloorRect moved(const FloorRect& r, double x, double z) {
   return {r.x0 + x, r.z0 + z, r.x1 + x, r.z1 + z};
 }
 
-FloorRect bounds_of(const Group& g) {
+FloorRect bounds_of(const FurnitureGroup& g) {
   FloorRect all{1e9, 1e9, -1e9, -1e9};
-  for (const Group::Piece& p : g.pieces) {
+  for (const FurnitureGroup::Piece& p : g.pieces) {
     const FloorRect r = moved(footprint_of(p), p.x, p.z);
     all = {std::min(all.x0, r.x0), std::min(all.z0, r.z0), std::max(all.x1, r.x1),
            std::max(all.z1, r.z1)};
@@ -99,8 +99,8 @@ class Furnisher {
   }
 
   /// Places the first of the groups that fits. Returns false if none does.
-  bool place_one_of(const std::vector<Group>& groups) {
-    for (const Group& g : groups) {
+  bool place_one_of(const std::vector<FurnitureGroup>& groups) {
+    for (const FurnitureGroup& g : groups) {
       std::vector<Place> places = g.at_wall ? wall_places(g) : floor_places(g);
       std::stable_sort(places.begin(), places.end(),
                        [](const Place& a, const Place& b) { return a.score > b.score; });
@@ -113,11 +113,11 @@ class Furnisher {
 
  private:
   struct Place {
-    Frame frame;
+    FurnitureFrame frame;
     double score;
   };
 
-  std::vector<Place> wall_places(const Group& g) {
+  std::vector<Place> wall_places(const FurnitureGroup& g) {
     const FloorRect b = bounds_of(g);
     // Plants and lamps stand around their centre, all others with their back to the wall.
     const double back = -b.z0;
@@ -134,10 +134,10 @@ class Furnisher {
         const double score = preference + 0.5 * g.corner * from_middle + 0.4 * rng_.uniform();
         for (const double gap : {kAtWall, kBehindCurtain}) {
           if (gap > kAtWall && !curtains_) continue;
-          const Frame from_wall[] = {{in_.x0 + at, in_.z0 + back + gap, 0},
-                                     {in_.x0 + back + gap, in_.z1 - at, 1},
-                                     {in_.x1 - at, in_.z1 - back - gap, 2},
-                                     {in_.x1 - back - gap, in_.z0 + at, 3}};
+          const FurnitureFrame from_wall[] = {{in_.x0 + at, in_.z0 + back + gap, 0},
+                                              {in_.x0 + back + gap, in_.z1 - at, 1},
+                                              {in_.x1 - at, in_.z1 - back - gap, 2},
+                                              {in_.x1 - back - gap, in_.z0 + at, 3}};
           out.push_back({from_wall[quarters], score - gap});
         }
       }
@@ -145,7 +145,7 @@ class Furnisher {
     return out;
   }
 
-  std::vector<Place> floor_places(const Group& g) {
+  std::vector<Place> floor_places(const FurnitureGroup& g) {
     const FloorRect b = bounds_of(g);
     const double middle_x = (in_.x0 + in_.x1) / 2, middle_z = (in_.z0 + in_.z1) / 2;
     std::vector<Place> out;
@@ -154,7 +154,7 @@ class Furnisher {
       for (int i = -4; i <= 4; ++i) {
         for (int j = -4; j <= 4; ++j) {
           const double dx = 0.35 * i, dz = 0.35 * j;
-          const Frame f{middle_x + dx, middle_z + dz, quarters};
+          const FurnitureFrame f{middle_x + dx, middle_z + dz, quarters};
           if (contains(in_, f.at(b))) {
             out.push_back({f, (along ? 0.5 : 0.0) - std::hypot(dx, dz) + 0.3 * rng_.uniform()});
           }
@@ -164,12 +164,12 @@ class Furnisher {
     return out;
   }
 
-  bool place(const Group& g, const Frame& frame) {
+  bool place(const FurnitureGroup& g, const FurnitureFrame& frame) {
     const auto meets = [](const FloorRect& r, const std::vector<FloorRect>& others, double gap) {
       return std::any_of(others.begin(), others.end(),
                          [&](const FloorRect& o) { return overlap(r, o, gap); });
     };
-    for (const Group::Piece& p : g.pieces) {
+    for (const FurnitureGroup::Piece& p : g.pieces) {
       const FloorRect r = frame.at(moved(footprint_of(p), p.x, p.z));
       if (!contains(in_, r) || meets(r, taken_, kGap)) return false;
       if (p.kind == FurnitureKind::rug) continue;
@@ -177,7 +177,7 @@ class Furnisher {
     }
     std::array<FreeFloor, 3> floors = floors_;
     std::vector<FloorRect> takes;
-    for (const Group::Piece& p : g.pieces) {
+    for (const FurnitureGroup::Piece& p : g.pieces) {
       if (p.kind == FurnitureKind::rug) continue;
       takes.push_back(frame.at(moved(footprint_of(p), p.x, p.z)));
       for (FreeFloor& f : floors) f.take(takes.back());
@@ -190,8 +190,8 @@ class Furnisher {
     return true;
   }
 
-  void add(const Group& g, const Frame& frame) {
-    for (const Group::Piece& p : g.pieces) {
+  void add(const FurnitureGroup& g, const FurnitureFrame& frame) {
+    for (const FurnitureGroup::Piece& p : g.pieces) {
       PlannedFurniture f;
       f.kind = p.kind;
       f.room = room_;
@@ -227,7 +227,7 @@ bool furnish(FloorPlan& plan, double clearance, Rng& rng) {
   for (std::size_t r = 0; r < plan.rooms.size(); ++r) {
     Furnisher furnisher(plan, r, clearance, rng);
     const auto wants = furniture_for(plan.rooms[r], plan.rooms.size() == 1, rng);
-    for (const std::vector<Group>& want : wants) {
+    for (const std::vector<FurnitureGroup>& want : wants) {
       const bool placed = furnisher.place_one_of(want);
       all = all && (placed || &want != wants.data());
     }

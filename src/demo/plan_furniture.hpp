@@ -10,7 +10,7 @@ inline constexpr double kCurtainWidth = 0.42;    // metres
 inline constexpr double kCurtainOverlap = 0.03;  // metres of it in front of the window
 
 /// A group of furniture, in the frame of a piece at a wall: back at z = 0, front towards +z.
-struct Group {
+struct FurnitureGroup {
   struct Piece {
     FurnitureKind kind{};
     double x = 0, z = 0;
@@ -26,10 +26,11 @@ struct Group {
 
 /// Furniture that a room of this kind should have, the most important first. Each entry lists
 /// alternative groups, of which the first that fits is used.
-std::vector<std::vector<Group>> furniture_for(const PlannedRoom& room, bool only_room, Rng& rng);
+std::vector<std::vector<FurnitureGroup>> furniture_for(const PlannedRoom& room, bool only_room,
+                                                       Rng& rng);
 
 /// The floor that a piece takes, in its own frame.
-FloorRect footprint_of(const Group::Piece& piece) noexcept;
+FloorRect footprint_of(const FurnitureGroup::Piece& piece) noexcept;
 
 /// Furnishes all rooms of a plan that has its doors and windows. The floor stays connected for a disc of
 /// radius `clearance`, and the floor in front of doors stays free. Returns false if a room did not get

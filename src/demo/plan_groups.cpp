@@ -5,25 +5,25 @@ namespace gsnav::plan {
 namespace {
 
 using K = FurnitureKind;
-using Groups = std::vector<Group>;
+using Groups = std::vector<FurnitureGroup>;
 
-Group single(K kind, double width = 0, double corner = 0) {
-  Group g{.pieces = {{kind, 0, 0, false, width, 0}},
-          .tall = kind == K::wardrobe || kind == K::bookshelf || kind == K::bed,
-          .corner = corner,
-          .picture = kind == K::sofa || kind == K::sideboard || kind == K::bed ? 0.7 : 0.0};
+FurnitureGroup single(K kind, double width = 0, double corner = 0) {
+  FurnitureGroup g{.pieces = {{kind, 0, 0, false, width, 0}},
+                   .tall = kind == K::wardrobe || kind == K::bookshelf || kind == K::bed,
+                   .corner = corner,
+                   .picture = kind == K::sofa || kind == K::sideboard || kind == K::bed ? 0.7 : 0.0};
   return g;
 }
 
-Group seating(double width, bool rug) {
-  Group g = single(K::sofa, width, -1);
+FurnitureGroup seating(double width, bool rug) {
+  FurnitureGroup g = single(K::sofa, width, -1);
   g.pieces.push_back({K::coffee_table, 0, 1.85, false, 0, 0});
   if (rug) g.pieces.push_back({K::rug, 0, 1.75, false, 2.5, 1.9});
   return g;
 }
 
-Group bed(int tables, bool rug) {
-  Group g = single(K::bed, 0, tables == 1 ? 0.5 : -0.5);
+FurnitureGroup bed(int tables, bool rug) {
+  FurnitureGroup g = single(K::bed, 0, tables == 1 ? 0.5 : -0.5);
   for (int i = 0; i < tables; ++i) {
     g.pieces.push_back({K::bedside_table, i == 0 ? 1.12 : -1.12, 0, false, 0, 0});
   }
@@ -31,21 +31,21 @@ Group bed(int tables, bool rug) {
   return g;
 }
 
-Group desk() {
-  Group g = single(K::desk, 0, -0.2);
+FurnitureGroup desk() {
+  FurnitureGroup g = single(K::desk, 0, -0.2);
   g.pieces.push_back({K::chair, -0.1, 0.98, true, 0, 0});
   return g;
 }
 
-Group kitchen(double length, bool fridge) {
-  Group g = single(K::kitchen_unit, length, 1);
+FurnitureGroup kitchen(double length, bool fridge) {
+  FurnitureGroup g = single(K::kitchen_unit, length, 1);
   g.tall = true;
   if (fridge) g.pieces.push_back({K::fridge, length / 2 + 0.36, 0, false, 0, 0});
   return g;
 }
 
-Group dining(double width, double depth, int chairs) {
-  Group g;
+FurnitureGroup dining(double width, double depth, int chairs) {
+  FurnitureGroup g;
   g.at_wall = false;
   g.pieces.push_back({K::dining_table, 0, 0, false, width, depth});
   const int a_side = chairs / 2;
@@ -56,14 +56,15 @@ Group dining(double width, double depth, int chairs) {
   return g;
 }
 
-Group carpet(double width, double depth) {
-  Group g{.pieces = {{K::rug, 0, 0, false, width, depth}}, .at_wall = false};
+FurnitureGroup carpet(double width, double depth) {
+  FurnitureGroup g{.pieces = {{K::rug, 0, 0, false, width, depth}}, .at_wall = false};
   return g;
 }
 
 }  // namespace
 
-std::vector<std::vector<Group>> furniture_for(const PlannedRoom& room, bool only_room, Rng& rng) {
+std::vector<std::vector<FurnitureGroup>> furniture_for(const PlannedRoom& room, bool only_room,
+                                                       Rng& rng) {
   std::vector<Groups> out;
   const auto by_size = [](K kind, std::initializer_list<double> widths, double corner) {
     Groups g;
@@ -124,7 +125,7 @@ std::vector<std::vector<Group>> furniture_for(const PlannedRoom& room, bool only
   return out;
 }
 
-FloorRect footprint_of(const Group::Piece& p) noexcept {
+FloorRect footprint_of(const FurnitureGroup::Piece& p) noexcept {
   // Leave some margin around the drawn piece, because fronts have handles and chairs are turned a
   // little.
   const auto at_wall = [](double w, double depth) { return FloorRect{-w / 2, 0, w / 2, depth}; };

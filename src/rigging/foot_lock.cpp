@@ -24,7 +24,7 @@ Quatd turn_between(const Vec3d& a, const Vec3d& b) noexcept {
 
 /// Moves the ankle by `offset` by rotating thigh and shin in the plane of the leg. The foot keeps its
 /// orientation. Returns the distance by which the leg was too short.
-double reach(const Leg& leg, const Vec3d& offset, std::vector<Affine3<double>>& joints) {
+double reach(const LegJoints& leg, const Vec3d& offset, std::vector<Affine3<double>>& joints) {
   const Vec3d hip = joints[leg.hip].translation, knee = joints[leg.knee].translation,
               ankle = joints[leg.ankle].translation;
   const double thigh = norm(knee - hip), shin = norm(ankle - knee);
@@ -57,7 +57,7 @@ double reach(const Leg& leg, const Vec3d& offset, std::vector<Affine3<double>>& 
 
 }  // namespace
 
-Result<std::vector<Leg>> find_legs(const Skeleton& skeleton, const std::vector<Foot>& feet) {
+Result<std::vector<LegJoints>> find_legs(const Skeleton& skeleton, const std::vector<Foot>& feet) {
   const BadArgument bad{"find_legs: "};
   if (feet.size() != 2) return bad(std::to_string(feet.size()) + " feet, must be 2");
   const auto rest = skeleton.rest_globals();
@@ -67,11 +67,11 @@ Result<std::vector<Leg>> find_legs(const Skeleton& skeleton, const std::vector<F
       out.push_back(static_cast<std::size_t>(skeleton.parents[out.back()]));
     return out;
   };
-  std::vector<Leg> legs;
+  std::vector<LegJoints> legs;
   for (std::size_t f = 0; f < 2; ++f) {
     const std::vector<std::size_t> chain = above(feet[f].joints[0]),
                                    other = above(feet[1 - f].joints[0]);
-    Leg leg;
+    LegJoints leg;
     leg.ankle = chain[0];
     std::size_t top = 0;  // the highest joint that does not carry the other foot too
     while (top + 1 < chain.size() &&

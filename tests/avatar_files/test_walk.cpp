@@ -322,7 +322,7 @@ TEST_CASE("feet that are held stay where they are; what they carry keeps its sha
   CHECK(report.moved <= 0.1);
   double stretch = 0, rigid = 0, jump = 0, heading = 0;
   for (std::size_t t = 0; t < frames.size(); ++t) {
-    for (const Leg& leg : legs) {
+    for (const LegJoints& leg : legs) {
       const auto length = [&](const auto& g, std::size_t i, std::size_t j) {
         return norm(g[i].translation - g[j].translation);
       };

@@ -65,12 +65,12 @@ class WalkMotion final : public MotionSource {
     double left = std::numeric_limits<double>::infinity();  // metres until the next stop
     double turn_cycles = 0, turning = 0;
   };
-  struct Body {
+  struct PelvisPose {
     Vec3d pelvis;
     Quatd rotation;
     double roll;
   };
-  struct Foot {
+  struct FootPose {
     Vec3d ankle;
     double pitch = 0, toe = 0;  // degrees, toe up positive
   };
@@ -78,7 +78,7 @@ class WalkMotion final : public MotionSource {
   struct Arm {
     Quatd collar, hang, elbow, wrist;
   };
-  struct Leg {
+  struct LegPose {
     Quatd thigh, shin;
     double stretch;  // of the leg; 1: straight
   };
@@ -91,7 +91,7 @@ class WalkMotion final : public MotionSource {
 
   void prepare();
 
-  Body body(double phase, double walking, double drop) const;
+  PelvisPose body(double phase, double walking, double drop) const;
 
   // Phase of its own cycle at which a foot is directly below the root.
   double upright() const noexcept { return 0.43 * options_.duty; }
@@ -103,10 +103,10 @@ class WalkMotion final : public MotionSource {
   // ahead of the root.
   Vec3d ankle(int side, double forward, double pitch) const;
 
-  Foot foot(int side, const Steps& s, double walking) const;
+  FootPose foot(int side, const Steps& s, double walking) const;
 
   // Two-bone inverse kinematics with the knee pointing forward.
-  Leg solve(int side, const Body& b, const Foot& f) const;
+  LegPose solve(int side, const PelvisPose& b, const FootPose& f) const;
 
   GaitOptions options_;
   std::array<std::size_t, kBodyJoints> joints_{};

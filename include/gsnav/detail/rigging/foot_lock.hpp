@@ -11,7 +11,7 @@ namespace gsnav {
 
 /// The joints of a leg above a foot. Thigh and shin each rotate as a whole, even where a rig splits them
 /// into several joints.
-struct Leg {
+struct LegJoints {
   std::size_t hip = 0, knee = 0, ankle = 0;  ///< Indices of the joints.
   std::vector<std::size_t> thigh;            ///< Joints that move with the hip, itself included.
   std::vector<std::size_t> shin;             ///< Joints that move with the knee, itself included.
@@ -34,7 +34,7 @@ struct FootLockReport {
 
 /// Finds the legs that belong to the feet, in their order. Errors: invalid_argument (not two feet, or a
 /// leg without a knee).
-Result<std::vector<Leg>> find_legs(const Skeleton& skeleton, const std::vector<Foot>& feet);
+Result<std::vector<LegJoints>> find_legs(const Skeleton& skeleton, const std::vector<Foot>& feet);
 
 /// Keeps the feet of a recorded walk in place while they are down, by inverse kinematics of two bones.
 /// While a foot is down (by the rule of FootSlideMeter), its point that slides least is held: heel, ball
