@@ -65,13 +65,13 @@ std::uint8_t ScalarCodebook::index(float value) const noexcept {
 namespace {
 
 /// The vectors [first, last) of the order.
-struct Group {
+struct VectorRange {
   double error = 0;  ///< Sum of squares about the mean.
   std::size_t first = 0, last = 0;
   std::size_t axis = 0;  ///< Axis along which it is widest.
   double middle = 0;     ///< Mean along that axis.
 
-  bool operator<(const Group& other) const noexcept {
+  bool operator<(const VectorRange& other) const noexcept {
     return error != other.error ? error < other.error : first > other.first;
   }
 };
@@ -87,11 +87,11 @@ class Splitter {
     VectorPalette out;
     out.labels.resize(order_.size());
     if (order_.empty()) return out;
-    std::priority_queue<Group> open;
-    std::vector<Group> done;
+    std::priority_queue<VectorRange> open;
+    std::vector<VectorRange> done;
     open.push(measured(0, order_.size()));
     while (!open.empty()) {
-      const Group g = open.top();
+      const VectorRange g = open.top();
       open.pop();
       const std::size_t cut = g.error > 0 && done.size() + open.size() + 1 < most ? split(g) : g.first;
       if (cut == g.first || cut == g.last) {
@@ -104,7 +104,7 @@ class Splitter {
     // Sort groups in the order of the vectors, so that neighbours have similar labels and images
     // compress well.
     std::sort(done.begin(), done.end(),
-              [](const Group& a, const Group& b) { return a.first < b.first; });
+              [](const VectorRange& a, const VectorRange& b) { return a.first < b.first; });
     out.size = done.size();
     out.entries.reserve(out.size * width_);
     for (std::size_t label = 0; label < done.size(); ++label) {
@@ -123,8 +123,8 @@ class Splitter {
   /// Measures a group and leaves its mean in mean_. Sums are of differences to the first vector, so that
   /// identical vectors have an error of exactly zero. They are in double, so that the difference of
   /// squares loses none of the precision of floats.
-  Group measured(std::size_t first, std::size_t last) {
-    Group g{0, first, last, 0, 0};
+  VectorRange measured(std::size_t first, std::size_t last) {
+    VectorRange g{0, first, last, 0, 0};
     std::fill(mean_.begin(), mean_.end(), 0.0);
     std::fill(spread_.begin(), spread_.end(), 0.0);
     const float* origin = vector(first);
@@ -149,7 +149,7 @@ class Splitter {
     return g;
   }
 
-  std::size_t split(const Group& g) {
+  std::size_t split(const VectorRange& g) {
     const auto begin = order_.begin();
     const auto cut =
         std::stable_partition(begin + static_cast<std::ptrdiff_t>(g.first),

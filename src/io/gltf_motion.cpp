@@ -13,13 +13,13 @@
 namespace gsnav::io::detail {
 namespace {
 
-enum class Blend : std::uint8_t { linear, step, cubic };
+enum class Interpolation : std::uint8_t { linear, step, cubic };
 
 /// The keys of one property of one node.
 struct Channel {
   std::size_t node = 0, width = 3;
   char target = 't';  // t, r or s
-  Blend blend = Blend::linear;
+  Interpolation blend = Interpolation::linear;
   std::vector<double> times;
   std::vector<double> values;  // [times][width], or [times][3][width] for cubic splines
 };
@@ -27,8 +27,8 @@ struct Channel {
 /// Value of the channel at `time`, by the formulas of glTF 2.0, appendix C.
 std::array<double, 4> sample(const Channel& c, double time) {
   const std::size_t n = c.times.size(), w = c.width;
-  const std::size_t stride = c.blend == Blend::cubic ? 3 * w : w,
-                    middle = c.blend == Blend::cubic ? w : 0;
+  const std::size_t stride = c.blend == Interpolation::cubic ? 3 * w : w,
+                    middle = c.blend == Interpolation::cubic ? w : 0;
   std::array<double, 4> out{};
   const auto key = [&](std::size_t i) { return c.values.data() + i * stride + middle; };
   std::size_t b =
@@ -40,9 +40,9 @@ std::array<double, 4> sample(const Channel& c, double time) {
   const std::size_t a = b - 1;
   const double step = c.times[b] - c.times[a], u = (time - c.times[a]) / step;
   const double *p = key(a), *q = key(b);
-  if (c.blend == Blend::step) {
+  if (c.blend == Interpolation::step) {
     std::copy_n(p, w, out.begin());
-  } else if (c.blend == Blend::cubic) {
+  } else if (c.blend == Interpolation::cubic) {
     const double u2 = u * u, u3 = u2 * u;
     for (std::size_t k = 0; k < w; ++k) {
       out[k] = (2 * u3 - 3 * u2 + 1) * p[k] + step * (u3 - 2 * u2 + u) * p[w + k] +
@@ -87,8 +87,8 @@ Result<std::vector<Channel>> read_channels(const GltfFile& file, const Json& ani
     if (blend != nullptr && *blend != "LINEAR" && *blend != "STEP" && *blend != "CUBICSPLINE") {
       return {Errc::invalid_file, here + ": 'interpolation' is " + shown(*blend)};
     }
-    if (blend != nullptr && *blend == "STEP") c.blend = Blend::step;
-    if (blend != nullptr && *blend == "CUBICSPLINE") c.blend = Blend::cubic;
+    if (blend != nullptr && *blend == "STEP") c.blend = Interpolation::step;
+    if (blend != nullptr && *blend == "CUBICSPLINE") c.blend = Interpolation::cubic;
     const auto input = file.index(sampler, "input", "accessors", here),
                output = file.index(sampler, "output", "accessors", here);
     if (!input) return input.status();
@@ -97,7 +97,7 @@ Result<std::vector<Channel>> read_channels(const GltfFile& file, const Json& ani
     if (!times) return times.status();
     auto values = file.numbers(*output, c.width == 4 ? "VEC4" : "VEC3");
     if (!values) return values.status();
-    if (values->count != times->count * (c.blend == Blend::cubic ? 3 : 1)) {
+    if (values->count != times->count * (c.blend == Interpolation::cubic ? 3 : 1)) {
       return {Errc::invalid_file, here + ": " + std::to_string(values->count) + " values for " +
                                       std::to_string(times->count) + " keys"};
     }
@@ -115,19 +115,19 @@ Result<std::vector<Channel>> read_channels(const GltfFile& file, const Json& ani
 }
 
 /// Rate and number of keys from time 0 on: those of the keys, if they are evenly spaced, else at `rate`.
-struct Grid {
+struct TimeGrid {
   double first = 0.0, rate = 60.0;  // first: time of the first key
   std::size_t keys = 1;
 };
 
-Grid grid_of(const std::vector<Channel>& channels, double rate) {
+TimeGrid grid_of(const std::vector<Channel>& channels, double rate) {
   std::set<double> times;
   bool uniform = true;
   for (const Channel& c : channels) {
     times.insert(c.times.begin(), c.times.end());
-    uniform = uniform && c.blend == Blend::linear;
+    uniform = uniform && c.blend == Interpolation::linear;
   }
-  Grid out;
+  TimeGrid out;
   if (times.empty()) return out;
   out.first = *times.begin();
   times.insert(0.0);
@@ -163,7 +163,7 @@ Status read_clips(const GltfFile& file, const GltfSkin& skin, const GltfNodes& n
       // An animated node must not have a matrix. If it has one, use its other members.
       posed.nodes[c.node].has_matrix = false;
     }
-    const Grid grid = grid_of(*channels, frame_rate);
+    const TimeGrid grid = grid_of(*channels, frame_rate);
     constexpr std::size_t kMostMatrices = std::size_t{1} << 22;
     if (grid.keys > kMostMatrices / skin.nodes.size()) {
       return {Errc::unsupported, at + ": " + std::to_string(grid.keys) + " keys at " +

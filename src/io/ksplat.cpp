@@ -20,12 +20,12 @@ constexpr std::size_t kHeader = 4096, kSectionHeader = 1024, kBucketCentre = 12;
 
 /// Sizes in bytes of a record's fields, by compression level. Four bytes of colour follow
 /// the quaternion.
-struct Level {
+struct CompressionLevel {
   std::size_t number;   ///< Size of a coordinate of the position, the scale or the quaternion.
   std::size_t rest;     ///< Size of an SH coefficient.
   std::uint32_t range;  ///< Steps from a bucket's centre to its side, unless the section has its own.
 };
-constexpr std::array<Level, 3> kLevels = {{{4, 4, 1}, {2, 2, 32767}, {2, 1, 32767}}};
+constexpr std::array<CompressionLevel, 3> kLevels = {{{4, 4, 1}, {2, 2, 32767}, {2, 1, 32767}}};
 
 struct Section {
   std::size_t count = 0, capacity = 0;  ///< Number of Gaussians, and the size of a full bucket.
@@ -238,7 +238,7 @@ class KsplatReader {
   const std::string& source_;
   std::uint32_t count_ = 0;
   bool quantised_ = false;
-  Level level_{};
+  CompressionLevel level_{};
   double rest_low_ = 0, rest_high_ = 0;
   std::vector<Section> sections_;
 };

@@ -30,11 +30,11 @@ struct Header {
 static_assert(sizeof(Header) == 40);
 
 /// A node without a struct's padding.
-struct Node {
+struct FileNode {
   double low[3], high[3];
   float error, scale_max, opacity_max, grain;
 };
-static_assert(sizeof(Node) == 64);
+static_assert(sizeof(FileNode) == 64);
 
 Hasher hash_of(const GaussianCloud& cloud, const LodSettings& settings) {
   Hasher h;
@@ -51,7 +51,7 @@ detail::CacheFront front_of(const GaussianCloud& cloud, const LodSettings& setti
 
 /// Calls f for the arrays of a tree, in the order of the file.
 template <class Tree, class F>
-void for_each_array(Tree& tree, std::vector<Node>& nodes, const F& f) {
+void for_each_array(Tree& tree, std::vector<FileNode>& nodes, const F& f) {
   f(nodes);
   auto& m = tree.merged;
   for (auto& p : m.means) f(p);
@@ -64,7 +64,7 @@ void for_each_array(Tree& tree, std::vector<Node>& nodes, const F& f) {
 }
 
 /// Checks the values that kernels and LodCut rely on.
-Status check(const fs::path& path, const GaussianCloud& m, const std::vector<Node>& nodes,
+Status check(const fs::path& path, const GaussianCloud& m, const std::vector<FileNode>& nodes,
              std::size_t origins) {
   const auto finite = [](const std::vector<float>& v) {
     for (const float x : v) {
@@ -95,7 +95,7 @@ Status check(const fs::path& path, const GaussianCloud& m, const std::vector<Nod
     if (id >= origins)
       return invalid_file(path, "origin " + std::to_string(id) + " of " + std::to_string(origins));
   }
-  for (const Node& n : nodes) {
+  for (const FileNode& n : nodes) {
     bool good = n.error >= 0 && std::isfinite(n.error) && n.grain >= 0 && std::isfinite(n.grain) &&
                 n.scale_max >= 0 && std::isfinite(n.scale_max);
     for (int k = 0; k < 3; ++k) {
@@ -106,9 +106,9 @@ Status check(const fs::path& path, const GaussianCloud& m, const std::vector<Nod
   return {};
 }
 
-std::uint64_t checksum(const LodTree& tree, const std::vector<Node>& nodes) {
+std::uint64_t checksum(const LodTree& tree, const std::vector<FileNode>& nodes) {
   Hasher h;
-  for_each_array(tree, const_cast<std::vector<Node>&>(nodes), [&h](const auto& v) { h.array(v); });
+  for_each_array(tree, const_cast<std::vector<FileNode>&>(nodes), [&h](const auto& v) { h.array(v); });
   return h.low();
 }
 
@@ -117,7 +117,7 @@ std::uint64_t checksum(const LodTree& tree, const std::vector<Node>& nodes) {
 Status save_lod(const fs::path& path, const LodTree& tree, const GaussianCloud& cloud,
                 const LodSettings& settings) {
   return detail::guarded(path.string(), [&]() -> Status {
-    std::vector<Node> nodes(tree.nodes.size());
+    std::vector<FileNode> nodes(tree.nodes.size());
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       const LodNode& n = tree.nodes[i];
       for (int k = 0; k < 3; ++k) {
@@ -149,7 +149,7 @@ Result<LodTree> load_lod(const fs::path& path, const GaussianCloud& cloud, const
       return Status(Errc::invalid_argument, path.string() + ": the cloud is not in spatial order");
     }
     gsnav::detail::shape_lod(tree, cloud, settings);
-    std::vector<Node> nodes(tree.nodes.size());
+    std::vector<FileNode> nodes(tree.nodes.size());
     std::uint64_t wanted = sizeof header;
     for_each_array(tree, nodes, [&wanted](const auto& v) { wanted += v.size() * sizeof(v[0]); });
     if (file.size() != wanted) {

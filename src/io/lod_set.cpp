@@ -29,10 +29,10 @@ using detail::RowRange;
 constexpr std::int64_t kMostLevels = 64, kMostRows = std::int64_t{16383} * 16383;
 
 /// Rows of a file that a node names for a level.
-struct Rows {
+struct FileRows {
   std::size_t file = 0;
   RowRange range;
-  bool operator==(const Rows&) const = default;
+  bool operator==(const FileRows&) const = default;
 };
 
 /// Rows of a node in a file.
@@ -149,7 +149,7 @@ class LodReader {
   Status choose(const Json& lods) {
     if (!lods.is_object()) return fail("'lods' is " + detail::shown(lods) + ", must be an object");
     const std::string where = source_ + ": node " + std::to_string(nodes_);
-    std::map<int, Rows> there;
+    std::map<int, FileRows> there;
     std::string missing;
     for (int level = 0; level < levels_; ++level) {
       const Json* entry = detail::member(lods, std::to_string(level).c_str());
@@ -182,7 +182,7 @@ class LodReader {
     steps_[0][chosen->second.file].push_back({chosen->second.range, node});
     std::size_t step = 0;
     for (auto next = std::next(chosen); coarser_ && next != there.end(); ++next) {
-      const Rows& rows = next->second;
+      const FileRows& rows = next->second;
       if (rows.range.count == 0 || rows == chosen->second)
         continue;  // nothing is left at this level, or it is not coarser
       if (++step == steps_.size()) steps_.emplace_back(files_.size());

@@ -85,25 +85,25 @@ class NpyHeader {
   std::string_view text_;
 };
 
-enum class Kind { real, boolean, signed_integer, unsigned_integer };
+enum class NpyKind { real, boolean, signed_integer, unsigned_integer };
 
 struct Type {
-  Kind kind = Kind::real;
+  NpyKind kind = NpyKind::real;
   std::size_t size = 0;
 };
 
 /// The type of a NumPy type string: little-endian numbers only. '|' (no byte order) is for single bytes.
 std::optional<Type> type_of(std::string_view descr) {
   if (descr == "<f2" || descr == "<f4" || descr == "<f8") {
-    return Type{Kind::real, static_cast<std::size_t>(descr[2] - '0')};
+    return Type{NpyKind::real, static_cast<std::size_t>(descr[2] - '0')};
   }
-  if (descr == "|b1") return Type{Kind::boolean, 1};
+  if (descr == "|b1") return Type{NpyKind::boolean, 1};
   if (descr == "|i1" || descr == "|u1") {
-    return Type{descr[1] == 'i' ? Kind::signed_integer : Kind::unsigned_integer, 1};
+    return Type{descr[1] == 'i' ? NpyKind::signed_integer : NpyKind::unsigned_integer, 1};
   }
   for (const std::string_view known : {"<i2", "<i4", "<i8", "<u2", "<u4", "<u8"}) {
     if (descr == known) {
-      return Type{descr[1] == 'i' ? Kind::signed_integer : Kind::unsigned_integer,
+      return Type{descr[1] == 'i' ? NpyKind::signed_integer : NpyKind::unsigned_integer,
                   static_cast<std::size_t>(descr[2] - '0')};
     }
   }
@@ -116,10 +116,10 @@ double number(const std::byte* p) {
 }
 
 double value_at(const std::byte* p, Type type) {
-  const bool is_signed = type.kind == Kind::signed_integer, real = type.kind == Kind::real;
+  const bool is_signed = type.kind == NpyKind::signed_integer, real = type.kind == NpyKind::real;
   switch (type.size) {
     case 1:
-      if (type.kind == Kind::boolean) return load_le<std::uint8_t>(p) != 0 ? 1.0 : 0.0;
+      if (type.kind == NpyKind::boolean) return load_le<std::uint8_t>(p) != 0 ? 1.0 : 0.0;
       return is_signed ? number<std::int8_t>(p) : number<std::uint8_t>(p);
     case 2:
       if (real) return half_to_double(load_le<std::uint16_t>(p));
@@ -233,7 +233,7 @@ Result<NpyArray> parse_npy(std::span<const std::byte> bytes, const std::string& 
   for_each_value(out.shape, layout->fortran, *count, [&](std::size_t to, std::size_t from) {
     out.values[to] = value_at(values + type->size * from, *type);
   });
-  if (type->size == 8 && type->kind != Kind::real) {
+  if (type->size == 8 && type->kind != NpyKind::real) {
     constexpr double kExact = 9007199254740992.0;  // 2^53, to which 2^53 + 1 is rounded
     for (std::size_t i = 0; i < *count; ++i) {
       if (std::fabs(out.values[i]) >= kExact) {

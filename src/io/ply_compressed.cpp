@@ -16,15 +16,15 @@ namespace {
 constexpr std::size_t kChunk = 256;  // Gaussians that share their bounds
 
 /// An element whose rows are all inside the file, and the offsets of the values that are read.
-struct Rows {
+struct ElementRows {
   const PlyElement* element = nullptr;
   ByteSource bytes;
   std::vector<std::size_t> offsets;
 };
 
 /// Consecutive rows of an element in memory.
-struct Block {
-  const Rows* rows = nullptr;
+struct ElementBlock {
+  const ElementRows* rows = nullptr;
   const std::byte* first = nullptr;
 
   template <class T>
@@ -45,14 +45,14 @@ class CompressedPlyReader {
     if (Status s = find_rows(); !s) return s;
     if (Status s = find_columns(); !s) return s;
     std::vector<std::byte> chunk_room;
-    Block chunks;
+    ElementBlock chunks;
     if (Status s = get(chunk_, 0, static_cast<std::size_t>(chunk_.element->count), chunk_room, chunks);
         !s) {
       return s;
     }
     const auto decode = [&](std::size_t first, std::size_t last, CloudSink& sink) -> Status {
       std::vector<std::byte> vertex_room, sh_room;
-      Block vertex, sh;
+      ElementBlock vertex, sh;
       for (std::size_t row = first; row < last; row += kRowsAtOnce) {
         const std::size_t n = std::min(kRowsAtOnce, last - row);
         if (Status s = get(vertex_, row, n, vertex_room, vertex); !s) return s;
@@ -78,8 +78,8 @@ class CompressedPlyReader {
   Status fail(const std::string& what) const { return {Errc::invalid_file, source_ + ": " + what}; }
 
   /// Reads n rows from `row` on. The element may be missing.
-  Status get(const Rows& rows, std::size_t row, std::size_t n, std::vector<std::byte>& scratch,
-             Block& out) const {
+  Status get(const ElementRows& rows, std::size_t row, std::size_t n, std::vector<std::byte>& scratch,
+             ElementBlock& out) const {
     out.rows = &rows;
     if (rows.element == nullptr) return {};
     const std::size_t stride = rows.element->stride;
@@ -94,7 +94,7 @@ class CompressedPlyReader {
       if (e.has_list) {
         return {Errc::unsupported, source_ + ": element " + in_quotes(e.name) + " has a list property"};
       }
-      Rows* rows = e.name == "chunk" ? &chunk_ : e.name == "vertex" ? &vertex_ : &sh_;
+      ElementRows* rows = e.name == "chunk" ? &chunk_ : e.name == "vertex" ? &vertex_ : &sh_;
       if (rows != &sh_ || e.name == "sh") *rows = {&e, bytes_.part(at, 0), {}};
       if (e.stride == 0) continue;
       const std::uint64_t there = (bytes_.size() - at) / e.stride;
@@ -116,7 +116,7 @@ class CompressedPlyReader {
   }
 
   /// Adds the offset of a property, which must have the given type.
-  Status column(Rows& rows, const std::string& name, PlyType type, const char* type_name) {
+  Status column(ElementRows& rows, const std::string& name, PlyType type, const char* type_name) {
     const PlyProperty* p = rows.element->find(name);
     if (p == nullptr) {
       return fail("element " + in_quotes(rows.element->name) + " has no property " + in_quotes(name));
@@ -167,7 +167,7 @@ class CompressedPlyReader {
 
   /// Decodes the `bits` from `shift` on, as a fraction of a chunk's range of value `which` (x y z,
   /// scales, rgb).
-  double between(const Block& chunks, std::size_t chunk, std::size_t which, std::uint32_t packed,
+  double between(const ElementBlock& chunks, std::size_t chunk, std::size_t which, std::uint32_t packed,
                  int shift, int bits) const {
     const double low = static_cast<double>(chunks.at<float>(chunk, which)),
                  high = static_cast<double>(chunks.at<float>(chunk, bounds() + which)),
@@ -181,8 +181,8 @@ class CompressedPlyReader {
   }
 
   /// Adds row i of the blocks, which belongs to `chunk`.
-  void add(const Block& chunks, std::size_t chunk, const Block& vertex, const Block& sh, std::size_t i,
-           CloudSink& sink) const {
+  void add(const ElementBlock& chunks, std::size_t chunk, const ElementBlock& vertex,
+           const ElementBlock& sh, std::size_t i, CloudSink& sink) const {
     const std::uint32_t position = vertex.at<std::uint32_t>(i, 0),
                         rotation = vertex.at<std::uint32_t>(i, 1),
                         scale = vertex.at<std::uint32_t>(i, 2), colour = vertex.at<std::uint32_t>(i, 3);
@@ -216,7 +216,7 @@ class CompressedPlyReader {
   ByteSource bytes_;
   const PlyHeader& header_;
   const std::string& source_;
-  Rows chunk_, vertex_, sh_;
+  ElementRows chunk_, vertex_, sh_;
   bool has_colours_ = false;
   int degree_ = 0;
   std::size_t sh_in_file_ = 0, stray_ = 0;

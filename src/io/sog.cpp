@@ -83,7 +83,7 @@ class SogFiles {
 
 /// An image: first its size, and its pixels after all sizes were checked. The file is read each time, so
 /// that only one is in memory.
-struct Plane {
+struct PlaneFile {
   std::string name, label;
   std::size_t bytes = 0;  ///< Size of the file.
   detail::WebpSize size;
@@ -145,7 +145,7 @@ class SogReader {
     // Bands are most of the cloud. Decode them first and free their images before anything else is
     // allocated.
     if (Status s = look_up_bands(*ranges, count, planes.shN); !s) return s;
-    for (Plane* plane : {&low_, &high_, &scales_, &quats_, &sh0_}) {
+    for (PlaneFile* plane : {&low_, &high_, &scales_, &quats_, &sh0_}) {
       if (Status s = plane->decode(files_); !s) return s;
     }
     files_.close();
@@ -187,7 +187,7 @@ class SogReader {
   Status look_up_bands(const std::vector<detail::RowRange>& ranges, std::size_t count,
                        std::vector<float>& bands) {
     if (meta_.degree == 0) return {};
-    for (Plane* plane : {&labels_, &centroids_}) {
+    for (PlaneFile* plane : {&labels_, &centroids_}) {
       if (Status s = plane->decode(files_); !s) return s;
     }
     const std::size_t rest = 3 * static_cast<std::size_t>(sh_coefficient_count(meta_.degree) - 1);
@@ -206,13 +206,13 @@ class SogReader {
   /// Reads the sizes of all images, and checks that they fit one another, the count and the number of
   /// bytes.
   Status read_sizes() {
-    const std::pair<Plane*, const std::string*> wanted[] = {
+    const std::pair<PlaneFile*, const std::string*> wanted[] = {
         {&low_, &meta_.means_low}, {&high_, &meta_.means_high}, {&scales_, &meta_.scales},
         {&quats_, &meta_.quats},   {&sh0_, &meta_.sh0},         {&labels_, &meta_.labels}};
     const std::size_t planes = meta_.degree > 0 ? 6 : 5;
     std::size_t bytes = 0;
     for (std::size_t k = 0; k < planes; ++k) {
-      Plane& p = *wanted[k].first;
+      PlaneFile& p = *wanted[k].first;
       if (Status s = p.read(files_, *wanted[k].second); !s) return s;
       bytes += p.bytes;
       if (p.size.width != low_.size.width || p.size.height != low_.size.height) {
@@ -249,7 +249,7 @@ class SogReader {
     return {};
   }
 
-  Status look_up(const Plane& plane, std::size_t pixel, std::size_t channel, const Codebook& book,
+  Status look_up(const PlaneFile& plane, std::size_t pixel, std::size_t channel, const Codebook& book,
                  double& value) const {
     const std::size_t index = plane.image.pixel(pixel)[channel];
     if (index >= book.size()) {
@@ -311,7 +311,7 @@ class SogReader {
 
   SogFiles& files_;
   SogMeta meta_;
-  Plane low_, high_, scales_, quats_, sh0_, labels_, centroids_;
+  PlaneFile low_, high_, scales_, quats_, sh0_, labels_, centroids_;
 };
 
 Result<LoadedCloud> load(const std::filesystem::path& path, const std::vector<detail::RowRange>* ranges,

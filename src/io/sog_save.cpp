@@ -63,11 +63,11 @@ class SogWriter {
     meta_["antialias"] = cloud_.filter == Filter::mip;
     // Begin with the part that takes longest. One thread makes each part, so the bytes do not depend on
     // the number of threads.
-    Status (SogWriter::*const make[])(Part&)
+    Status (SogWriter::*const make[])(MetaMember&)
         const = {&SogWriter::bands, &SogWriter::means, &SogWriter::scales, &SogWriter::colours,
                  &SogWriter::quats};
     constexpr std::size_t kParts = std::size(make);
-    std::array<Part, kParts> parts;
+    std::array<MetaMember, kParts> parts;
     ThreadPool pool(static_cast<int>(std::min(detail::io_threads(), kParts)));
     const Status made =
         gsnav::detail::run_guarded(pool, static_cast<std::uint32_t>(kParts),
@@ -86,7 +86,7 @@ class SogWriter {
 
  private:
   /// One member of meta.json and the files that it names.
-  struct Part {
+  struct MetaMember {
     std::string name;
     Json meta;
     Files files;
@@ -97,7 +97,7 @@ class SogWriter {
   }
 
   /// Adds an image to a part, and its name to the part's metadata.
-  Status add(Part& part, const char* stem, const RgbaImage& image) const {
+  Status add(MetaMember& part, const char* stem, const RgbaImage& image) const {
     const std::string name = stem + ending_;
     auto bytes = detail::encode_webp(image, target_ + ": " + name);
     if (!bytes) return bytes.status();
@@ -109,7 +109,7 @@ class SogWriter {
   /// sign(v) log(1 + |v|), so that distant values take fewer of the steps.
   static double squeezed(double v) { return std::copysign(std::log1p(std::fabs(v)), v); }
 
-  Status means(Part& part) const {
+  Status means(MetaMember& part) const {
     double low[3] = {0, 0, 0}, high[3] = {0, 0, 0};
     for (std::size_t i = 0; i < cloud_.size(); ++i) {
       const Vec3d m = cloud_.mean(i);
@@ -136,7 +136,7 @@ class SogWriter {
     return add(part, "means_u", upper);
   }
 
-  Status scales(Part& part) const {
+  Status scales(MetaMember& part) const {
     const std::size_t n = cloud_.size();
     std::vector<float> logs(3 * n);
     for (std::size_t i = 0; i < n; ++i) {
@@ -155,7 +155,7 @@ class SogWriter {
     return add(part, "scales", image);
   }
 
-  Status quats(Part& part) const {
+  Status quats(MetaMember& part) const {
     constexpr std::size_t kFirstMode = 252;
     RgbaImage image = plane();
     for (std::size_t i = 0; i < cloud_.size(); ++i) {
@@ -172,7 +172,7 @@ class SogWriter {
     return add(part, "quats", image);
   }
 
-  Status colours(Part& part) const {
+  Status colours(MetaMember& part) const {
     const detail::ScalarCodebook book(cloud_.sh0);
     RgbaImage image = plane();
     for (std::size_t i = 0; i < cloud_.size(); ++i) {
@@ -186,7 +186,7 @@ class SogWriter {
     return add(part, "sh0", image);
   }
 
-  Status bands(Part& part) const {
+  Status bands(MetaMember& part) const {
     if (cloud_.sh_degree == 0 || cloud_.size() == 0) return {};
     const std::size_t width = detail::rest_width(cloud_);
     const std::size_t most = std::clamp(cloud_.size() / 2, kSmallPalette, kLargestPalette);

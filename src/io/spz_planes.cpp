@@ -19,7 +19,15 @@ namespace gsnav::io::detail {
 namespace {
 
 constexpr std::size_t kGzipHeader = 16, kPlainHeader = 32, kTocEntry = 16;
-enum Plane : std::size_t { kPositions, kOpacities, kColours, kScales, kQuaternions, kBands, kPlanes };
+enum PlaneIndex : std::size_t {
+  kPositions,
+  kOpacities,
+  kColours,
+  kScales,
+  kQuaternions,
+  kBands,
+  kPlanes
+};
 constexpr std::size_t kMostWidth = 72;  // of a plane, bytes
 constexpr int kMostDegree = 4, kMostFractionalBits = 30;
 constexpr std::uint32_t kAxesExtension = 0xadbe0003;  // SPZ_ADOBE_coordinate_system

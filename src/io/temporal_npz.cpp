@@ -19,7 +19,7 @@ namespace gsnav::io::detail {
 namespace {
 
 /// The Gaussians of one network. Arrays that are missing in the file are empty.
-struct Part {
+struct Network {
   std::string prefix;
   bool moves = true;
   std::size_t count = 0, rest_blocks = 0, motion_width = 0;
@@ -44,7 +44,7 @@ class TemporalNpz {
       parts_[1].moves = false;
     }
     std::size_t total = 0, blocks = 0, motion = 0;
-    for (Part& part : parts_) {
+    for (Network& part : parts_) {
       if (Status s = read(part); !s) return s;
       total += part.count;
       blocks = std::max(blocks, part.rest_blocks);
@@ -92,7 +92,8 @@ class TemporalNpz {
 
   /// Reads an array [N][width] (kAny: any), with or without a dimension of 1 in between. An optional
   /// array that is missing stays empty.
-  Status array(const Part& part, const char* name, std::size_t width, bool needed, NpyArray& to) const {
+  Status array(const Network& part, const char* name, std::size_t width, bool needed,
+               NpyArray& to) const {
     const std::string key = part.prefix + name;
     if (!needed && !file_.contains(key)) return {};
     auto values = file_.read(key);
@@ -110,7 +111,7 @@ class TemporalNpz {
     return {};
   }
 
-  Status read(Part& p) const {
+  Status read(Network& p) const {
     if (Status s = array(p, "_xyz", 3, true, p.xyz); !s) return s;
     p.count = p.xyz.shape[0];
     const std::size_t any = NpzArrays::kAny;
@@ -145,7 +146,7 @@ class TemporalNpz {
   }
 
   void add(std::size_t row, CloudSink& sink, TemporalRows& planes) const {
-    const Part& p = row < parts_[0].count ? parts_[0] : parts_[1];
+    const Network& p = row < parts_[0].count ? parts_[0] : parts_[1];
     const std::size_t i = row < parts_[0].count ? row : row - parts_[0].count;
     std::array<float, 45> rest{};
     RawGaussian raw;
@@ -174,7 +175,7 @@ class TemporalNpz {
 
   const NpzFile& file_;
   double scale_ = 1, dilation_ = 1;
-  std::vector<Part> parts_;
+  std::vector<Network> parts_;
 };
 
 }  // namespace
