@@ -104,7 +104,7 @@ void CornerHubs::draw_sides(const UnfoldedMesh& mesh) {
     for (std::uint32_t k = 0; k < mesh.faces[f].count; ++k) {
       size = max(size, length(mesh.edges[mesh.faces[f].first + k].at - origin));
     }
-    frames_.push_back({origin, static_cast<float>(1e-3 + 1e-6 * size)});
+    face_origins_.push_back({origin, static_cast<float>(1e-3 + 1e-6 * size)});
     const std::size_t first = first_sight_[f], n = first_sight_[f + 1] - first;
     for (std::size_t i = 0; i < n; ++i) {
       const Sight& s = sights_[first + i];

@@ -79,7 +79,7 @@ class CornerHubs {
     std::uint32_t corner = 0;
   };
 
-  struct Seen {
+  struct SeenCorner {
     double straight = 0;  ///< Straight distance to the corner, metres.
     std::uint32_t corner = 0;
   };
@@ -98,10 +98,10 @@ class CornerHubs {
   void draw_sides(const UnfoldedMesh& mesh);
   void fill_table();
   /// Corners that a site sees, the nearest first.
-  void look_from(const Site& from, std::vector<Seen>& out) const;
+  void look_from(const Site& from, std::vector<SeenCorner>& out) const;
   Meeting meet(std::uint32_t a, std::uint32_t b) const noexcept;
   /// Replaces `best` by the path through these two corners if it is shorter.
-  static void offer(double length, const Seen& first, const Seen& last, Way& best) noexcept {
+  static void offer(double length, const SeenCorner& first, const SeenCorner& last, Way& best) noexcept {
     if (!(length < best.length)) return;
     best.length = length;
     best.first = first.corner;
@@ -111,10 +111,10 @@ class CornerHubs {
   }
   /// Finds the shortest path over all pairs of corners that both ends see, by the table or by the
   /// labels.
-  void join_by_table(const Site& start, const Site& goal, std::vector<Seen>& near_start,
-                     std::vector<Seen>& near_goal, Way& best) const;
-  void join_by_labels(const Site& start, const Site& goal, const std::vector<Seen>& near_start,
-                      const std::vector<Seen>& near_goal, Way& best) const;
+  void join_by_table(const Site& start, const Site& goal, std::vector<SeenCorner>& near_start,
+                     std::vector<SeenCorner>& near_goal, Way& best) const;
+  void join_by_labels(const Site& start, const Site& goal, const std::vector<SeenCorner>& near_start,
+                      const std::vector<SeenCorner>& near_goal, Way& best) const;
   const double* row(std::uint32_t corner) const noexcept {
     return table_.data() + corner * corners_.size();
   }
@@ -133,11 +133,11 @@ class CornerHubs {
   /// x + b y + c is the distance in metres by which the point (x, y), relative to the face's first
   /// corner, lies inside.
   std::vector<float> sides_;
-  struct Frame {
+  struct FaceOrigin {
     Flat origin;
     float margin = 0;  ///< Bound of the rounding error, metres.
   };
-  std::vector<Frame> frames_;               ///< One per face.
+  std::vector<FaceOrigin> face_origins_;    ///< One per face.
   std::vector<std::uint32_t> first_label_;  ///< Begin of each corner's labels, and one past the last.
   std::vector<Label> labels_;
   std::vector<std::uint32_t> hub_corner_;  ///< Corner of each hub, by rank.

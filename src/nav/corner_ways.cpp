@@ -24,16 +24,16 @@ void inside_sides(const float* __restrict sides, std::size_t n, float x, float y
 
 }  // namespace
 
-void CornerHubs::look_from(const Site& from, std::vector<Seen>& out) const {
+void CornerHubs::look_from(const Site& from, std::vector<SeenCorner>& out) const {
   out.clear();
   std::size_t nearest = 0;
   thread_local std::vector<std::uint8_t> within;
   const std::size_t begin = first_sight_[from.face], n = first_sight_[from.face + 1] - begin;
-  const Frame& frame = frames_[from.face];
-  const float x = static_cast<float>(from.at.x - frame.origin.x),
-              y = static_cast<float>(from.at.y - frame.origin.y);
+  const FaceOrigin& face = face_origins_[from.face];
+  const float x = static_cast<float>(from.at.x - face.origin.x),
+              y = static_cast<float>(from.at.y - face.origin.y);
   if (within.size() < n) within.resize(n);
-  inside_sides(sides_.data() + std::size_t{6} * begin, n, x, y, frame.margin, within.data());
+  inside_sides(sides_.data() + std::size_t{6} * begin, n, x, y, face.margin, within.data());
   for (std::size_t i = 0; i < n; ++i) {
     if (within[i] == 0) continue;
     const Root& root = roots_[begin + i];
@@ -61,7 +61,7 @@ CornerHubs::Meeting CornerHubs::meet(std::uint32_t a, std::uint32_t b) const noe
 }
 
 CornerHubs::Way CornerHubs::shortest(const Site& start, const Site& goal) const {
-  thread_local std::vector<Seen> near_start, near_goal;
+  thread_local std::vector<SeenCorner> near_start, near_goal;
   Way best;
   look_from(start, near_start);
   look_from(goal, near_goal);
@@ -77,24 +77,25 @@ CornerHubs::Way CornerHubs::shortest(const Site& start, const Site& goal) const 
   return best;
 }
 
-void CornerHubs::join_by_table(const Site& start, const Site& goal, std::vector<Seen>& near_start,
-                               std::vector<Seen>& near_goal, Way& best) const {
+void CornerHubs::join_by_table(const Site& start, const Site& goal, std::vector<SeenCorner>& near_start,
+                               std::vector<SeenCorner>& near_goal, Way& best) const {
   // Good paths first: to the corner nearest to one end from all corners that the other end sees. By the
   // triangle inequality, their lengths also bound paths through the same corners: a path through a
   // corner is at least its length to the nearest corner minus that corner's distance from the end.
-  const auto by_nearest = [&](const std::vector<Seen>& from, const Seen& nearest, bool forward) {
+  const auto by_nearest = [&](const std::vector<SeenCorner>& from, const SeenCorner& nearest,
+                              bool forward) {
     const double* to = row(nearest.corner);
-    for (const Seen& seen : from) {
+    for (const SeenCorner& seen : from) {
       const double l = seen.straight + to[seen.corner] + nearest.straight;
       offer(l, forward ? seen : nearest, forward ? nearest : seen, best);
     }
   };
   by_nearest(near_start, near_goal[0], true);
   by_nearest(near_goal, near_start[0], false);
-  const auto keep = [&](std::vector<Seen>& from, const Seen& nearest, const Site& end) {
+  const auto keep = [&](std::vector<SeenCorner>& from, const SeenCorner& nearest, const Site& end) {
     const double* to = row(nearest.corner);
     std::size_t kept = 0;
-    for (const Seen& seen : from) {
+    for (const SeenCorner& seen : from) {
       if (seen.straight + to[seen.corner] - nearest.straight >= best.length ||
           seen.straight + distance(corners_[seen.corner].position, end.position) >= best.length) {
         continue;
@@ -103,42 +104,43 @@ void CornerHubs::join_by_table(const Site& start, const Site& goal, std::vector<
     }
     from.resize(kept);
   };
-  const Seen a0 = near_start[0], b0 = near_goal[0];
+  const SeenCorner a0 = near_start[0], b0 = near_goal[0];
   keep(near_start, b0, goal);
   keep(near_goal, a0, start);
-  for (const Seen& a : near_start) {
+  for (const SeenCorner& a : near_start) {
     const double* to = row(a.corner);
-    for (const Seen& b : near_goal) {
+    for (const SeenCorner& b : near_goal) {
       offer(a.straight + to[b.corner] + b.straight, a, b, best);
     }
   }
 }
 
-void CornerHubs::join_by_labels(const Site& start, const Site& goal, const std::vector<Seen>& near_start,
-                                const std::vector<Seen>& near_goal, Way& best) const {
+void CornerHubs::join_by_labels(const Site& start, const Site& goal,
+                                const std::vector<SeenCorner>& near_start,
+                                const std::vector<SeenCorner>& near_goal, Way& best) const {
   struct Entry {
     double length = kInfinity;
-    Seen first;
+    SeenCorner first;
     std::uint64_t round = 0;
   };
   thread_local std::vector<Entry> from_start;
   thread_local std::uint64_t round = 0;
   // Lower bound of a path through the corner to the other end.
-  const auto least = [&](const Seen& seen, const Site& end) {
+  const auto least = [&](const SeenCorner& seen, const Site& end) {
     return seen.straight + distance(corners_[seen.corner].position, end.position);
   };
   // Start with a good path, through the corners that lead most directly to the other end. Most other
   // corners are then too far.
-  const auto first = [&](const std::vector<Seen>& from, const Site& end) {
-    return *std::min_element(from.begin(), from.end(), [&](const Seen& a, const Seen& b) {
+  const auto first = [&](const std::vector<SeenCorner>& from, const Site& end) {
+    return *std::min_element(from.begin(), from.end(), [&](const SeenCorner& a, const SeenCorner& b) {
       return least(a, end) < least(b, end);
     });
   };
-  const Seen a0 = first(near_start, goal), b0 = first(near_goal, start);
+  const SeenCorner a0 = first(near_start, goal), b0 = first(near_goal, start);
   offer(a0.straight + meet(a0.corner, b0.corner).length + b0.straight, a0, b0, best);
   if (from_start.size() < corners_.size()) from_start.resize(corners_.size());
   ++round;
-  for (const Seen& seen : near_start) {
+  for (const SeenCorner& seen : near_start) {
     if (least(seen, goal) >= best.length) continue;
     for (std::uint32_t i = first_label_[seen.corner]; i < first_label_[seen.corner + 1]; ++i) {
       Entry& e = from_start[labels_[i].hub];
@@ -147,7 +149,7 @@ void CornerHubs::join_by_labels(const Site& start, const Site& goal, const std::
       e = {length, seen, round};
     }
   }
-  for (const Seen& seen : near_goal) {
+  for (const SeenCorner& seen : near_goal) {
     if (least(seen, start) >= best.length) continue;
     for (std::uint32_t i = first_label_[seen.corner]; i < first_label_[seen.corner + 1]; ++i) {
       const Entry& e = from_start[labels_[i].hub];

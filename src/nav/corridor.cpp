@@ -11,13 +11,13 @@ namespace gsnav::detail {
 namespace {
 
 /// Transform from the plane of a face to that of the first face.
-struct Placed {
+struct FaceTransform {
   double cosine = 1, sine = 0, dx = 0, dy = 0;
   Flat operator()(const Flat& p) const noexcept {
     return {cosine * p.x - sine * p.y + dx, sine * p.x + cosine * p.y + dy};
   }
   /// Composed with the turn of an edge: from the plane of its face to that of its neighbour.
-  Placed after(const UnfoldedMesh::Edge& e) const noexcept {
+  FaceTransform after(const UnfoldedMesh::Edge& e) const noexcept {
     if (e.same_plane) return *this;
     const Flat d = (*this)({e.dx, e.dy});
     return {cosine * e.cosine - sine * e.sine, sine * e.cosine + cosine * e.sine, d.x, d.y};
@@ -70,7 +70,7 @@ double corridor_length(const UnfoldedMesh& mesh, const LandmarkLead& lead, const
   constexpr std::size_t kMostFaces = 512;
   thread_local std::vector<Gate> gates;
   gates.clear();
-  Placed placed;
+  FaceTransform placed;
   Flat at = start.at;
   std::uint32_t face = start.face, entered = UnfoldedMesh::kNone;
   while (face != goal.face) {

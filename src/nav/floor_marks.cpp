@@ -49,7 +49,7 @@ void close_mask(std::vector<std::uint8_t>& mask, std::size_t nx, std::size_t nz,
 }
 
 void Floors::mark(std::int32_t id) {
-  Storey& s = storeys_[static_cast<std::size_t>(id)];
+  StoreyCandidate& s = storeys_[static_cast<std::size_t>(id)];
   if (s.patches.empty()) return;
   std::size_t x0 = px_, x1 = 0, z0 = pz_, z1 = 0;
   for (const std::size_t p : s.patches) {

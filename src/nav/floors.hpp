@@ -50,14 +50,15 @@ struct Mark {
 };
 
 /// Connected ground outside the storeys. Neighbouring cells differ by at most the agent's climb height.
-struct Piece {
+struct GroundPiece {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> runs;  // Pairs (column, run).
   // Pairs (column, run) of adjacent storeys.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> beside;
   std::vector<std::int32_t> storeys;
 };
 
-struct Storey {
+/// Patches of ground at about one height. They become a storey if `kept`.
+struct StoreyCandidate {
   std::vector<std::size_t> patches;
   double level = 0;    // Mean over the patches.
   double columns = 0;  // Number of columns with enough free height for the agent.
@@ -180,9 +181,9 @@ class Floors {
   /// Turns stairs into ramps: replaces the height of stairs, and of floors within kStairHead of them, by
   /// the mean of the ground within kRampRadius that one step reaches. No step is then too high for
   /// Recast and erosion widens none, whatever the offset of the grid. Removes voxels that stick out.
-  void level_ramps(std::span<const Piece> pieces, std::vector<Mark>& out);
+  void level_ramps(std::span<const GroundPiece> pieces, std::vector<Mark>& out);
   /// Closes small gaps in stairs.
-  void fill_stairs(const Piece& p, std::vector<Mark>& out, GaussianNavReport& report);
+  void fill_stairs(const GroundPiece& p, std::vector<Mark>& out, GaussianNavReport& report);
 
   VoxelGrid& g_;
   const FloorSettings& s_;
@@ -192,7 +193,7 @@ class Floors {
   std::vector<std::vector<PatchLevel>> patches_;
   double apart_;
   std::vector<Peak> peaks_;
-  std::vector<Storey> storeys_;
+  std::vector<StoreyCandidate> storeys_;
   std::vector<std::int32_t> label_;    // One per run: a storey, kNotWalkable or kFree.
   std::vector<std::uint16_t> height_;  // One per walkable run.
   std::vector<std::uint16_t> ramp_;    // Level of each run that is part of stairs or leads to them, or

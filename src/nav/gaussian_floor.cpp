@@ -75,14 +75,14 @@ FloorTops Floors::find(GaussianNavReport& report, double& most_area) {
   const bool indoors = storeys_[0].covered > 0.5;
   report.ceiling_share = storeys_[0].covered;
   storeys_[0].kept = true;
-  for (Storey& s : storeys_) {
+  for (StoreyCandidate& s : storeys_) {
     const bool above = s.level > storeys_[0].level - static_cast<double>(s_.band);
     s.kept = s.kept || (above && (o_.drop_uncovered ? indoors && s.covered > 0.5 : true));
     s.inside = s.kept;
   }
   std::vector<Mark> marks = find_stairs(report);
   progress(0.9);
-  for (Storey& s : storeys_) {
+  for (StoreyCandidate& s : storeys_) {
     if (!s.kept) continue;
     double area = 0;
     for (std::size_t i = 0; i < s.marks.size(); ++i) {

@@ -105,26 +105,27 @@ struct Extent {
 };
 
 /// A run of levels in one column.
-struct Piece {
+struct ColumnRun {
   std::size_t low, end;
   bool floor;
 };
 
 /// Solid runs and floors of a column, lowest first.
 void read_column(const VoxelGrid& g, const detail::FloorTops& floors, std::size_t column,
-                 std::vector<Piece>& out) {
+                 std::vector<ColumnRun>& out) {
   out.clear();
   for (const detail::SolidRun& r : g.runs_of(column)) out.push_back({r.low, r.end, false});
   for (std::uint32_t i = floors.first[column]; i < floors.first[column + 1]; ++i) {
     out.push_back({floors.tops[i], floors.tops[i] + std::size_t{1}, true});
   }
-  std::sort(out.begin(), out.end(), [](const Piece& a, const Piece& b) { return a.low < b.low; });
+  std::sort(out.begin(), out.end(),
+            [](const ColumnRun& a, const ColumnRun& b) { return a.low < b.low; });
 }
 
 /// Adds solid runs and floors of the grid to a heightfield. Its first column is (x0, z0) of the extent.
 Status add_spans(detail::RecastLog& log, const VoxelGrid& g, const detail::FloorTops& floors, int climb,
                  const Extent& o, int x0, int z0, rcHeightfield& field) {
-  std::vector<Piece> pieces;
+  std::vector<ColumnRun> pieces;
   const int nx = static_cast<int>(g.nx), nz = static_cast<int>(g.nz);
   for (int fz = max(0, o.z - z0); fz < min(field.height, nz + o.z - z0); ++fz) {
     for (int fx = max(0, o.x - x0); fx < min(field.width, nx + o.x - x0); ++fx) {

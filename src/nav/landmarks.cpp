@@ -28,7 +28,7 @@ void keep_largest(std::array<T, N>& kept, std::size_t& count, const T& one, cons
 }
 
 /// Part of an edge that is reached in a straight line from a root, in metres along the edge.
-struct Reach {
+struct EdgeReach {
   double low = 0, high = 0;
   double at = 0, beside = 0, g = 0;  ///< Position of the root along the edge and its distance from the
                                      ///< line, and the root's own distance.
@@ -39,14 +39,14 @@ struct Reach {
 
 /// Distances from a landmark along one edge.
 struct AlongEdge {
-  const Reach* first = nullptr;
-  const Reach* last = nullptr;
+  const EdgeReach* first = nullptr;
+  const EdgeReach* last = nullptr;
   double length = 0;
   double from_low = kInfinity, from_high = kInfinity;  ///< Distances from the landmark to its ends.
 
   double distance(double x) const noexcept {
     double d = min(from_low + x, from_high + length - x);
-    for (const Reach* r = first; r != last; ++r) {
+    for (const EdgeReach* r = first; r != last; ++r) {
       if (x >= r->low - kRounding && x <= r->high + kRounding) d = min(d, r->length_to(x));
     }
     return d;
@@ -57,7 +57,7 @@ struct AlongEdge {
 double most_below(const AlongEdge& e, double low, double high, double a, double b) noexcept {
   const double slope = (b - a) / (high - low), rest = 1.0 - slope * slope;
   double most = 0;
-  for (const Reach* r = e.first; r != e.last; ++r) {
+  for (const EdgeReach* r = e.first; r != e.last; ++r) {
     const double from = max(r->low - kRounding, low), to = min(r->high + kRounding, high);
     if (from > to) continue;
     double x = slope > 0 ? to : from;
@@ -72,7 +72,7 @@ double most_above(const AlongEdge& e, double low, double high, double a, double 
                   std::vector<double>& ends) {
   constexpr std::size_t kTaken = 6;
   ends.assign({low, high});
-  for (const Reach* r = e.first; r != e.last; ++r) {
+  for (const EdgeReach* r = e.first; r != e.last; ++r) {
     for (const double x : {r->low, r->high}) {
       if (x > low + kRounding && x < high - kRounding) ends.push_back(x);
     }
@@ -93,7 +93,7 @@ double most_above(const AlongEdge& e, double low, double high, double a, double 
     };
     take(e.from_low + x, e.from_low + y);
     take(e.from_high + e.length - x, e.from_high + e.length - y);
-    for (const Reach* r = e.first; r != e.last; ++r) {
+    for (const EdgeReach* r = e.first; r != e.last; ++r) {
       if (r->low <= x + kRounding && r->high >= y - kRounding) take(r->length_to(x), r->length_to(y));
     }
     // The minimum of all chords is largest where two of them cross or at an end.
@@ -187,7 +187,7 @@ bool Landmarks::add(const UnfoldedMesh& mesh, const Site& at, GeodesicSearch& se
   }
   std::partial_sum(first.begin(), first.end(), first.begin());
   std::vector<double> scratch;
-  std::vector<Reach> reaches(first.back());
+  std::vector<EdgeReach> reaches(first.back());
   std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
   for (const GeodesicSearch::Node& n : search.nodes()) {
     if (n.is_vertex) continue;

@@ -13,12 +13,12 @@ constexpr double kWhole = 1e-6;  // Cells. A length that is this much short of a
                                  // counts as whole.
 
 /// Part of the line z = const inside a polygon. Empty if low > high.
-struct Reach {
+struct PolySpan {
   double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
 };
 
-Reach reach_at(const detail::PolyMesh& m, const detail::PolyMesh::Poly& poly, double z) noexcept {
-  Reach r;
+PolySpan reach_at(const detail::PolyMesh& m, const detail::PolyMesh::Poly& poly, double z) noexcept {
+  PolySpan r;
   for (std::uint32_t k = 0; k < poly.count; ++k) {
     const Vec3d &a = m.corner(poly, k), &b = m.corner(poly, k + 1);
     const double ex = b.x - a.x, ez = b.z - a.z;
@@ -92,7 +92,7 @@ Result<TopDownMap> NavMesh::top_down_map(double height, double metres_per_cell, 
     for (std::size_t r = cell_from(around.low.z - low.z, rows); r < map.rows; ++r) {
       Vec3d centre{0, 0, low.z + (static_cast<double>(r) + 0.5) * metres_per_cell};
       if (centre.z > around.high.z) break;
-      const Reach reach = reach_at(m, poly, centre.z);
+      const PolySpan reach = reach_at(m, poly, centre.z);
       for (std::size_t c = cell_from(reach.low - low.x, columns); c < map.columns; ++c) {
         centre.x = low.x + (static_cast<double>(c) + 0.5) * metres_per_cell;
         if (centre.x > reach.high) break;

@@ -125,11 +125,11 @@ std::optional<NavPoint> NavMesh::random_point_near(Rng& rng, const Vec3d& p, dou
   if (!is_finite(p) || !(radius >= 0) || !is_finite(radius)) return {};
   const PolyMesh& m = impl_->polys;
   const Vec3d c = p - impl_->origin;
-  struct Piece {
+  struct SampledTriangle {
     PolyId poly;
     std::array<Vec3d, 3> corners;
   };
-  std::vector<Piece> near;
+  std::vector<SampledTriangle> near;
   std::vector<double> areas;
   for (const PolyMesh::Piece& whole : m.pieces) {
     if (island && m.polys[whole.poly].island != *island) continue;
@@ -147,7 +147,7 @@ std::optional<NavPoint> NavMesh::random_point_near(Rng& rng, const Vec3d& p, dou
   if (near.empty()) return {};
   const detail::AliasTable table(areas, {});
   for (int i = 0; i < kMaxTries; ++i) {
-    const Piece& piece = near[table.draw(rng)];
+    const SampledTriangle& piece = near[table.draw(rng)];
     const double u = std::sqrt(rng.uniform()), v = rng.uniform();
     Vec3d q = piece.corners[0] * (1 - u) + piece.corners[1] * (u * (1 - v)) + piece.corners[2] * (u * v);
     q.y = m.height(piece.poly, q);

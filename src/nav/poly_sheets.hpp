@@ -20,7 +20,7 @@ struct Sheet {
 
 /// Part of a polygon's edge: the edge of a sheet that lies on it, between the fractions t0 and t1 of its
 /// length.
-struct Part {
+struct EdgePart {
   std::size_t sheet = 0, edge = 0;
   double t0 = 0, t1 = 1;
 };
@@ -39,7 +39,7 @@ class PolySheets {
 
   const std::vector<Sheet>& all() const noexcept { return all_; }
   /// Parts of a polygon's edge.
-  const std::vector<Part>& parts(std::uint32_t edge) const { return parts_[edge]; }
+  const std::vector<EdgePart>& parts(std::uint32_t edge) const { return parts_[edge]; }
 
  private:
   bool level(const PolyMesh::Poly& p, const std::vector<Vec3d>& corners) const;
@@ -49,7 +49,7 @@ class PolySheets {
 
   const PolyMesh& mesh_;
   std::vector<Sheet> all_;
-  std::vector<std::vector<Part>> parts_;
+  std::vector<std::vector<EdgePart>> parts_;
 };
 
 }  // namespace gsnav::detail

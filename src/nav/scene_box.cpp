@@ -37,15 +37,15 @@ Aabb<double> scene_box(std::span<const GaussianSet> sets, const GaussianNavOptio
     below += filled[i];
     least = kSparse * filled[i];
   }
-  struct Part {
+  struct MassCluster {
     double mass = 0;
     Aabb<double> box;
   };
-  std::vector<Part> parts;
+  std::vector<MassCluster> parts;
   std::map<Cell, bool> visited;
   for (const auto& [start, m] : mass) {
     if (m < least || visited[start]) continue;
-    Part part;
+    MassCluster part;
     std::vector<Cell> stack{start};
     visited[start] = true;
     while (!stack.empty()) {
@@ -66,9 +66,9 @@ Aabb<double> scene_box(std::span<const GaussianSet> sets, const GaussianNavOptio
     parts.push_back(part);
   }
   double most = 0;
-  for (const Part& p : parts) most = max(most, p.mass);
+  for (const MassCluster& p : parts) most = max(most, p.mass);
   Aabb<double> box;
-  for (const Part& p : parts) {
+  for (const MassCluster& p : parts) {
     if (p.mass >= 0.1 * most) box.add(p.box);
   }
   if (options.crop && !box.empty()) {

@@ -149,7 +149,7 @@ class TileMass {
 
 /// Gaussians that reach each tile of columns, in order.
 struct TileLists {
-  struct Reach {
+  struct ColumnBox {
     std::uint16_t x0 = 1, x1 = 0, z0 = 1, z1 = 0;  // Empty if x0 > x1.
   };
   std::size_t nx, nz;
@@ -159,7 +159,7 @@ struct TileLists {
   TileLists(const VoxelGrid& g, std::span<const GaussianSet> sets, const GaussianNavOptions& o,
             GaussianNavReport& report)
       : nx((g.nx + kTile - 1) / kTile), nz((g.nz + kTile - 1) / kTile) {
-    std::vector<Reach> reach;
+    std::vector<ColumnBox> reach;
     Solid s;
     SolidSplat splat;
     for (const GaussianSet& set : sets) {
@@ -179,7 +179,7 @@ struct TileLists {
       }
     }
     list_by_group(reach.size(), nx * nz, first, rows, [&](std::size_t i, const auto& f) {
-      const Reach& r = reach[i];
+      const ColumnBox& r = reach[i];
       if (r.x0 > r.x1) return;
       for (std::size_t z = r.z0; z <= r.z1; ++z) {
         for (std::size_t x = r.x0; x <= r.x1; ++x) f(x + nx * z);

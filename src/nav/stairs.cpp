@@ -43,13 +43,13 @@ std::vector<Mark> Floors::find_stairs(GaussianNavReport& report) {
     }
   }
   find_heights();
-  std::vector<Piece> pieces;
+  std::vector<GroundPiece> pieces;
   std::vector<std::vector<std::int32_t>> direct(storeys_.size());
   const auto note = [](std::vector<std::int32_t>& list, std::int32_t id) {
     if (std::find(list.begin(), list.end(), id) == list.end()) list.push_back(id);
   };
   constexpr std::int32_t kSeen = -3;
-  Piece piece;
+  GroundPiece piece;
   for (std::size_t c = 0; c < g_.nx * g_.nz; ++c) {
     for (std::uint32_t r = g_.first[c]; r < g_.first[c + 1]; ++r) {
       if (label_[r] >= 0) {
@@ -85,7 +85,7 @@ std::vector<Mark> Floors::find_stairs(GaussianNavReport& report) {
       changed = changed || !kept(id);
       storeys_[static_cast<std::size_t>(id)].kept = true;
     };
-    for (const Piece& p : pieces) {
+    for (const GroundPiece& p : pieces) {
       if (std::any_of(p.storeys.begin(), p.storeys.end(), kept))
         std::for_each(p.storeys.begin(), p.storeys.end(), keep);
     }
@@ -94,10 +94,10 @@ std::vector<Mark> Floors::find_stairs(GaussianNavReport& report) {
     }
   }
   std::vector<Mark> out;
-  std::erase_if(pieces, [&](const Piece& p) { return !kept(p.storeys.front()); });
+  std::erase_if(pieces, [&](const GroundPiece& p) { return !kept(p.storeys.front()); });
   report.stairs = pieces.size();
   level_ramps(pieces, out);
-  for (const Piece& p : pieces) fill_stairs(p, out, report);
+  for (const GroundPiece& p : pieces) fill_stairs(p, out, report);
   return out;
 }
 
@@ -135,10 +135,10 @@ void Floors::find_heights() {
   });
 }
 
-void Floors::level_ramps(std::span<const Piece> pieces, std::vector<Mark>& out) {
+void Floors::level_ramps(std::span<const GroundPiece> pieces, std::vector<Mark>& out) {
   ramp_.assign(g_.runs.size(), kNoLevel);
   std::vector<std::pair<std::uint32_t, std::uint32_t>> ground;
-  for (const Piece& p : pieces) {
+  for (const GroundPiece& p : pieces) {
     for (const auto& [c, run] : p.runs) ramp_[run] = height_[run];
     ground.insert(ground.end(), p.runs.begin(), p.runs.end());
   }
@@ -150,7 +150,7 @@ void Floors::level_ramps(std::span<const Piece> pieces, std::vector<Mark>& out) 
     ramp_[run] = height_[run];
     ground.push_back({static_cast<std::uint32_t>(c), run});
   };
-  for (const Piece& p : pieces) {
+  for (const GroundPiece& p : pieces) {
     for (const auto& [c, run] : p.beside) add(c, run);
   }
   const auto reach = static_cast<std::size_t>(kStairHead / g_.cell + 0.5);
@@ -189,7 +189,7 @@ void Floors::level_ramps(std::span<const Piece> pieces, std::vector<Mark>& out) 
   }
 }
 
-void Floors::fill_stairs(const Piece& p, std::vector<Mark>& out, GaussianNavReport& report) {
+void Floors::fill_stairs(const GroundPiece& p, std::vector<Mark>& out, GaussianNavReport& report) {
   const auto far = g_.cells_in(kRampRadius);
   std::size_t x0 = g_.nx, x1 = 0, z0 = g_.nz, z1 = 0;
   for (const auto& [c, run] : p.runs) {

@@ -117,7 +117,7 @@ std::optional<PatchLevel> Floors::fit(std::size_t patch, const PatchLevel& expec
 
 void Floors::grow(std::span<const Seed> seeds, std::size_t near) {
   const auto id = static_cast<std::int32_t>(storeys_.size());
-  Storey storey;
+  StoreyCandidate storey;
   const auto add = [&](std::size_t p, const PatchLevel& expected, std::size_t band) {
     if (level_of(p, id) != nullptr || taken(p, expected.level)) return;
     double columns = 0;

@@ -71,7 +71,7 @@ Fan fan_at(const PolyMesh& m, PolyId start, const Vec3d& p) noexcept {
 }
 
 /// Continuation from p: the polygon that is entered, the direction, and where that leaves the polygon.
-struct Way {
+struct PolyCrossing {
   PolyId poly = kNoPoly;
   Direction d{};
   Exit exit{};
@@ -81,8 +81,8 @@ bool progresses(const Exit& e, const Direction& d) noexcept {
   return !e.found || e.t * d.length() > kTouch;
 }
 
-Way enter(const PolyMesh& m, const Fan& fan, const Vec3d& p, const Direction& d) noexcept {
-  Way best;
+PolyCrossing enter(const PolyMesh& m, const Fan& fan, const Vec3d& p, const Direction& d) noexcept {
+  PolyCrossing best;
   for (std::size_t i = 0; i < fan.count; ++i) {
     const Exit e = exit_of(m, fan.polys[i], p, d);
     if (progresses(e, d) && (best.poly == kNoPoly || e.t > best.exit.t)) best = {fan.polys[i], d, e};
@@ -91,9 +91,9 @@ Way enter(const PolyMesh& m, const Fan& fan, const Vec3d& p, const Direction& d)
 }
 
 /// Fastest motion along a wall that stops direction d at p. Sets `normal` to the wall's normal.
-Way slide_along_wall(const PolyMesh& m, const Fan& fan, const Vec3d& p, const Direction& d, bool slide,
-                     Vec3d& normal) noexcept {
-  Way best;
+PolyCrossing slide_along_wall(const PolyMesh& m, const Fan& fan, const Vec3d& p, const Direction& d,
+                              bool slide, Vec3d& normal) noexcept {
+  PolyCrossing best;
   double best_speed = -1;
   for (std::size_t i = 0; i < fan.count; ++i) {
     const PolyMesh::Poly& poly = m.polys[fan.polys[i]];
@@ -109,7 +109,7 @@ Way slide_along_wall(const PolyMesh& m, const Fan& fan, const Vec3d& p, const Di
         normal = n;
       }
       if (!slide || !(std::abs(along) > max(best_speed, kParallel * d.length()))) continue;
-      const Way w = enter(m, fan, p, {along * ex / el, along * ez / el});
+      const PolyCrossing w = enter(m, fan, p, {along * ex / el, along * ez / el});
       if (w.poly == kNoPoly) continue;
       best = w;
       best_speed = std::abs(along);
@@ -214,7 +214,7 @@ void PolyMesh::walk(PolyId start_poly, const Vec3d& start, double dx, double dz,
   const std::size_t cap = 64 + 16 * polys.size();
   for (std::size_t hops = 0; left > 0; ++hops) {
     if (hops == cap) break;
-    Way way{poly, wanted, exit_of(*this, poly, p, wanted)};
+    PolyCrossing way{poly, wanted, exit_of(*this, poly, p, wanted)};
     if (!progresses(way.exit, wanted)) {
       const Fan fan = fan_at(*this, poly, p);
       way = enter(*this, fan, p, wanted);

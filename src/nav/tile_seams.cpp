@@ -17,9 +17,9 @@ using Triangle = PolyMesh::Corners;
 using Points = std::vector<std::uint32_t>;  // Indices into the mesh's points.
 
 /// Line of a border on the ground plane. Positions are in metres from its start.
-class Line {
+class BorderLine {
  public:
-  Line(const Vec3d& a, const Vec3d& b)
+  BorderLine(const Vec3d& a, const Vec3d& b)
       : a_(a), dx_(b.x - a.x), dz_(b.z - a.z), length_(std::hypot(dx_, dz_)) {
     if (length_ > 0) dx_ /= length_, dz_ /= length_;
   }
@@ -44,13 +44,13 @@ class Seams {
     // made by Recast may stack many polygons.
     left_ = min(m_.tris.size() / 2, m_.points.size()) + 8;
     extra_.resize(m_.polys.size());
-    each_seam([&](PolyId p, PolyId q, const Line& line) {
+    each_seam([&](PolyId p, PolyId q, const BorderLine& line) {
       const Points of_p = vertices_on(p, line), of_q = vertices_on(q, line);
       for (const std::uint32_t v : of_q) insert(p, v, line);
       for (const std::uint32_t v : of_p) insert(q, v, line);
     });
     put_together();
-    each_seam([&](PolyId p, PolyId q, const Line& line) {
+    each_seam([&](PolyId p, PolyId q, const BorderLine& line) {
       settle(p, line);
       settle(q, line);
     });
@@ -65,7 +65,7 @@ class Seams {
       for (std::uint32_t k = 0; k < poly.count; ++k) {
         const PolyId q = m_.neighbours[poly.first + k];
         if (q == kNoPoly || q < p || tile_of_[q] == tile_of_[p]) continue;
-        const Line line(m_.corner(poly, k), m_.corner(poly, k + 1));
+        const BorderLine line(m_.corner(poly, k), m_.corner(poly, k + 1));
         if (line.length() > kSamePlace) f(p, q, line);
       }
     }
@@ -89,7 +89,7 @@ class Seams {
       }
       return at->second;
     };
-    each_seam([&](PolyId p, PolyId q, const Line& line) {
+    each_seam([&](PolyId p, PolyId q, const BorderLine& line) {
       const Points of_p = vertices_on(p, line);
       for (const std::uint32_t point : vertices_on(q, line)) {
         const Vec3d& v = m_.points[point];
@@ -117,7 +117,7 @@ class Seams {
   }
 
   /// Moves a polygon's corners on the border to those of its height triangles.
-  void settle(PolyId id, const Line& line) {
+  void settle(PolyId id, const BorderLine& line) {
     const Points fixed = vertices_on(id, line);
     const PolyMesh::Poly& poly = m_.polys[id];
     for (std::uint32_t k = 0; k < poly.count; ++k) {
@@ -143,7 +143,7 @@ class Seams {
   }
 
   /// Distinct vertices of the height triangles of a polygon on this part of the border.
-  Points vertices_on(PolyId id, const Line& line) const {
+  Points vertices_on(PolyId id, const BorderLine& line) const {
     Points out;
     each_triangle(id, [&](const Triangle& t) {
       for (const std::uint32_t point : t) {
@@ -167,7 +167,7 @@ class Seams {
   }
 
   /// Splits the height triangle of a polygon whose side on the border contains point v.
-  void insert(PolyId id, std::uint32_t v, const Line& line) {
+  void insert(PolyId id, std::uint32_t v, const BorderLine& line) {
     if (left_ == 0) return;
     const double at = line.along(m_.points[v]);
     const auto split = [&](Triangle& t) {

@@ -38,20 +38,20 @@ std::uint32_t opposite(const PolyMesh& m, const PolyMesh::Poly& p, PolyId id, st
 }
 
 /// Point at which an edge of a polygon is cut.
-struct Cut {
+struct EdgeCut {
   double t = 0;           ///< Fraction of the edge's length.
   std::uint64_t key = 0;  ///< Key of the part up to the next cut, equal on both sides. kWall at a wall.
 };
-using Cuts = std::vector<std::vector<Cut>>;  ///< Indexed by the edge of a polygon.
+using Cuts = std::vector<std::vector<EdgeCut>>;  ///< Indexed by the edge of a polygon.
 
 /// Positions at which edge e is cut, as sorted fractions of its length. They are the ends of the parts
 /// of e, and of the parts of f, the edge of the neighbour along e.
 std::vector<double> cut_places(const PolySheets& sheets, std::uint32_t e, std::uint32_t f,
                                double length) {
   std::vector<double> at;
-  for (const Part& s : sheets.parts(e)) at.insert(at.end(), {s.t0, s.t1});
+  for (const EdgePart& s : sheets.parts(e)) at.insert(at.end(), {s.t0, s.t1});
   if (f != UnfoldedMesh::kNone) {
-    for (const Part& s : sheets.parts(f)) at.insert(at.end(), {1 - s.t0, 1 - s.t1});
+    for (const EdgePart& s : sheets.parts(f)) at.insert(at.end(), {1 - s.t0, 1 - s.t1});
   }
   std::sort(at.begin(), at.end());
   const double weld = kWeld / max(length, kWeld);
@@ -151,7 +151,7 @@ class FaceMaker {
 
   /// Adds the edges of a sheet from a to b, on edge `side` of the polygon.
   void add_stretches(const PolyMesh::Poly& poly, std::uint32_t side, const Vec3d& a, const Vec3d& b) {
-    const std::vector<Cut>& cut = cuts_[poly.first + side];
+    const std::vector<EdgeCut>& cut = cuts_[poly.first + side];
     const Vec3d &p = mesh_.corner(poly, side), &q = mesh_.corner(poly, side + 1);
     const double t0 = fraction_xz(p, q, a), t1 = fraction_xz(p, q, b);
     const auto nearest = [&](double t) {
