@@ -24,12 +24,12 @@ constexpr double kPt = 0.95;
 constexpr double kQf = 0.5;  // Exponent of the feature difference.
 
 /// An image as the colour and feature pipelines compare it.
-struct Seen {
+struct FlipImage {
   std::vector<Vec3d> color;  // Hunt-adjusted CIELAB after the blur of the eye.
   detail::Features features;
 };
 
-Seen see(const Samples& rgb, int width, int height, double pixels_per_degree) {
+FlipImage see(const Samples& rgb, int width, int height, double pixels_per_degree) {
   std::array<Plane, 3> image = detail::clamped_planes(rgb, width, height);
   const std::size_t n = image[0].values.size();
   const auto pixel = [](const std::array<Plane, 3>& planes, std::size_t p) {
@@ -41,7 +41,7 @@ Seen see(const Samples& rgb, int width, int height, double pixels_per_degree) {
     const Vec3d opponent = detail::ycxcz_from_xyz(detail::xyz_from_linear(linear));
     for (int c = 0; c < 3; ++c) image[static_cast<std::size_t>(c)].values[p] = opponent[c];
   }
-  Seen seen;
+  FlipImage seen;
   const std::array<Plane, 3> blurred = detail::contrast_filtered(image, pixels_per_degree);
   seen.color.reserve(n);
   for (std::size_t p = 0; p < n; ++p) {
@@ -78,8 +78,8 @@ Result<Flip> flip(Samples reference, Samples test, int width, int height, double
     return {Errc::invalid_argument,
             std::string("flip: pixels_per_degree = ") + std::to_string(pixels_per_degree)};
   }
-  const Seen a = see(reference, width, height, pixels_per_degree),
-             b = see(test, width, height, pixels_per_degree);
+  const FlipImage a = see(reference, width, height, pixels_per_degree),
+                  b = see(test, width, height, pixels_per_degree);
   const double largest = largest_difference();
   Flip out;
   out.map.reserve(a.color.size());

@@ -107,10 +107,10 @@ Camera CubeMap::face_camera(const Camera& sensor, std::size_t face) const noexce
 namespace {
 
 /// The four pixels around a position, and interpolation between them.
-struct Corners {
+struct BilinearLookup {
   std::size_t first;  // Index of the upper left pixel.
   float fx, fy;
-  Corners(float x, float y, int side) noexcept {
+  BilinearLookup(float x, float y, int side) noexcept {
     const float most = static_cast<float>(side - 2);
     const float x0 = clamp(std::floor(x), 0.0f, most), y0 = clamp(std::floor(y), 0.0f, most);
     fx = clamp(x - x0, 0.0f, 1.0f);
@@ -130,7 +130,7 @@ void CubeMap::sample_color(const std::array<const float*, kFaces>& face_images, 
   const std::size_t below = static_cast<std::size_t>(side_) * channels;
   for (std::size_t i = 0; i < taps_.size(); ++i) {
     const Tap& tap = taps_[i];
-    const Corners at(tap.x, tap.y, side_);
+    const BilinearLookup at(tap.x, tap.y, side_);
     for (std::size_t c = 0; c < channels; ++c) {
       if (tap.face == kFaces) {
         out[i * channels + c] = 0.0f;
@@ -151,7 +151,7 @@ void CubeMap::sample_depth(const std::array<const float*, kFaces>& face_images,
       out[i] = 0.0f;
       continue;
     }
-    const Corners at(tap.x, tap.y, side_);
+    const BilinearLookup at(tap.x, tap.y, side_);
     const float* p = face_images[tap.face] + at.first;
     const float z[4] = {p[0], p[1], p[side_], p[side_ + 1]};
     const float least = std::min({z[0], z[1], z[2], z[3]}), most = std::max({z[0], z[1], z[2], z[3]});

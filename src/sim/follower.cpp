@@ -23,7 +23,7 @@ constexpr double kStuck = 0.2;     // Move that a wall stops.
 
 /// Numbers of actions: first wait, then turn, then walk straight, and from then on follow the path. All
 /// zero: follow the path at once.
-struct Plan {
+struct ActionCounts {
   int waits = 0, turns = 0, walks = 0;  // Positive turns are to the left.
 };
 
@@ -64,7 +64,7 @@ class Lookahead {
         turn_(radians(world.config().turn_angle)),
         reach_(0.95 * world.config().success_distance) {}
 
-  Outlook play(const Plan& plan) const {
+  Outlook play(const ActionCounts& plan) const {
     static const CapsuleSet nobody;
     const TaskConfig& c = world_.config();
     const Vec3d goal = world_.episode().goal_position;
@@ -113,7 +113,7 @@ class Lookahead {
 
  private:
   /// Action that the plan prescribes for step i. Action::stop means that the path decides.
-  Action scripted(const Plan& plan, int i) const noexcept {
+  Action scripted(const ActionCounts& plan, int i) const noexcept {
     const Action to = plan.turns < 0 ? Action::turn_right : Action::turn_left;
     const Action fro = plan.turns < 0 ? Action::turn_left : Action::turn_right;
     if (i < plan.waits) return i % 2 == 0 ? to : fro;
@@ -156,7 +156,7 @@ Action GeodesicFollower::next(const World& world) const {
   const Lookahead look(world, bodies, horizon, options_.comfort);
   Outlook best = look.play({});
   if (best.charge <= 0) return best.first;
-  const auto consider = [&](const Plan& plan) {
+  const auto consider = [&](const ActionCounts& plan) {
     const Outlook o = look.play(plan);
     if (o.cost < best.cost - 1e-9) best = o;
   };

@@ -300,11 +300,11 @@ class RowLists {
   }
 
  private:
-  struct Rows {
+  struct PixelRows {
     int from, to;
   };
-  Rows rows_of(const OracleScene<Model>& scene, const OracleRecord<Model>& r,
-               int y_limit) const noexcept {
+  PixelRows rows_of(const OracleScene<Model>& scene, const OracleRecord<Model>& r,
+                    int y_limit) const noexcept {
     return {std::max(scene.boxed ? r.box.y0 : scene.rect.y0, y0_),
             std::min(scene.boxed ? r.box.y1 : scene.rect.y1, y_limit)};
   }

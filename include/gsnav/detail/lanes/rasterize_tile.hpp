@@ -32,7 +32,7 @@ class TileBlender {
   static constexpr bool kNeedsId = D != DepthMode::none || General || Mesh || Weigh;
 
   /// Values of a splat that blending reads, besides its column terms.
-  struct Row {
+  struct SplatValues {
     float ref_y, b;
     SplatColor<float> color;
     float number;  ///< index in the batch
@@ -150,7 +150,7 @@ class TileBlender {
   void blend_list(int block, int x, int y) noexcept {
     const F px = pixels_.pixel_x(x), py = pixels_.pixel_y(y);
     const BlendRules<float> rules = args_.rules;
-    const Row* const rows = &rows_[0];
+    const SplatValues* const rows = &rows_[0];
     BlendState<F, kLoop> state = pixels_.states[block];
     [[maybe_unused]] const F before = state.transmittance;
     [[maybe_unused]] F last(0.0f);  // last splat met with transmittance above 1/2
@@ -232,7 +232,7 @@ class TileBlender {
   std::size_t tile_;
   TilePixels<Color, D, Mesh> pixels_;
   Unset<SplatGeometry<float>, kBatch> geometry_;
-  Unset<Row, kStride> rows_;
+  Unset<SplatValues, kStride> rows_;
   std::uint32_t ids_[kNeedsId ? kStride : 1];  // slots, or ranks if splats are weighed
   Unset<Columns, General ? 1 : kParts * kStride> columns_;
   BlockLists lists_;

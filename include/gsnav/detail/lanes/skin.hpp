@@ -93,10 +93,10 @@ GSNAV_HD BlendedRows blend_every_fourth(const float* joints, const std::uint16_t
 
 /// Four elements of the matrices of a pack, one element per pack. The arguments are one of the parts of
 /// four BlendedRows.
-struct Columns {
+struct MatrixColumns {
   F c[4];
 
-  GSNAV_HD Columns(F::vector m0, F::vector m1, F::vector m2, F::vector m3) noexcept {
+  GSNAV_HD MatrixColumns(F::vector m0, F::vector m1, F::vector m2, F::vector m3) noexcept {
     F::vector r[4] = {m0, m1, m2, m3};
     gsnav::detail::transpose_quarters(r);
     for (int k = 0; k < 4; ++k) c[k].v = r[k];
@@ -116,7 +116,7 @@ GSNAV_HD Affine3<F> blend_joints(const SkinningArgs<float>& args, std::size_t fi
                     b = blend_every_fourth<K>(joints, indices + K, weights + K),
                     c = blend_every_fourth<K>(joints, indices + 2 * K, weights + 2 * K),
                     d = blend_every_fourth<K>(joints, indices + 3 * K, weights + 3 * K);
-  const Columns m0(a.parts[0], b.parts[0], c.parts[0], d.parts[0]),
+  const MatrixColumns m0(a.parts[0], b.parts[0], c.parts[0], d.parts[0]),
       m1(a.parts[1], b.parts[1], c.parts[1], d.parts[1]),
       m2(a.parts[2], b.parts[2], c.parts[2], d.parts[2]);
   return {{{{m0.c[0], m0.c[1], m0.c[2]}, {m0.c[3], m1.c[0], m1.c[1]}, {m1.c[2], m1.c[3], m2.c[0]}}},

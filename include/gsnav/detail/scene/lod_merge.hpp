@@ -103,16 +103,16 @@ inline double lod_overlap(const LodGaussian& a, const LodGaussian& b, const Vec3
   Vec3d u = cross(n, any);
   u = u * (1 / norm(u));
   const Vec3d v = cross(n, u);
-  struct Flat {
+  struct PlaneCovariance {
     double xx, xy, yy;
     double det() const noexcept { return xx * yy - xy * xy; }
   };
   const auto across = [&u, &v](const Sym3& s) {
     const Mat3d c = s.matrix();
-    return Flat{dot(u, c * u), dot(u, c * v), dot(v, c * v)};
+    return PlaneCovariance{dot(u, c * u), dot(u, c * v), dot(v, c * v)};
   };
-  const Flat fa = across(a.covariance), fb = across(b.covariance);
-  const Flat sum{fa.xx + fb.xx, fa.xy + fb.xy, fa.yy + fb.yy};
+  const PlaneCovariance fa = across(a.covariance), fb = across(b.covariance);
+  const PlaneCovariance sum{fa.xx + fb.xx, fa.xy + fb.xy, fa.yy + fb.yy};
   const double det = sum.det();
   if (!(fa.det() > 0 && fb.det() > 0 && det > 0)) return 0;
   const Vec3d d = a.mean - b.mean;

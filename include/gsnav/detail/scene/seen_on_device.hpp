@@ -74,7 +74,7 @@ class SeenOnDevice {
   }
 
  private:
-  using Renderer = typename B::batch_renderer;
+  using Batch = typename B::batch_renderer;
 
   /// Memory. The first look allocates it, and reports that there is none.
   struct Work {
@@ -95,15 +95,15 @@ class SeenOnDevice {
 
     GaussianArrays<B> arrays;
     GaussianSet set;
-    Renderer renderer;
+    Batch renderer;
     Buffer<float, B> most;                   // [viewpoints][rows]
     HostArray<float, B> most_here;           // [viewpoints][rows]
     std::vector<std::vector<RowBits>> rows;  // [viewpoints][chunks]
     bool measured = false;                   // the renderer knows how much memory a viewpoint needs
   };
 
-  std::vector<typename Renderer::camera_type> cameras_of(std::span<const std::size_t> which) const {
-    std::vector<typename Renderer::camera_type> out;
+  std::vector<typename Batch::camera_type> cameras_of(std::span<const std::size_t> which) const {
+    std::vector<typename Batch::camera_type> out;
     for (const std::size_t v : which) {
       for (const Camera& camera :
            cube_cameras(viewpoints_[v], v, settings_.face, settings_.near_plane, settings_.near_sigma))

@@ -94,8 +94,8 @@ class SensorFinish {
     for (std::size_t i = 0; i < plan.sensors().size(); ++i) {
       const SensorSpec& sensor = plan.sensors()[i];
       if (sensor.noise.kind == NoiseKind::none) continue;
-      const std::span<const float> clean = images.row(plan, plan.output(i).clean, view.row);
-      const std::span<float> out = images.row(plan, plan.output(i).noisy, view.row);
+      const std::span<const float> clean = images.row(plan, plan.buffers_of(i).clean, view.row);
+      const std::span<float> out = images.row(plan, plan.buffers_of(i).noisy, view.row);
       // Seeds that differ by one step of the generator would give the same stream, shifted. Hash them.
       const std::uint64_t seed = Rng(view.noise + 0xd6e8feb86659fd93ull * (i + 1)).next();
       if (sensor.noise.kind == NoiseKind::redwood_depth) {

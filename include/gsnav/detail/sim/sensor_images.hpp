@@ -48,7 +48,7 @@ struct SensorImages {
     };
     given.assign(plan.buffers(), nullptr);
     for (std::size_t i = 0; i < plan.sensors().size(); ++i) {
-      const std::size_t buffer = plan.output(i).noisy, floats = count * plan.size(buffer);
+      const std::size_t buffer = plan.buffers_of(i).noisy, floats = count * plan.size(buffer);
       if (given[buffer] != nullptr) continue;
       const auto made = detail::guarded([&] { return source(i, floats); });
       if (!made) return made.status();
@@ -73,18 +73,18 @@ struct SensorImages {
   /// Image of a sensor in one row, shape [height][width][channels]. Host memory only.
   std::span<const float> image(const SensorPlan& plan, std::size_t sensor,
                                std::size_t r) const noexcept {
-    const std::size_t buffer = plan.output(sensor).noisy, n = plan.size(buffer);
+    const std::size_t buffer = plan.buffers_of(sensor).noisy, n = plan.size(buffer);
     return {first(buffer) + r * n, n};
   }
   /// All rows of a sensor, shape [rows][height][width][channels]. Empty if they are not in host memory.
   std::span<const float> all(const SensorPlan& plan, std::size_t sensor) const noexcept {
     if (!in_host_memory()) return {};
-    const std::size_t buffer = plan.output(sensor).noisy;
+    const std::size_t buffer = plan.buffers_of(sensor).noisy;
     return {first(buffer), rows * plan.size(buffer)};
   }
   /// All rows of a sensor in the backend's memory. Null if they are in host memory.
   const float* all_on_backend(const SensorPlan& plan, std::size_t sensor) const noexcept {
-    return in_host_memory() ? nullptr : first(plan.output(sensor).noisy);
+    return in_host_memory() ? nullptr : first(plan.buffers_of(sensor).noisy);
   }
 
  private:

@@ -31,7 +31,7 @@ class SensorPlan {
     bool has(std::size_t kind) const noexcept { return buffer[kind] != kNone; }
   };
   /// Buffers of a sensor without and with noise. Equal if the sensor has no noise.
-  struct Output {
+  struct SensorBuffers {
     std::size_t clean, noisy;
   };
 
@@ -41,15 +41,15 @@ class SensorPlan {
       Group& group = group_of(i);
       const auto kind = static_cast<std::size_t>(sensors_[i].kind);
       if (!group.has(kind)) group.buffer[kind] = add_buffer(i);
-      Output out{group.buffer[kind], group.buffer[kind]};
-      if (sensors_[i].noise.kind != NoiseKind::none) out.noisy = add_buffer(i);
-      outputs_.push_back(out);
+      SensorBuffers own{group.buffer[kind], group.buffer[kind]};
+      if (sensors_[i].noise.kind != NoiseKind::none) own.noisy = add_buffer(i);
+      of_sensor_.push_back(own);
     }
   }
 
   const std::vector<SensorSpec>& sensors() const noexcept { return sensors_; }
   const std::vector<Group>& groups() const noexcept { return groups_; }
-  const Output& output(std::size_t sensor) const noexcept { return outputs_[sensor]; }
+  const SensorBuffers& buffers_of(std::size_t sensor) const noexcept { return of_sensor_[sensor]; }
   std::size_t buffers() const noexcept { return sizes_.size(); }
   /// Number of values per row of a buffer.
   std::size_t size(std::size_t buffer) const noexcept { return sizes_[buffer]; }
@@ -100,8 +100,8 @@ class SensorPlan {
 
   std::vector<SensorSpec> sensors_;
   std::vector<Group> groups_;
-  std::vector<Output> outputs_;     // One per sensor.
-  std::vector<std::size_t> sizes_;  // One per buffer.
+  std::vector<SensorBuffers> of_sensor_;  // One per sensor.
+  std::vector<std::size_t> sizes_;        // One per buffer.
 };
 
 }  // namespace gsnav
