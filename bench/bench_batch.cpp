@@ -92,8 +92,8 @@ std::vector<BatchCamera> judged_cameras() {
 }
 
 /// Visible sets of the cameras' cells, on the device.
-struct Seen {
-  explicit Seen(CudaBackend& cuda) : bits(cuda) {
+struct ViewSets {
+  explicit ViewSets(CudaBackend& cuda) : bits(cuda) {
     bits.upload(g_visible.bits.data(), g_visible.bits.size());
   }
   /// Sets each camera's visible set to the one of its cell. The call has one Gaussian set.
@@ -123,14 +123,14 @@ struct DeviceImages {
 
 /// Errors of the images of the judged views; NaN for images that are not drawn.
 struct Judged {
-  gsnav_bench::Error rgb{kNan, kNan, kNan, kNan};  ///< of all views together
-  double least = kNan;                             ///< PSNR of the worst view, dB
-  double depth_p99 = kNan;                         ///< metres, where alpha exceeds 0.9
+  gsnav_bench::ErrorStats rgb{kNan, kNan, kNan, kNan};  ///< of all views together
+  double least = kNan;                                  ///< PSNR of the worst view, dB
+  double depth_p99 = kNan;                              ///< metres, where alpha exceeds 0.9
 };
 
 /// Draws the judged views in calls of at most `count` cameras and compares them with `truth`.
 Judged judge(CudaBackend& cuda, CudaBatchRenderer& renderer, const std::vector<GaussianSet>& sets,
-             const Frames<double>& truth, std::size_t count, Seen& seen, const BatchImages& images) {
+             const Frames<double>& truth, std::size_t count, ViewSets& seen, const BatchImages& images) {
   const std::vector<BatchCamera> cameras = judged_cameras();
   const std::size_t pixels = static_cast<std::size_t>(g_width) * static_cast<std::size_t>(g_height);
   std::vector<float> rgb(3 * cameras.size() * pixels), depth(cameras.size() * pixels), depth_seen;
@@ -175,7 +175,7 @@ void row(CudaBackend& cuda, const GaussianArrays<CudaBackend>& arrays, const Fra
   const std::size_t pixels = static_cast<std::size_t>(g_width) * static_cast<std::size_t>(g_height);
   DeviceImages out(cuda, count * pixels);
   const std::vector<GaussianSet> sets{arrays.set()};
-  Seen seen(cuda);
+  ViewSets seen(cuda);
   cudaEvent_t begin, end;
   cudaEventCreate(&begin);
   cudaEventCreate(&end);
@@ -226,7 +226,7 @@ void compare_visible(CudaBackend& cuda, const GaussianArrays<CudaBackend>& array
   there.resize_discard(values);
   BatchImages images;
   images.floats.rgb = there.data();
-  Seen seen(cuda);
+  ViewSets seen(cuda);
   double least = 1e9, worst = 0, sum = 0;
   for (std::size_t v = 0; v < views; ++v) {
     std::vector<float> rgb[2];
@@ -239,7 +239,7 @@ void compare_visible(CudaBackend& cuda, const GaussianArrays<CudaBackend>& array
       cuda.copy(rgb[with].data(), there.data(), values * sizeof(float), CopyKind::device_to_host);
       cuda.synchronize().throw_if_error();
     }
-    const gsnav_bench::Error e =
+    const gsnav_bench::ErrorStats e =
         gsnav_bench::error_of(rgb[1], std::vector<double>(rgb[0].begin(), rgb[0].end()));
     least = std::min(least, e.psnr);
     worst = std::max(worst, e.max);

@@ -288,7 +288,7 @@ struct BlendBody {
     config.quality = quality;
     FrameStages<S, B> stages(backend, cloud, front_camera(), config);
     for (auto _ : state) stages.blend();
-    const Error e = error_of(stages.image(), truth.image());
+    const ErrorStats e = error_of(stages.image(), truth.image());
     state.counters["rgb_max"] = e.max;
     state.counters["rgb_psnr"] = e.psnr;
     count(state, stages.pixels());

@@ -46,9 +46,9 @@ struct SkinWork {
 
 /// One skinning with all its arrays in the backend's memory.
 template <class S, class Out, class B>
-class Skinning {
+class SkinningRun {
  public:
-  Skinning(B& backend, const GaussianCloud& cloud, const SkinWork& work)
+  SkinningRun(B& backend, const GaussianCloud& cloud, const SkinWork& work)
       : backend_(&backend),
         arrays_(backend, cloud),
         indices_(backend),
@@ -110,14 +110,14 @@ class Skinning {
 };
 
 template <class S, class B>
-using People = std::vector<std::unique_ptr<Skinning<S, float, B>>>;
+using People = std::vector<std::unique_ptr<SkinningRun<S, float, B>>>;
 
 template <class S, class B>
 People<S, B> make_people(B& backend, const GaussianCloud& cloud, const SkinWork& work,
                          std::size_t count) {
   People<S, B> people;
   for (std::size_t p = 0; p < count; ++p) {
-    people.push_back(std::make_unique<Skinning<S, float, B>>(backend, cloud, work));
+    people.push_back(std::make_unique<SkinningRun<S, float, B>>(backend, cloud, work));
   }
   return people;
 }
@@ -127,7 +127,7 @@ template <class S, class B>
 void report_errors(benchmark::State& state, const People<S, B>& people, std::size_t count,
                    const GaussianCloud& cloud, const SkinWork& work) {
   SerialBackend serial;
-  Skinning<double, double, SerialBackend> truth(serial, cloud, work);
+  SkinningRun<double, double, SerialBackend> truth(serial, cloud, work);
   truth.run();
   double means = 0, quats = 0;
   for (std::size_t p = 0; p < count; ++p) {
@@ -142,10 +142,10 @@ void report_errors(benchmark::State& state, const People<S, B>& people, std::siz
 
 /// Number of values whose bits differ from those of the scalar form.
 template <class B>
-double different_values(const Skinning<float, float, B>& skinning, const GaussianCloud& cloud,
+double different_values(const SkinningRun<float, float, B>& skinning, const GaussianCloud& cloud,
                         const SkinWork& work) {
   SerialBackend serial;
-  Skinning<float, float, SerialBackend> scalar(serial, cloud, work);
+  SkinningRun<float, float, SerialBackend> scalar(serial, cloud, work);
   scalar.run();
   double differ = 0;
   for (std::size_t k = 0; k < 7; ++k) {
@@ -194,7 +194,7 @@ struct SkinBody {
 #if defined(GSNAV_HAS_CUDA)
 /// Ten people in one call. The row's time is that of all ten together on the device. synchronised_us is
 /// the time from the call until its work is done.
-struct CrowdBody {
+struct CrowdSkin {
   SkinWork work;
   template <class S, class B>
   void operator()(benchmark::State& state, B& backend) const {
@@ -228,7 +228,7 @@ void register_skin_kernels() {
     add_cpu_rows("skin", variant, SkinBody{work});
     add_cuda_row("skin", variant, SkinBody{work});
 #if defined(GSNAV_HAS_CUDA)
-    add_cuda_row("skin_crowd", "people:10/" + variant, CrowdBody{work}, TimedBy::body);
+    add_cuda_row("skin_crowd", "people:10/" + variant, CrowdSkin{work}, TimedBy::body);
 #endif
   }
 }

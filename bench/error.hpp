@@ -9,19 +9,19 @@
 namespace gsnav_bench {
 
 /// Differences of an array from its float64 reference, reported beside every time.
-struct Error {
+struct ErrorStats {
   double max = 0, p99 = 0, p999 = 0, psnr = 0;
 };
 
 template <class A, class B>
-Error error_of(const std::vector<A>& values, const std::vector<B>& reference) {
+ErrorStats error_of(const std::vector<A>& values, const std::vector<B>& reference) {
   std::vector<double> d(values.size());
   double squares = 0;
   for (std::size_t i = 0; i < values.size(); ++i) {
     d[i] = std::abs(static_cast<double>(values[i]) - static_cast<double>(reference[i]));
     squares += d[i] * d[i];
   }
-  Error e;
+  ErrorStats e;
   if (d.empty()) return e;
   std::sort(d.begin(), d.end());
   const auto at = [&](double q) {

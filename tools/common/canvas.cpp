@@ -23,10 +23,10 @@ void Canvas::blend(int x, int y, Rgb c, float alpha) {
 }
 
 namespace {
-struct PixelBox {
+struct CanvasBox {
   int x0, y0, x1, y1;
 };
-PixelBox around(double x0, double y0, double x1, double y1, int width, int height) {
+CanvasBox around(double x0, double y0, double x1, double y1, int width, int height) {
   const auto limited = [](double v, int high) {
     return static_cast<int>(std::clamp(v, 0.0, static_cast<double>(high)));
   };
@@ -37,7 +37,7 @@ float coverage(double distance) { return static_cast<float>(std::clamp(0.5 - dis
 }  // namespace
 
 void Canvas::stroke(double x0, double y0, double x1, double y1, double radius, Rgb color, float alpha) {
-  const PixelBox b =
+  const CanvasBox b =
       around(std::min(x0, x1) - radius - 1, std::min(y0, y1) - radius - 1, std::max(x0, x1) + radius + 1,
              std::max(y0, y1) + radius + 1, width_, height_);
   const double dx = x1 - x0, dy = y1 - y0, length2 = std::max(dx * dx + dy * dy, 1e-12);
@@ -53,7 +53,7 @@ void Canvas::stroke(double x0, double y0, double x1, double y1, double radius, R
 
 void Canvas::ring(double cx, double cy, double radius, double width, Rgb color, float alpha) {
   const double reach = radius + width + 1;
-  const PixelBox b = around(cx - reach, cy - reach, cx + reach, cy + reach, width_, height_);
+  const CanvasBox b = around(cx - reach, cy - reach, cx + reach, cy + reach, width_, height_);
   for (int y = b.y0; y < b.y1; ++y) {
     for (int x = b.x0; x < b.x1; ++x) {
       const float c = coverage(std::abs(std::hypot(x + 0.5 - cx, y + 0.5 - cy) - radius) - 0.5 * width);
@@ -66,7 +66,7 @@ void Canvas::triangle(const gsnav::Vec2<double> (&p)[3], Rgb color, float alpha)
   const double area = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x);
   if (area == 0) return;
   const double sign = area > 0 ? 1.0 : -1.0;
-  const PixelBox b =
+  const CanvasBox b =
       around(std::min({p[0].x, p[1].x, p[2].x}), std::min({p[0].y, p[1].y, p[2].y}),
              std::max({p[0].x, p[1].x, p[2].x}), std::max({p[0].y, p[1].y, p[2].y}), width_, height_);
   for (int y = b.y0; y < b.y1; ++y) {

@@ -57,15 +57,15 @@ struct Track {
 };
 
 /// Pose of the agent at one moment.
-struct Moment {
+struct AgentMoment {
   double time = 0;  ///< seconds on the scene's clock
   gsnav::AgentPose agent;
 };
 
 /// The moment between a (t = 0) and b (t = 1). The agent moves in a straight line and turns by the
 /// smaller angle.
-Moment between(const Moment& a, const Moment& b, double t) {
-  Moment m = b;
+AgentMoment between(const AgentMoment& a, const AgentMoment& b, double t) {
+  AgentMoment m = b;
   if (t == 1) return m;
   m.time = a.time + t * (b.time - a.time);
   m.agent.position = a.agent.position + (b.agent.position - a.agent.position) * t;
@@ -75,16 +75,17 @@ Moment between(const Moment& a, const Moment& b, double t) {
 }
 
 /// Draws pictures of moments of an episode.
-class Painter {
+class EpisodePainter {
  public:
-  static gsnav::Result<Painter> create(const Options& o, const ReplayOptions& r, const Stage& stage) {
+  static gsnav::Result<EpisodePainter> create(const Options& o, const ReplayOptions& r,
+                                              const Stage& stage) {
     gsnav::RenderOptions options;
     options.render = stage.config.render;
     options.detail = gsnav::detail_choice(stage.config);
     options.render.outputs = gsnav::kRgb | gsnav::kMedianDepth;
     auto renderer = gsnav::Renderer::create(o.device, stage.scene, options);
     if (!renderer) return renderer.status();
-    Painter p(std::move(*renderer));
+    EpisodePainter p(std::move(*renderer));
     p.own_ = stage.config.sensors.front();
     p.radius_ = stage.config.task.agent_radius;
     p.height_ = stage.config.task.agent_height;
@@ -100,7 +101,7 @@ class Painter {
   }
 
   /// Picture of the chosen camera, [height][width][3] bytes.
-  gsnav::Result<std::vector<std::uint8_t>> paint(const Moment& m) {
+  gsnav::Result<std::vector<std::uint8_t>> paint(const AgentMoment& m) {
     if (!fixed_) return view(own_camera(m, 1), m.time);
     auto rgb = view(*fixed_, m.time);
     if (!rgb) return rgb;
@@ -126,10 +127,10 @@ class Painter {
   }
 
  private:
-  explicit Painter(gsnav::Renderer renderer) : renderer_(std::move(renderer)) {}
+  explicit EpisodePainter(gsnav::Renderer renderer) : renderer_(std::move(renderer)) {}
 
   /// The agent's own camera with an image that is `share` times smaller.
-  gsnav::Camera own_camera(const Moment& m, int share) const {
+  gsnav::Camera own_camera(const AgentMoment& m, int share) const {
     gsnav::SensorSpec spec = own_;
     for (int& side : spec.resolution) side /= share;
     return gsnav::sensor_camera(spec, m.agent.position, m.agent.rotation(), m.agent.pitch);
@@ -152,7 +153,7 @@ class Painter {
 /// Follows a replay: records its track, and writes pictures to a folder or a video.
 class Recorder {
  public:
-  Recorder(const Options& o, const ReplayOptions& r, Painter painter)
+  Recorder(const Options& o, const ReplayOptions& r, EpisodePainter painter)
       : options_(o), replay_(r), painter_(std::move(painter)) {}
 
   Status open(double control_period) {
@@ -163,14 +164,14 @@ class Recorder {
     return video.status();
   }
   Status look(Simulator& s, std::size_t step) {
-    const Moment now{s.clock(), s.agent()};
+    const AgentMoment now{s.clock(), s.agent()};
     const Vec3d& at = now.agent.position;
     track_.positions.insert(track_.positions.end(), {at.x, at.y, at.z});
     track_.yaws.push_back(now.agent.yaw);
     track_.times.push_back(now.time);
     track_.clearances.push_back(s.world().last_step().avatar_clearance);
     if (step % static_cast<std::size_t>(replay_.every) != 0 || step > replay_.last) return {};
-    const Moment before = std::exchange(last_, now);
+    const AgentMoment before = std::exchange(last_, now);
     if (step < replay_.first) return {};
     for (int k = step <= replay_.first ? replay_.per_action : 1; k <= replay_.per_action; ++k) {
       const auto rgb = painter_.paint(between(before, now, static_cast<double>(k) / replay_.per_action));
@@ -198,10 +199,10 @@ class Recorder {
 
   const Options& options_;
   const ReplayOptions& replay_;
-  Painter painter_;
+  EpisodePainter painter_;
   std::unique_ptr<Video> video_;
   Track track_;
-  Moment last_;
+  AgentMoment last_;
   std::size_t pictures_ = 0;
 };
 
@@ -236,7 +237,7 @@ Status run(const Options& o, const ReplayOptions& r) {
   }
   auto sim = make_simulator(o, *stage);
   if (!sim) return sim.status();
-  auto painter = Painter::create(o, r, *stage);
+  auto painter = EpisodePainter::create(o, r, *stage);
   if (!painter) return painter.status();
   Recorder recorder(o, r, std::move(*painter));
   if (Status s = recorder.open(stage->config.task.control_period); !s) return s;

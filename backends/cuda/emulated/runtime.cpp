@@ -35,14 +35,14 @@ constexpr std::size_t kDefaultShared = 48 << 10, kMostShared = 64 << 10;
 
 thread_local cudaError_t last_error = cudaSuccess;
 
-struct Device {
+struct DeviceState {
   std::mutex mutex;
   /// Bytes of shared memory that a launch may request: the maximum allowed for any kernel.
   std::size_t shared = kDefaultShared;
   std::vector<CUstream_st*> streams;
 };
-Device& device() {
-  static auto* const d = new Device;  // Never destroyed, because static objects may use it at exit.
+DeviceState& device() {
+  static auto* const d = new DeviceState;  // Never destroyed, because static objects may use it at exit.
   return *d;
 }
 
@@ -99,7 +99,7 @@ bool accepts(const Launch& l) {
 
 cudaError_t set_attribute(cudaFuncAttribute, int value) {
   if (value < 0 || static_cast<std::size_t>(value) > kMostShared) return failed(cudaErrorInvalidValue);
-  Device& d = device();
+  DeviceState& d = device();
   const std::lock_guard lock(d.mutex);
   d.shared = std::max(d.shared, static_cast<std::size_t>(value));
   return cudaSuccess;
