@@ -165,7 +165,9 @@ class BatchCases final : public CaseImages<float> {
         !std::all_of(cameras.begin(), cameras.end(), same_size)) {
       BasicRenderer<float, CudaBackend> renderer(cuda_, config);
       renderer.set_meshes(meshes.instances);
-      return renderer.render(sets, cameras).value();
+      Frames<float> frames = renderer.render(sets, cameras).value();
+      record_hashes(frames, name() + ", in no batch");
+      return frames;
     }
     std::vector<Camera> all = cameras;
     if (way_ == BatchWay::many) {

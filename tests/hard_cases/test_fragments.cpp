@@ -448,6 +448,7 @@ TEST_CASE("semantic ids by weight: a pane is who covers most of a pixel, or nobo
     const SemanticLabels out =
         semantic_labels<double>(serial, std::span(&set, 1), panes.instances, axis_camera(9));
     const double of_pane = static_cast<double>(alpha), of_cloud = 0.9 * (1 - of_pane);
+    record_hashes<float>({{"labels", &out.labels}, {"weights", &out.weights}}, "serial double");
     CHECK(out.labels[40] == (of_pane > of_cloud ? 3.0f : 1.0f));
     CHECK(std::abs(static_cast<double>(out.weights[40]) - std::max(of_pane, of_cloud)) < 1e-6);
   }

@@ -84,9 +84,9 @@ TEST_CASE("images: every storage and selection of rows draws the same bits on ev
       renderer.set_meshes(there.meshes());
       const Frames<float> one = renderer.render(there.sets(), std::span(&scene.camera, 1)).value();
       check_same_bits(one, single);
+      record_hashes(one, (scene.in_batches ? "cuda batch, " : "cuda in no batch, ") + scene.name);
       if (!scene.in_batches) continue;
       CHECK(one.stats[0].visible == 0);  // A batch of one, which counts none.
-      record_hashes(one, "cuda batch, " + scene.name);
       CudaBatchRenderer regions(cuda, there.config());
       regions.set_least_of_regions(1, 0);
       const Batch batch = draw_batch(cuda, regions, there.sets(), {scene.camera}, {},
