@@ -105,8 +105,13 @@ class GpuRows {
       chunks_.place(cuts);
       for (std::size_t c = 0; c < n; ++c) {
         for (const GaussianSet& set : cuts[c].sets()) {
-          lists[c].push_back(static_cast<std::uint32_t>(sets.size()));
-          sets.push_back(set);
+          // Cameras in one cell share its cut, as in a batch of simulators.
+          const auto same = std::ranges::find_if(sets, [&](const GaussianSet& other) {
+            return other.gaussians.shape.means.data[0] == set.gaussians.shape.means.data[0] &&
+                   other.selection.drawn_chunks.data == set.selection.drawn_chunks.data;
+          });
+          lists[c].push_back(static_cast<std::uint32_t>(same - sets.begin()));
+          if (same == sets.end()) sets.push_back(set);
         }
         batch[c].sets = lists[c];
       }
