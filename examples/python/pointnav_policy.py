@@ -195,10 +195,10 @@ def save(policy: Policy, path: pathlib.Path) -> None:
     """
     kept: dict[str, Any] = {}
     for name, weight in policy.weights.items():
-        largest = float(np.abs(weight).max(initial=0))
         if name[:5] == "value":
             continue
-        if largest > np.finfo(np.float16).max:
+        largest = float(np.abs(weight).max(initial=0))
+        if largest > 65504.0:
             sys.exit(f"{path}: {name} has a weight of size {largest:g}, and numbers of 16 bits end at 65504")
         kept[name] = weight.astype(np.float16)
     with aside(path) as part, open(part, "wb") as file:

@@ -94,7 +94,8 @@ def test_two_ranks_make_the_update_of_one_with_twice_the_environments(tmp_path):
 
 def test_a_folder_or_disk_that_takes_no_files_ends_the_run_with_a_line(tmp_path):
     def said(out, *limits):
-        run = subprocess.run([*limits, *command(out)], env=ONE_THREAD, capture_output=True, text=True)
+        words = [*limits, *command(out, updates=1, every=1)]
+        run = subprocess.run(words, env=ONE_THREAD, capture_output=True, text=True)
         assert run.returncode == 1 and run.stderr.startswith("train_pointnav.py: "), run.stderr
         assert run.stderr.count("\n") == 1 and not list(out.glob("part-*")), run.stderr
         return run.stderr
