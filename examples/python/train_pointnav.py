@@ -209,7 +209,7 @@ class Learner:
         last = torch.where(self.start[rows] > 0, ACTIONS, self.last[rows])
         images = self.mirror.images([i[rows] for i in self.images])
         x = self.agent.features(images, self.goal[rows].reshape(-1, 3), last.reshape(-1))
-        x = Reorder.apply(x, order, inverse)  # type: ignore[no-untyped-call]
+        x = Reorder.apply(x, order, inverse)  # type: ignore[no-untyped-call,unused-ignore]
         hidden = self.first_hidden[chunk][env] * (1 - fresh)[:, None]
         y = self.agent.gru(PackedSequence(x, sizes), hidden[None])[0].data
         policy_learns = self.update_count >= self.args.critic_updates
